@@ -1,0 +1,1 @@
+"""How we learn: MAP, Laplace draws, emcee, NUTS, identifiability, the posterior."""

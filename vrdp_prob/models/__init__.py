@@ -1,0 +1,1 @@
+"""What we believe about the world: simulator, effects, parameters, observation, likelihood."""

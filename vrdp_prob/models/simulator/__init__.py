@@ -1,0 +1,1 @@
+"""The event-driven simulator: motion between events, detection, contacts, the event loop."""

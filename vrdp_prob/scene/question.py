@@ -1,0 +1,67 @@
+"""A question about a video, as CLEVRER's question files state it."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import StrEnum
+
+
+class QuestionType(StrEnum):
+    """The four kinds of questions of CLEVRER."""
+
+    DESCRIPTIVE = "descriptive"
+    EXPLANATORY = "explanatory"
+    PREDICTIVE = "predictive"
+    COUNTERFACTUAL = "counterfactual"
+
+
+@dataclass(frozen=True)
+class Choice:
+    """One option of a multiple-choice question.
+
+    Parameters
+    ----------
+    choice_id
+        Name of the option within its question.
+    text
+        The option in English.
+    program
+        Its program in postfix order, None where only the text is known.
+    answer
+        The true judgement (`correct` or `wrong`) where it is known; for scoring alone.
+    """
+
+    choice_id: int | str
+    text: str
+    program: tuple[str, ...] | None = None
+    answer: str | None = None
+
+
+@dataclass(frozen=True)
+class Question:
+    """One question.
+
+    Parameters
+    ----------
+    text
+        The question in English.
+    program
+        Its program in postfix order, None where only the text is known.
+    choices
+        Options of a multiple-choice question, empty for an open question.
+    question_type
+        One of the four kinds, None where it has to be read off the program.
+    question_id
+        Name of the question within its video.
+    answer
+        The true answer where it is known; for scoring alone.
+    labels
+        Further fields of the question file, for example `question_subtype`.
+    """
+
+    text: str
+    program: tuple[str, ...] | None = None
+    choices: tuple[Choice, ...] = ()
+    question_type: QuestionType | None = None
+    question_id: int | str | None = None
+    answer: str | None = None
+    labels: Mapping[str, str] | None = None

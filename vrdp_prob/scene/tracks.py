@@ -1,0 +1,196 @@
+"""Measured positions of the objects of one video."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import xarray as xr
+from jaxtyping import Bool, Float
+
+from vrdp_prob.errors import InputError
+from vrdp_prob.scene.body import Body, Wall
+from vrdp_prob.scene.camera import Camera
+
+OVERLAP_TOLERANCE = 0.25
+"""Share of the contact distance by which measured centres may be too near before the tracks are refused."""
+
+
+@dataclass(frozen=True)
+class Tracks:
+    """Measured positions of the objects of one video, validated once, here.
+
+    Parameters
+    ----------
+    video
+        Name of the video.
+    bodies
+        The objects, in the order of the `body` axis.
+    data
+        Dataset with coordinates `time` (s, increasing) and `body` (ids) and the variables
+
+        - `x`, `y` (time, body): position in m, NaN where the object was not seen;
+        - `angle` (time, body), optional: angle in rad, counter-clockwise, unwrapped, its zero arbitrary per object;
+        - `position_covariance` (time, body, axis, axis_other), optional: covariance in m^2 of the measured position,
+          where whoever measured it knows it.
+    walls
+        Static walls.
+    camera
+        The camera, where there is one: events `in` and `out` are crossings of its picture's edge.
+
+    Raises
+    ------
+    InputError
+        If there is no object or no position, times are not finite and strictly increasing, a position is infinite,
+        an object was seen fewer than two times, or two bodies overlap where they are first seen together.
+    """
+
+    video: str
+    bodies: tuple[Body, ...]
+    data: xr.Dataset
+    walls: tuple[Wall, ...] = ()
+    camera: Camera | None = None
+
+    def __post_init__(self) -> None:
+        self._check_names()
+        self._check_values()
+        self._check_overlap()
+
+    @classmethod
+    def from_arrays(
+        cls,
+        video: str,
+        bodies: tuple[Body, ...],
+        times: Float[np.ndarray, "time"],
+        positions: Float[np.ndarray, "time body 2"],
+        *,
+        angles: Float[np.ndarray, "time body"] | None = None,
+        position_covariance: Float[np.ndarray, "time body 2 2"] | None = None,
+        walls: tuple[Wall, ...] = (),
+        camera: Camera | None = None,
+    ) -> "Tracks":
+        """Tracks from arrays: times in s, positions in m (NaN where not seen), angles in rad, covariance in m^2."""
+        variables: dict[str, object] = {
+            "x": (("time", "body"), positions[..., 0], {"units": "m"}),
+            "y": (("time", "body"), positions[..., 1], {"units": "m"}),
+        }
+        if angles is not None:
+            variables["angle"] = (("time", "body"), angles, {"units": "rad"})
+        if position_covariance is not None:
+            axes = ("time", "body", "axis", "axis_other")
+            variables["position_covariance"] = (axes, position_covariance, {"units": "m^2"})
+        coordinates = {"time": ("time", times, {"units": "s"}), "body": ("body", [body.id for body in bodies])}
+        return cls(video, bodies, xr.Dataset(variables, coordinates), walls, camera)
+
+    @property
+    def times(self) -> Float[np.ndarray, "time"]:
+        """Times in s of the frames."""
+        return np.asarray(self.data["time"].values, dtype=float)
+
+    @property
+    def positions(self) -> Float[np.ndarray, "time body 2"]:
+        """Measured positions in m, NaN where an object was not seen."""
+        return np.stack([self.data["x"].values, self.data["y"].values], axis=-1).astype(float)
+
+    @property
+    def angles(self) -> Float[np.ndarray, "time body"] | None:
+        """Measured angles in rad, NaN where not measured; None where no angle was."""
+        return np.asarray(self.data["angle"].values, dtype=float) if "angle" in self.data else None
+
+    @property
+    def position_covariance(self) -> Float[np.ndarray, "time body 2 2"] | None:
+        """Covariance in m^2 of the measured positions; None where it is not known."""
+        if "position_covariance" not in self.data:
+            return None
+        return np.asarray(self.data["position_covariance"].values, dtype=float)
+
+    @property
+    def seen(self) -> Bool[np.ndarray, "time body"]:
+        """Whether an object was seen in a frame."""
+        return np.isfinite(self.positions).all(axis=-1)
+
+    @property
+    def first_seen(self) -> Float[np.ndarray, "body"]:
+        """Time in s at which each object was first seen."""
+        return self.times[self.seen.argmax(axis=0)]
+
+    @property
+    def last_seen(self) -> Float[np.ndarray, "body"]:
+        """Time in s at which each object was last seen."""
+        return self.times[::-1][self.seen[::-1].argmax(axis=0)]
+
+    @property
+    def frame_rate(self) -> float:
+        """Frames per second: of the camera where it says so, else from the median time step."""
+        if self.camera is not None and self.camera.frame_rate is not None:
+            return self.camera.frame_rate
+        return float(1 / np.median(np.diff(self.times)))
+
+    def index(self, body: str) -> int:
+        """Place of an object on the body axis.
+
+        Raises
+        ------
+        InputError
+            If no object has that id.
+        """
+        for index, candidate in enumerate(self.bodies):
+            if candidate.id == body:
+                return index
+        raise InputError(
+            f"{self.video}: there is no object '{body}'; the objects are {', '.join(b.id for b in self.bodies)}."
+        )
+
+    def until(self, time: float) -> "Tracks":
+        """The same tracks with the frames up to and including a time (s); objects not seen twice by then are left out."""
+        data = self.data.sel(time=slice(None, time + 1e-9))
+        keep = np.isfinite(data["x"].values).sum(axis=0) >= 2
+        bodies = tuple(body for body, kept in zip(self.bodies, keep, strict=True) if kept)
+        return Tracks(self.video, bodies, data.isel(body=keep), self.walls, self.camera)
+
+    def _check_names(self) -> None:
+        ids = [body.id for body in self.bodies]
+        if not ids:
+            raise InputError(f"{self.video}: there are 0 objects; give tracks of at least one.")
+        if len(set(ids)) < len(ids):
+            raise InputError(f"{self.video}: two objects have the same id ({', '.join(ids)}); name them apart.")
+        if list(self.data["body"].values) != ids:
+            raise InputError(f"{self.video}: the body axis of the data does not match the objects {', '.join(ids)}.")
+
+    def _check_values(self) -> None:
+        times, positions = self.times, self.positions
+        if not np.isfinite(times).all():
+            raise InputError(f"{self.video}: a time is not finite; give every row a time in seconds.")
+        steps = np.diff(times)
+        if (steps <= 0).any():
+            where = times[1:][steps <= 0][0]
+            raise InputError(
+                f"{self.video}: times are not strictly increasing at {where:g} s; sort the rows and drop duplicates."
+            )
+        if np.isinf(positions).any():
+            frame, body, _ = np.argwhere(np.isinf(positions))[0]
+            raise InputError(
+                f"{self.video}: the position of object {self.bodies[body].id} at {times[frame]:g} s is infinite; "
+                "leave a missing observation out."
+            )
+        for body, count in zip(self.bodies, self.seen.sum(axis=0), strict=True):
+            if count < 2:
+                raise InputError(
+                    f"{self.video}: object {body.id} was seen in {count} frame{'s' * (count != 1)}; "
+                    "at least two are needed to tell its motion."
+                )
+
+    def _check_overlap(self) -> None:
+        seen, positions = self.seen, self.positions
+        for i, first in enumerate(self.bodies):
+            for j in range(i + 1, len(self.bodies)):
+                second = self.bodies[j]
+                together = seen[:, i] & seen[:, j]
+                if not together.any() or first.radius is None or second.radius is None:
+                    continue
+                frame = int(together.argmax())
+                distance = float(np.linalg.norm(positions[frame, i] - positions[frame, j]))
+                if distance < (1 - OVERLAP_TOLERANCE) * (first.radius + second.radius):
+                    raise InputError(
+                        f"{self.video}: objects {first.id} and {second.id} overlap at {self.times[frame]:g} s "
+                        f"(centres {distance:.3g} m apart, radii {first.radius:g} and {second.radius:g} m); "
+                        "check positions and radii."
+                    )

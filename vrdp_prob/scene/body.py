@@ -81,7 +81,7 @@ class Body:
     def probabilities(self, attribute: str) -> dict[str | None, float]:
         """Probability of each value of an attribute; one value with probability 1 where it is certain."""
         if attribute in self.attribute_probabilities:
-            return dict(self.attribute_probabilities[attribute])
+            return {**self.attribute_probabilities[attribute]}
         value: str | None = getattr(self, attribute)
         return {value: 1.0}
 

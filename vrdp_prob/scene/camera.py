@@ -83,7 +83,7 @@ class Camera:
             raise InputError(f"{path}: the camera file cannot be read ({error.strerror}); check the path.") from error
         except (ValueError, KeyError, TypeError, AttributeError) as error:
             raise InputError(
-                f"{path}: not a camera file ({error}); it needs 'projection' (3 rows of 4 numbers), 'width' and 'height'."
+                f"{path}: not a camera file ({error}); it needs 'projection' (3 rows of 4), 'width' and 'height'."
             ) from error
         if projection.shape != (3, 4):
             raise InputError(f"{path}: 'projection' is {projection.shape}, not 3 rows of 4 numbers.")

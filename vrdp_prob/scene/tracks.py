@@ -140,7 +140,7 @@ class Tracks:
         )
 
     def until(self, time: float) -> "Tracks":
-        """The same tracks with the frames up to and including a time (s); objects not seen twice by then are left out."""
+        """The same tracks up to and including a time (s); objects not seen twice by then are left out."""
         data = self.data.sel(time=slice(None, time + 1e-9))
         keep = np.isfinite(data["x"].values).sum(axis=0) >= 2
         bodies = tuple(body for body, kept in zip(self.bodies, keep, strict=True) if kept)

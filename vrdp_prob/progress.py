@@ -1,0 +1,74 @@
+"""How long work tells that it goes on: a bar with the time left in a terminal, nothing elsewhere."""
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Protocol
+
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+
+Advance = Callable[[float], None]
+
+
+class ProgressDisplay(Protocol):
+    """Whoever wants to follow long work implements this one method."""
+
+    def stage(self, description: str, total: float | None = None) -> "StageContext":
+        """Open a stage of work; `total` is its number of steps, None where it is not known beforehand."""
+        ...
+
+
+class StageContext(Protocol):
+    """A stage: entering it gives the function that reports finished steps."""
+
+    def __enter__(self) -> Advance: ...
+
+    def __exit__(self, *exception: object) -> bool | None: ...
+
+
+class SilentProgress:
+    """Tells nothing."""
+
+    @contextmanager
+    def stage(self, description: str, total: float | None = None) -> Iterator[Advance]:
+        """Open a stage that nobody follows."""
+        del description, total
+        yield lambda _steps: None
+
+
+class TerminalProgress:
+    """One bar per stage with the time left, on standard error; the finished bars stay to be read.
+
+    Parameters
+    ----------
+    console
+        Where to draw; standard error by default.
+    """
+
+    def __init__(self, console: Console | None = None) -> None:
+        self._console = console or Console(stderr=True)
+
+    @contextmanager
+    def stage(self, description: str, total: float | None = None) -> Iterator[Advance]:
+        """Open a stage drawn as a bar."""
+        columns = (
+            TextColumn("{task.description:<34}"),
+            BarColumn(bar_width=24),
+            TaskProgressColumn(),
+            TimeElapsedColumn(),
+            TextColumn("left"),
+            TimeRemainingColumn(),
+        )
+        with Progress(*columns, console=self._console) as progress:
+            task = progress.add_task(description, total=total)
+            yield lambda steps: progress.advance(task, steps)
+            if total is None:
+                progress.update(task, total=1, completed=1)
+            else:
+                progress.update(task, completed=total)
+
+
+def progress_display(*, quiet: bool) -> ProgressDisplay:
+    """Bars where standard error is a terminal and nobody asked for quiet, else nothing."""
+    console = Console(stderr=True)
+    return TerminalProgress(console) if console.is_terminal and not quiet else SilentProgress()

@@ -1,7 +1,7 @@
 """How long work tells that it goes on: a bar with the time left in a terminal, nothing elsewhere."""
 
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from typing import Protocol
 
 from rich.console import Console
@@ -13,17 +13,17 @@ Advance = Callable[[float], None]
 class ProgressDisplay(Protocol):
     """Whoever wants to follow long work implements this one method."""
 
-    def stage(self, description: str, total: float | None = None) -> "StageContext":
-        """Open a stage of work; `total` is its number of steps, None where it is not known beforehand."""
+    def stage(self, description: str, total: float | None = None) -> AbstractContextManager[Advance]:
+        """Open a stage of work, which gives the function that reports finished steps.
+
+        Parameters
+        ----------
+        description
+            What is done, in a few words.
+        total
+            Number of steps, None where it is not known beforehand.
+        """
         ...
-
-
-class StageContext(Protocol):
-    """A stage: entering it gives the function that reports finished steps."""
-
-    def __enter__(self) -> Advance: ...
-
-    def __exit__(self, *exception: object) -> bool | None: ...
 
 
 class SilentProgress:

@@ -1,1 +1,7 @@
-"""Files that hold scenes and questions."""
+"""Files that hold scenes and questions: tracks folders, CLEVRER annotations and question files."""
+
+from vrdp_prob.datasets.clevrer import read_annotation, read_questions
+from vrdp_prob.datasets.folder import read_folder, write_folder
+from vrdp_prob.datasets.loading import find_camera, load, load_all
+
+__all__ = ["find_camera", "load", "load_all", "read_annotation", "read_folder", "read_questions", "write_folder"]

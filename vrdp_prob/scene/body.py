@@ -78,12 +78,15 @@ class Body:
                     f"object {self.id}: the probabilities of its {attribute} must be >= 0 and add up to 1."
                 )
 
-    def probabilities(self, attribute: str) -> dict[str | None, float]:
-        """Probability of each value of an attribute; one value with probability 1 where it is certain."""
+    def probabilities(self, attribute: str) -> Mapping[str, float]:
+        """Probability of each value of an attribute; one value with probability 1 where it is certain.
+
+        An attribute that nobody stated has no value: the mapping is empty.
+        """
         if attribute in self.attribute_probabilities:
-            return {**self.attribute_probabilities[attribute]}
+            return self.attribute_probabilities[attribute]
         value: str | None = getattr(self, attribute)
-        return {value: 1.0}
+        return {} if value is None else {str(value): 1.0}
 
 
 @dataclass(frozen=True)

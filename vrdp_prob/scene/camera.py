@@ -8,6 +8,7 @@ import numpy as np
 from jaxtyping import Float
 
 from vrdp_prob.errors import InputError
+from vrdp_prob.files import write_atomically
 
 REST_HEIGHT = 0.2
 """Height in m of the centre of a resting CLEVRER object."""
@@ -101,6 +102,17 @@ class Camera:
             "pixel_sd": self.pixel_sd,
             "projection": self.projection.tolist(),
         }
+
+    def write(self, path: Path) -> None:
+        """Write a camera file that `Camera.read` reads.
+
+        Raises
+        ------
+        InputError
+            If the file cannot be written.
+        """
+        with write_atomically(path) as temporary:
+            temporary.write_text(json.dumps(self.to_document(), indent=1) + "\n", encoding="utf-8")
 
     def project(self, points: Float[np.ndarray, "*points 3"]) -> Float[np.ndarray, "*points 2"]:
         """Pixel coordinates (u, v) of points of the world (x, y, z) in m."""

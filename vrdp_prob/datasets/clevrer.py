@@ -1,0 +1,169 @@
+"""CLEVRER's own files: annotations of a video, and questions with programs (Yi et al., ICLR 2020).
+
+Of an annotation only positions and the yaw of cubes inside the picture become measurements; velocities, collisions and
+positions out of view stay for scoring.
+"""
+
+import json
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from vrdp_prob.errors import InputError
+from vrdp_prob.scene import Body, Camera, Choice, Question, QuestionType, Shape, Tracks
+from vrdp_prob.scene.camera import REST_HEIGHT
+
+FRAME_RATE = 25.0
+"""Frames per second of CLEVRER's videos."""
+
+Document = Mapping[str, Any]
+
+
+def read_json(path: Path) -> Any:
+    """Content of a JSON file.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read or is not JSON.
+    """
+    try:
+        return json.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise InputError(f"{path}: the file cannot be read ({error.strerror}); check the path.") from error
+    except ValueError as error:
+        raise InputError(f"{path}: not a JSON file ({error}); check that it is whole.") from error
+
+
+def read_annotation(path: Path, *, camera: Camera | None = None) -> Tracks:
+    """Tracks of a CLEVRER annotation file.
+
+    Parameters
+    ----------
+    path
+        JSON file with `object_property` and `motion_trajectory`.
+    camera
+        The camera of the video, where it is known.
+
+    Raises
+    ------
+    InputError
+        If the file is not such a document, an object has an unknown shape, or none is ever in view.
+    """
+    document = read_json(path)
+    try:
+        properties = document["object_property"]
+        frames = document["motion_trajectory"]
+        video = Path(document["video_filename"]).stem
+        index = {entry["object_id"]: number for number, entry in enumerate(properties)}
+        positions = np.full((len(frames), len(properties), 2), np.nan)
+        yaw = np.full((len(frames), len(properties)), np.nan)
+        for number, frame in enumerate(frames):
+            for entry in frame["objects"]:
+                if entry["inside_camera_view"]:
+                    positions[number, index[entry["object_id"]]] = entry["location"][:2]
+                    yaw[number, index[entry["object_id"]]] = entry["orientation"][2]
+        bodies = [_body(path, entry) for entry in properties]
+        times = np.array([frame["frame_id"] for frame in frames]) / (
+            camera.frame_rate if camera is not None and camera.frame_rate else FRAME_RATE
+        )
+    except (KeyError, TypeError, IndexError, ValueError) as error:
+        if isinstance(error, InputError):
+            raise
+        raise InputError(
+            f"{path}: not a CLEVRER annotation ({type(error).__name__}: {error}); "
+            "it needs 'object_property', 'motion_trajectory' and 'video_filename'."
+        ) from error
+    seen_twice = np.isfinite(positions[..., 0]).sum(axis=0) >= 2
+    kept = tuple(body for body, seen in zip(bodies, seen_twice, strict=True) if seen)
+    cube = np.array([body.shape is Shape.CUBE for body in kept], dtype=bool)
+    angles = _unwrapped(np.where(cube, yaw[:, seen_twice], np.nan))
+    return Tracks.from_arrays(
+        video,
+        kept,
+        times,
+        positions[:, seen_twice],
+        angles=angles if cube.any() else None,
+        camera=camera,
+    )
+
+
+def read_questions(path: Path) -> dict[str, list[Question]]:
+    """Questions of a CLEVRER question file by the stem of their video's file name.
+
+    Raises
+    ------
+    InputError
+        If the file is not such a document, or holds no question.
+    """
+    document = read_json(path)
+    scenes = document if isinstance(document, list) else [document]
+    questions: dict[str, list[Question]] = {}
+    for scene in scenes:
+        try:
+            name, entries = Path(scene["video_filename"]).stem, scene["questions"]
+        except (KeyError, TypeError) as error:
+            raise InputError(
+                f"{path}: not a CLEVRER question file ({error}); every scene needs 'video_filename' and 'questions'."
+            ) from error
+        questions.setdefault(name, []).extend(_question(f"{path}, {name}", entry) for entry in entries)
+    if not any(questions.values()):
+        raise InputError(f"{path}: the file holds no question; give at least one.")
+    return questions
+
+
+def _body(path: Path, entry: Document) -> Body:
+    identity = str(entry["object_id"])
+    try:
+        shape = Shape(entry["shape"])
+    except ValueError as error:
+        raise InputError(
+            f"{path}: object {identity} has the unknown shape '{entry['shape']}'; use sphere, cube or cylinder."
+        ) from error
+    return Body(identity, shape, radius=REST_HEIGHT, material=entry.get("material"), color=entry.get("color"))
+
+
+def _unwrapped(angles: np.ndarray) -> np.ndarray:
+    """Angles (time, body) made continuous in time, gaps aside."""
+    result = angles.copy()
+    for column in result.T:
+        measured = np.isfinite(column)
+        column[measured] = np.unwrap(column[measured])
+    return result
+
+
+def _question(place: str, entry: Document) -> Question:
+    try:
+        text = entry["question"]
+        kind = entry.get("question_type")
+        choices = tuple(
+            Choice(
+                choice.get("choice_id", number),
+                choice["choice"],
+                _program(choice.get("program")),
+                choice.get("answer"),
+            )
+            for number, choice in enumerate(entry.get("choices") or ())
+        )
+        answer = entry.get("answer")
+        return Question(
+            text=text,
+            program=_program(entry.get("program")),
+            choices=choices,
+            question_type=None if kind is None else QuestionType(kind),
+            question_id=entry.get("question_id"),
+            answer=None if answer is None else str(answer),
+            labels={"question_subtype": entry["question_subtype"]} if "question_subtype" in entry else None,
+        )
+    except (KeyError, TypeError, AttributeError, ValueError) as error:
+        name = entry.get("question_id", "?") if isinstance(entry, Mapping) else "?"
+        raise InputError(
+            f"{place}, question {name}: {type(error).__name__} {error}; "
+            "a question needs 'question', and each of its choices 'choice'."
+        ) from error
+
+
+def _program(tokens: Sequence[str] | None) -> tuple[str, ...] | None:
+    return None if tokens is None else tuple(str(token) for token in tokens)

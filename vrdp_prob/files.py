@@ -1,0 +1,37 @@
+"""Files that are there whole or not at all."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from tempfile import mkstemp
+
+from vrdp_prob.errors import InputError
+
+
+@contextmanager
+def write_atomically(path: Path) -> Iterator[Path]:
+    """Give a temporary path beside `path`, which takes the name `path` when the block ends without an exception.
+
+    Raises
+    ------
+    InputError
+        If the folder cannot be made or written.
+    """
+    temporary: Path | None = None
+    try:
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            handle, name = mkstemp(prefix=f".{path.stem}-", suffix=path.suffix, dir=path.parent)
+            temporary = Path(name)
+            open(handle, "wb").close()
+        except OSError as error:
+            raise InputError(
+                f"{path.parent}: the folder cannot be written ({error.strerror}); choose another one."
+            ) from error
+        yield temporary
+        temporary.chmod(0o644)
+        temporary.replace(path)
+    except BaseException:
+        if temporary is not None:
+            temporary.unlink(missing_ok=True)
+        raise

@@ -1,0 +1,49 @@
+# Every command sets up what it needs: a virtual environment in .venv with the versions of constraints.txt.
+PYTHON ?= $(shell command -v python3.11 || command -v python3)
+VENV := .venv
+BIN := $(VENV)/bin
+SETUP := $(VENV)/.complete
+OUT ?= out
+export PIP_DISABLE_PIP_VERSION_CHECK := 1
+
+.PHONY: help setup demo test test-slow lint types bench clean
+
+help:
+	@echo "make demo       the main job on the example that ships: a video in, a report out"
+	@echo "make test       the fast tests"
+	@echo "make test-slow  the statistical and large tests"
+	@echo "make lint       format, lint and types"
+	@echo "make bench      every benchmark, tables to the terminal and JSON to $(OUT)/"
+
+setup: $(SETUP)
+
+$(SETUP): pyproject.toml constraints.txt
+	$(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install --quiet --constraint constraints.txt torch==2.13.0
+	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable ".[dev]"
+	touch $(SETUP)
+
+demo: $(SETUP)
+	$(BIN)/vrdp-prob demo --out $(OUT)/demo
+
+test: $(SETUP)
+	$(BIN)/python -m pytest -m "not slow" -n 2 --dist loadfile
+
+test-slow: $(SETUP)
+	$(BIN)/python -m pytest -m slow -n 2 --dist loadfile
+
+lint: $(SETUP)
+	$(BIN)/ruff format --check .
+	$(BIN)/ruff check .
+
+types: $(SETUP)
+	$(BIN)/mypy
+
+bench: $(SETUP)
+	mkdir -p $(OUT)
+	for script in benchmarks/[a-z]*.py; do \
+	  $(BIN)/python $$script --json $(OUT)/$$(basename $$script .py).json || exit 1; \
+	done
+
+clean:
+	rm -rf $(VENV) $(OUT) .pytest_cache .mypy_cache .ruff_cache build dist

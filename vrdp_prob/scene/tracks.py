@@ -171,7 +171,7 @@ class Tracks:
                 f"{self.video}: the position of object {self.bodies[body].id} at {times[frame]:g} s is infinite; "
                 "leave a missing observation out."
             )
-        for body, count in zip(self.bodies, self.seen.sum(axis=0), strict=True):
+        for body, count in zip(self.bodies, self.seen.sum(axis=0).tolist(), strict=True):
             if count < 2:
                 raise InputError(
                     f"{self.video}: object {body.id} was seen in {count} frame{'s' * (count != 1)}; "

@@ -1,0 +1,150 @@
+"""Tracks folders: what is read is what was written, and every mistake is told with its place."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from vrdp_prob.datasets import load, load_all, read_folder, write_folder
+from vrdp_prob.errors import InputError
+from vrdp_prob.scene import Body, Camera, Shape, Tracks, Wall
+
+TRACKS = """video,object,time,x,y
+a,1,0.00,0.0,0.0
+a,1,0.04,0.1,0.0
+a,1,0.12,0.3,0.0
+a,2,0.04,1.0,1.0
+a,2,0.08,1.0,1.1
+b,1,0.00,0.0,0.0
+b,1,0.04,0.0,0.5
+"""
+OBJECTS = """video,object,shape,radius,mass,material
+a,1,sphere,0.2,1.5,metal
+a,2,cube,0.2,,
+b,1,cylinder,,,
+"""
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """A tracks folder of two videos."""
+    (tmp_path / "tracks.csv").write_text(TRACKS)
+    (tmp_path / "objects.csv").write_text(OBJECTS)
+    return tmp_path
+
+
+def test_missing_rows_become_missing_positions(folder: Path) -> None:
+    first, second = read_folder(folder)
+    assert (first.video, second.video) == ("a", "b")
+    np.testing.assert_allclose(first.times, [0, 0.04, 0.08, 0.12])
+    np.testing.assert_array_equal(first.seen, [[1, 0], [1, 1], [0, 1], [1, 0]])
+    np.testing.assert_allclose(first.first_seen, [0, 0.04])
+    np.testing.assert_allclose(first.last_seen, [0.12, 0.08])
+    assert first.bodies[0] == Body("1", Shape.SPHERE, 0.2, mass=1.5, material="metal")
+    assert second.bodies[0].radius is None
+
+
+def test_walls_belong_to_their_video_or_to_all(folder: Path) -> None:
+    (folder / "walls.csv").write_text("video,x1,y1,x2,y2,restitution\n*,0,-1,5,-1,\nb,2,-1,2,5,0.8\n")
+    first, second = read_folder(folder)
+    assert first.walls == (Wall(0, -1, 5, -1),)
+    assert second.walls == (Wall(0, -1, 5, -1), Wall(2, -1, 2, 5, 0.8))
+
+
+def test_write_then_read_gives_the_same(tmp_path: Path) -> None:
+    times = np.arange(5) / 25
+    positions = np.random.default_rng(0).normal(size=(5, 2, 2))
+    positions[1, 0] = np.nan
+    angles = np.full((5, 2), np.nan)
+    angles[:, 1] = times
+    bodies = (Body("x", Shape.SPHERE, 0.2, color="red"), Body("y", Shape.CUBE, 0.3, mass=2.0))
+    tracks = Tracks.from_arrays(
+        "v", bodies, times, positions, angles=angles, walls=(Wall(0, 0, 1, 0, 0.5),), camera=Camera.clevrer()
+    )
+    write_folder(tmp_path, [tracks])
+    again = load(tmp_path)
+    np.testing.assert_allclose(again.positions, positions, rtol=1e-8)
+    np.testing.assert_allclose(again.angles, angles, rtol=1e-8)
+    assert (again.bodies, again.walls) == (bodies, tracks.walls)
+    np.testing.assert_array_equal(again.camera.projection, Camera.clevrer().projection)
+
+
+@pytest.mark.parametrize(
+    ("name", "old", "new", "message"),
+    [
+        ("tracks.csv", "video,object,time,x,y", "video,object,time,x", "column y missing"),
+        ("tracks.csv", "a,1,0.04,0.1,0.0", "a,1,0.04,nan,0.0", "row 3: 'x' is 'nan'"),
+        ("tracks.csv", "a,1,0.04,0.1,0.0", "a,1,0.04,inf,0.0", "row 3: 'x' is 'inf'"),
+        ("tracks.csv", "a,1,0.04,0.1,0.0", "a,1,0.04,left,0.0", "row 3: 'x' is 'left'; give a number"),
+        ("tracks.csv", "a,1,0.04,0.1,0.0", "a,1,0.04,,0.0", "row 3: 'x' is empty"),
+        ("tracks.csv", "a,1,0.04,0.1,0.0", "a,1,0.04,0.1", "row 3: 4 cells where the header has 5"),
+        ("tracks.csv", "a,1,0.04,", "a,1,0.00,", "row 3: time 0 of object 1 is there twice"),
+        ("tracks.csv", "a,1,0.12,", "a,1,0.02,", "row 4: time 0.02 of object 1 comes after a later one"),
+        ("tracks.csv", "b,1,0.04,0.0,0.5\n", "", "object 1 was seen in 1 frame;"),
+        ("tracks.csv", "a,2,0.04,1.0,1.0", "a,2,0.04,0.2,0.0", "objects 1 and 2 overlap at 0.04 s"),
+        ("tracks.csv", TRACKS, "", "the file is empty"),
+        ("tracks.csv", TRACKS, "video,object,time,x,y\n", "there are 0 objects"),
+        ("objects.csv", "a,2,cube", "a,2,pyramid", "row 3: shape 'pyramid' is not known"),
+        ("objects.csv", "a,1,sphere,0.2", "a,1,sphere,-0.2", "row 2: object 1: radius is -0.2"),
+        ("objects.csv", "a,2,cube,0.2,,\n", "", "object 2 of video a has tracks but no row"),
+        ("objects.csv", "a,2,cube", "a,1,cube", "row 3: object 1 of video a is there twice"),
+    ],
+)
+def test_a_mistake_is_one_sentence_with_its_place(folder: Path, name: str, old: str, new: str, message: str) -> None:
+    path = folder / name
+    assert old in path.read_text()
+    path.write_text(path.read_text().replace(old, new))
+    with pytest.raises(InputError) as caught:
+        read_folder(folder)
+    assert message in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_wall_mistakes_name_their_row(folder: Path) -> None:
+    (folder / "walls.csv").write_text("video,x1,y1,x2,y2,restitution\n*,0,0,0,0,\n")
+    with pytest.raises(InputError, match=r"row 2: wall .* are the same"):
+        read_folder(folder)
+
+
+def test_a_folder_of_several_videos_needs_a_choice(folder: Path) -> None:
+    with pytest.raises(InputError, match="holds 2 videos; choose one"):
+        load(folder)
+    assert load(folder, video="b").video == "b"
+    assert [tracks.video for tracks in load_all(folder)] == ["a", "b"]
+    with pytest.raises(InputError, match="there is no video 'c'; the videos are a, b"):
+        load(folder, video="c")
+
+
+def test_paths_that_are_not_there(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="no such file or folder"):
+        load(tmp_path / "nothing")
+    with pytest.raises(InputError, match=r"has no tracks\.csv"):
+        load(tmp_path)
+
+
+def test_a_video_needs_a_camera(tmp_path: Path) -> None:
+    (tmp_path / "inner").mkdir()
+    video = tmp_path / "inner" / "clip.mp4"
+    video.write_bytes(b"")
+    with pytest.raises(InputError, match=r"no camera; put camera\.json beside the video"):
+        load(video)
+    (tmp_path / "camera.json").write_text('{"projection": [[1, 2], [3, 4]], "width": 4, "height": 3}')
+    with pytest.raises(InputError, match=r"camera\.json: 'projection' is \(2, 2\)"):
+        load(video)
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "clevrer_bullet",
+        "billiards_three_cushion",
+        "puck_mass_pairs_2d",
+        "puck_collisions_2d",
+        "glider_free_1d",
+        "glider_collisions_1d_rubber",
+    ],
+)
+def test_the_data_sets_are_read(shared_data: Path, name: str) -> None:
+    videos = load_all(shared_data / name)
+    assert len(videos) >= 6
+    assert all(tracks.seen.sum(axis=0).min() >= 2 for tracks in videos)

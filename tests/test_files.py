@@ -1,0 +1,36 @@
+"""Files are there whole or not at all."""
+
+from pathlib import Path
+
+import pytest
+
+from vrdp_prob.errors import InputError
+from vrdp_prob.files import write_atomically
+
+
+def test_the_file_appears_when_the_block_ends(tmp_path: Path) -> None:
+    with write_atomically(tmp_path / "new" / "a.txt") as temporary:
+        temporary.write_text("whole")
+        assert not (tmp_path / "new" / "a.txt").exists()
+    assert (tmp_path / "new" / "a.txt").read_text() == "whole"
+
+
+@pytest.mark.parametrize("interruption", [KeyboardInterrupt, ValueError])
+def test_an_interruption_leaves_what_was_there(tmp_path: Path, interruption: type[BaseException]) -> None:
+    (tmp_path / "a.txt").write_text("before")
+
+    def write() -> None:
+        with write_atomically(tmp_path / "a.txt") as temporary:
+            temporary.write_text("half")
+            raise interruption
+
+    with pytest.raises(interruption):
+        write()
+    assert [path.name for path in tmp_path.iterdir()] == ["a.txt"]
+    assert (tmp_path / "a.txt").read_text() == "before"
+
+
+def test_a_folder_that_cannot_be_made(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("in the way")
+    with pytest.raises(InputError, match="the folder cannot be written"), write_atomically(tmp_path / "file" / "a.txt"):
+        pass

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from vrdp_prob.datasets import load, read_annotation, read_questions
+from vrdp_prob.datasets import load, read_annotation, read_questions, video_names
 from vrdp_prob.errors import InputError
 from vrdp_prob.scene import QuestionType, Shape
 
@@ -117,3 +117,11 @@ def test_annotations_and_tracks_of_the_practice_set_agree(shared_data: Path) -> 
     assert exact.camera is not None
     difference = (exact.positions - noisy.positions)[noisy.seen]
     assert abs(difference.std() - 0.01) < 0.001, "the noise that the data set states"
+
+
+def test_a_folder_of_annotations_is_read_as_its_videos(shared_data: Path) -> None:
+    folder = shared_data / "clevrer_bullet" / "annotations"
+    assert len(video_names(folder)) == 60
+    assert load(folder, video="video_00007").video == "video_00007"
+    with pytest.raises(InputError, match="there is no video 'video_9'"):
+        load(folder, video="video_9")

@@ -118,7 +118,7 @@ def test_a_folder_of_several_videos_needs_a_choice(folder: Path) -> None:
 def test_paths_that_are_not_there(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="no such file or folder"):
         load(tmp_path / "nothing")
-    with pytest.raises(InputError, match=r"has no tracks\.csv"):
+    with pytest.raises(InputError, match=r"holds no tracks\.csv, no video and no annotation"):
         load(tmp_path)
 
 

@@ -2,6 +2,16 @@
 
 from vrdp_prob.datasets.clevrer import read_annotation, read_questions
 from vrdp_prob.datasets.folder import read_folder, write_folder
-from vrdp_prob.datasets.loading import find_camera, load, load_all
+from vrdp_prob.datasets.loading import find_camera, load, load_all, video_files, video_names
 
-__all__ = ["find_camera", "load", "load_all", "read_annotation", "read_folder", "read_questions", "write_folder"]
+__all__ = [
+    "find_camera",
+    "load",
+    "load_all",
+    "read_annotation",
+    "read_folder",
+    "read_questions",
+    "video_files",
+    "video_names",
+    "write_folder",
+]

@@ -37,6 +37,13 @@ def read_json(path: Path) -> Any:
         raise InputError(f"{path}: not a JSON file ({error}); check that it is whole.") from error
 
 
+def annotated_video(path: Path) -> str:
+    """Name of the video of an annotation file: the stem of its `video_filename`, else of the file itself."""
+    document = read_json(path)
+    name = document.get("video_filename") if isinstance(document, dict) else None
+    return Path(str(name)).stem if name else path.stem
+
+
 def read_annotation(path: Path, *, camera: Camera | None = None) -> Tracks:
     """Tracks of a CLEVRER annotation file.
 

@@ -66,7 +66,7 @@ def read_folder(folder: Path, *, videos: Sequence[str] | None = None, camera: Ca
     names = list(measurements) if videos is None else list(videos)
     for name in names:
         if name not in measurements:
-            raise InputError(f"{folder}: there is no video '{name}'; the videos are {_some(list(measurements))}.")
+            raise InputError(f"{folder}: there is no video '{name}'; the videos are {some(list(measurements))}.")
     return [
         _tracks(folder, name, measurements[name], bodies, walls=walls[ALL_VIDEOS] + walls[name], camera=camera)
         for name in names
@@ -215,6 +215,7 @@ def _write_rows(path: Path, rows: Sequence[Sequence[object]]) -> None:
         csv.writer(file, lineterminator="\n").writerows(["" if cell is None else cell for cell in row] for row in rows)
 
 
-def _some(names: list[str]) -> str:
+def some(names: Sequence[str]) -> str:
+    """The first few of many names, for a sentence."""
     shown = ", ".join(names[:6])
     return shown if len(names) <= 6 else f"{shown}, ... ({len(names)} in all)"

@@ -1,10 +1,10 @@
-"""One door for every input: a video, a tracks folder or a CLEVRER annotation."""
+"""One door for every input: a video, a tracks folder, a CLEVRER annotation, or a folder of videos or annotations."""
 
 from collections.abc import Sequence
 from pathlib import Path
 
-from vrdp_prob.datasets.clevrer import read_annotation
-from vrdp_prob.datasets.folder import read_folder, video_names
+from vrdp_prob.datasets import folder as folders
+from vrdp_prob.datasets.clevrer import annotated_video, read_annotation
 from vrdp_prob.errors import InputError
 from vrdp_prob.progress import ProgressDisplay
 from vrdp_prob.scene import Camera, Tracks
@@ -12,6 +12,8 @@ from vrdp_prob.scene import Camera, Tracks
 CameraChoice = Camera | Path | str | None
 CAMERA_FILE = "camera.json"
 CLEVRER = "clevrer"
+VIDEO_SUFFIXES = (".avi", ".m4v", ".mkv", ".mov", ".mp4", ".mpg", ".webm")
+ANNOTATION_PATTERN = "annotation*.json"
 
 
 def load(
@@ -26,7 +28,8 @@ def load(
     Parameters
     ----------
     path
-        A video file, a tracks folder (or its `tracks.csv`), or a CLEVRER annotation file.
+        A video file, a tracks folder (or its `tracks.csv`), a CLEVRER annotation file, or a folder of videos or of
+        annotations.
     video
         Which video of a folder of several.
     camera
@@ -40,8 +43,7 @@ def load(
     InputError
         If the input cannot be used, a folder holds several videos and none is named, or a video has no camera.
     """
-    path = Path(path)
-    names = video_names_of(path)
+    names = video_names(path)
     if video is None and len(names) > 1:
         raise InputError(f"{path}: the folder holds {len(names)} videos; choose one (--video {names[0]}, say).")
     return load_all(path, videos=None if video is None else [video], camera=camera, progress=progress)[0]
@@ -54,37 +56,34 @@ def load_all(
     camera: CameraChoice = None,
     progress: ProgressDisplay | None = None,
 ) -> list[Tracks]:
-    """Tracks of all videos of a folder, or of the one video of a file; parameters as for `load`."""
-    path = Path(path)
-    if not path.exists():
-        raise InputError(f"{path}: there is no such file or folder; check the path.")
-    if _is_tracks_folder(path):
-        folder = path if path.is_dir() else path.parent
-        return read_folder(folder, videos=videos, camera=find_camera(folder, camera))
-    if path.is_dir():
-        raise InputError(f"{path}: the folder has no tracks.csv; give a tracks folder, a video or an annotation file.")
-    if path.suffix.lower() == ".json":
-        tracks = read_annotation(path, camera=find_camera(path, camera))
-    else:
-        found = find_camera(path, camera)
-        if found is None:
-            raise InputError(
-                f"{path}: no camera; put {CAMERA_FILE} beside the video or in its parent folder, or give --camera FILE "
-                "(or --camera clevrer)."
-            )
-        from vrdp_prob.perception import read_video  # noqa: PLC0415 - OpenCV is loaded only where there is a video
-
-        tracks = read_video(path, found, progress=progress)
-    if videos is not None and list(videos) != [tracks.video]:
-        raise InputError(f"{path}: there is no video '{', '.join(videos)}' in it; it is {tracks.video}.")
-    return [tracks]
+    """Tracks of the named videos (all by default) of an input; parameters as for `load`."""
+    source = _existing(path)
+    if _is_tracks_folder(source):
+        folder = source if source.is_dir() else source.parent
+        return folders.read_folder(folder, videos=videos, camera=find_camera(folder, camera))
+    files = _annotation_files(source) or video_files(source)
+    names = list(files) if videos is None else list(videos)
+    for name in names:
+        if name not in files:
+            raise InputError(f"{path}: there is no video '{name}'; the videos are {folders.some(list(files))}.")
+    return [_load_file(files[name], camera, progress) for name in names]
 
 
-def video_names_of(path: Path) -> list[str]:
-    """Names of the videos of a tracks folder; the file's stem for any other input."""
-    if _is_tracks_folder(path):
-        return video_names(path if path.is_dir() else path.parent)
-    return [path.stem]
+def video_names(path: Path | str) -> list[str]:
+    """Names of the videos of an input, in the order in which `load_all` returns them."""
+    source = _existing(path)
+    if _is_tracks_folder(source):
+        return folders.video_names(source if source.is_dir() else source.parent)
+    return list(_annotation_files(source) or video_files(source))
+
+
+def video_files(path: Path | str) -> dict[str, Path]:
+    """Video files by their stem: the file itself, or those of a folder or of its sub-folder `videos`."""
+    source = Path(path)
+    if not source.is_dir():
+        return {} if source.suffix.lower() in {".csv", ".json"} else {source.stem: source}
+    candidates = sorted((source / "videos").glob("*")) or sorted(source.glob("*"))
+    return {file.stem: file for file in candidates if file.suffix.lower() in VIDEO_SUFFIXES}
 
 
 def find_camera(path: Path, camera: CameraChoice = None) -> Camera | None:
@@ -100,5 +99,34 @@ def find_camera(path: Path, camera: CameraChoice = None) -> Camera | None:
     return None
 
 
+def _existing(path: Path | str) -> Path:
+    source = Path(path)
+    if not source.exists():
+        raise InputError(f"{source}: there is no such file or folder; check the path.")
+    if source.is_dir() and not (_is_tracks_folder(source) or _annotation_files(source) or video_files(source)):
+        raise InputError(f"{source}: the folder holds no tracks.csv, no video and no annotation; check the path.")
+    return source
+
+
 def _is_tracks_folder(path: Path) -> bool:
     return (path / "tracks.csv").is_file() if path.is_dir() else path.name == "tracks.csv"
+
+
+def _annotation_files(path: Path) -> dict[str, Path]:
+    """CLEVRER annotation files by the name of their video."""
+    files = sorted(path.glob(ANNOTATION_PATTERN)) if path.is_dir() else [path] if path.suffix == ".json" else []
+    return {annotated_video(file): file for file in files}
+
+
+def _load_file(path: Path, camera: CameraChoice, progress: ProgressDisplay | None) -> Tracks:
+    found = find_camera(path, camera)
+    if path.suffix.lower() == ".json":
+        return read_annotation(path, camera=found)
+    if found is None:
+        raise InputError(
+            f"{path}: no camera; put {CAMERA_FILE} beside the video or in its parent folder, or give --camera FILE "
+            "(or --camera clevrer)."
+        )
+    from vrdp_prob.perception import read_video  # noqa: PLC0415 - OpenCV is loaded only where there is a video
+
+    return read_video(path, found, progress=progress)

@@ -1,0 +1,136 @@
+"""Sampling with emcee: independent ensembles of walkers, each merged into one chain before anything is judged.
+
+Walkers of one ensemble propose from one another, so they are no independent chains; whole ensembles are.
+No snooker moves: in emcee 3.1.6 they shrink a Gaussian's standard deviation to 0.77 of what it is.
+Source: Foreman-Mackey, Hogg, Lang and Goodman, emcee: The MCMC Hammer, PASP 125 (2013); ter Braak, A Markov chain
+Monte Carlo version of the genetic algorithm differential evolution, Statistics and Computing 16 (2006).
+"""
+
+import emcee
+import numpy as np
+from jaxtyping import Float
+from numpy.random import RandomState
+
+from vrdp_prob.inference.laplace import smoothed_weights
+from vrdp_prob.inference.samples import (
+    ESS_GOAL,
+    R_HAT_GOAL,
+    Gaussian,
+    LogDensity,
+    Samples,
+    chain_statistics,
+    evaluate,
+)
+from vrdp_prob.progress import ProgressDisplay, SilentProgress
+
+ENSEMBLES = 4
+STEPS_PER_ROUND = 200
+ROUNDS = 6
+"""Rounds after which sampling stops even if it has not converged; a number of steps and not a time, so that the same
+seed gives the same draws on every machine."""
+BURN_IN = 0.4
+"""Share of the steps at the start of every ensemble that is thrown away."""
+START_POOL = 16
+"""Importance-sampled candidates per walker from which the starting places are taken."""
+
+
+def sample_emcee(
+    density: LogDensity,
+    start: Gaussian,
+    *,
+    draws: int,
+    generator: np.random.Generator,
+    progress: ProgressDisplay | None = None,
+    rounds: int = ROUNDS,
+) -> Samples:
+    """Draw with several independent ensembles.
+
+    Parameters
+    ----------
+    density
+        The log posterior.
+    start
+        Gaussian around the MAP, from which the walkers set out.
+    draws
+        Number of draws to hand back over all ensembles.
+    generator
+        Source of randomness.
+    progress
+        Told how many steps are done.
+    rounds
+        At most so many rounds of 200 steps.
+
+    Returns
+    -------
+    One chain per ensemble, walker after walker so that autocorrelation within a walker shows; all steps after burn-in.
+    """
+    del draws
+    dimension = len(start.mean)
+    walkers = 2 * (dimension + 2 + dimension // 4)
+    ensembles = [_Ensemble(density, start, walkers, generator) for _ in range(ENSEMBLES)]
+    with (progress or SilentProgress()).stage("Sampling (emcee)", total=rounds * ENSEMBLES * STEPS_PER_ROUND) as advance:
+        for count in range(1, rounds + 1):
+            for ensemble in ensembles:
+                ensemble.run(STEPS_PER_ROUND)
+                advance(STEPS_PER_ROUND)
+            chains = np.stack([ensemble.chain() for ensemble in ensembles])
+            if count > 1 and _good_enough(chains):
+                break
+    points = start.points(chains)
+    log_density = np.stack([ensemble.log_density() for ensemble in ensembles])
+    acceptance = np.stack([np.full(log_density.shape[1], ensemble.acceptance) for ensemble in ensembles])
+    evaluations = sum(ensemble.evaluations for ensemble in ensembles)
+    return Samples(points, log_density, {"acceptance_rate": acceptance}, evaluations=evaluations)
+
+
+class _Ensemble:
+    """One emcee ensemble in whitened coordinates."""
+
+    def __init__(self, density: LogDensity, start: Gaussian, walkers: int, generator: np.random.Generator) -> None:
+        self._density, self._gaussian = density, start
+        self.evaluations = 0
+        moves = [(emcee.moves.DEMove(), 0.9), (emcee.moves.DEMove(gamma0=1.0), 0.1)]
+        self._sampler = emcee.EnsembleSampler(
+            walkers, len(start.mean), self._log_probability, moves=moves, vectorize=True
+        )
+        state = RandomState(int(generator.integers(2**31))).get_state()
+        places = self._starting_places(walkers, generator)
+        self._state = emcee.State(places, random_state=state)
+
+    def _log_probability(self, whitened: Float[np.ndarray, "walker dimension"]) -> Float[np.ndarray, "walker"]:
+        self.evaluations += len(whitened)
+        return evaluate(self._density, self._gaussian.points(whitened))
+
+    def _starting_places(self, walkers: int, generator: np.random.Generator) -> Float[np.ndarray, "walker dimension"]:
+        """Different points with support, drawn by importance from the Gaussian."""
+        pool = generator.standard_normal((START_POOL * walkers, len(self._gaussian.mean)))
+        values = self._log_probability(pool)
+        weights, _ = smoothed_weights(values + (pool**2).sum(axis=1) / 2)
+        supported = np.flatnonzero(np.isfinite(values))
+        if len(supported) < walkers:
+            return 0.01 * pool[:walkers]
+        flattened = weights[supported] ** 0.5 + 1e-12
+        chosen = generator.choice(supported, size=walkers, replace=False, p=flattened / flattened.sum())
+        return pool[chosen]
+
+    def run(self, steps: int) -> None:
+        self._state = self._sampler.run_mcmc(self._state, steps, skip_initial_state_check=True, progress=False)
+
+    @property
+    def acceptance(self) -> float:
+        return float(np.mean(self._sampler.acceptance_fraction))
+
+    def _discard(self) -> int:
+        return int(BURN_IN * self._sampler.iteration)
+
+    def chain(self) -> Float[np.ndarray, "draw dimension"]:
+        steps = self._sampler.get_chain(discard=self._discard())
+        return np.ascontiguousarray(np.swapaxes(steps, 0, 1)).reshape(-1, steps.shape[-1])
+
+    def log_density(self) -> Float[np.ndarray, "draw"]:
+        return self._sampler.get_log_prob(discard=self._discard()).T.reshape(-1)
+
+
+def _good_enough(chains: Float[np.ndarray, "chain draw dimension"]) -> bool:
+    r_hat, ess = chain_statistics(chains)
+    return r_hat <= R_HAT_GOAL and ess >= 1.25 * ESS_GOAL

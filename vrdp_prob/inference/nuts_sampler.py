@@ -1,0 +1,137 @@
+"""Sampling with Pyro's NUTS on the log posterior, whitened, several independent chains.
+
+Source: Hoffman and Gelman, The No-U-Turn Sampler, JMLR 15 (2014); Bingham et al., Pyro, JMLR 20 (2019).
+"""
+
+import warnings
+
+import numpy as np
+import pyro
+import torch
+from jaxtyping import Float
+from pyro.infer.mcmc import MCMC, NUTS
+from torch import Tensor
+
+from vrdp_prob.inference.laplace import smoothed_weights
+from vrdp_prob.inference.samples import Gaussian, LogDensity, Samples, evaluate
+from vrdp_prob.progress import Advance, ProgressDisplay, SilentProgress
+
+CHAINS = 4
+WARM_UP = 150
+TREE_DEPTH = 6
+ACCEPTANCE = 0.85
+START_POOL = 200
+OUT_OF_SUPPORT = 1e10
+"""Potential where a world has no support; finite, because Pyro compares energies."""
+
+
+def sample_nuts(
+    density: LogDensity,
+    start: Gaussian,
+    *,
+    draws: int,
+    generator: np.random.Generator,
+    progress: ProgressDisplay | None = None,
+    warm_up: int = WARM_UP,
+) -> Samples:
+    """Draw with several NUTS chains, one after another.
+
+    Parameters
+    ----------
+    density
+        The log posterior, differentiable.
+    start
+        Gaussian around the MAP; chains set out from points drawn near it.
+    draws
+        Number of draws over all chains.
+    generator
+        Source of randomness.
+    progress
+        Told how many transitions are done.
+    warm_up
+        Adaptation steps per chain.
+
+    Returns
+    -------
+    The chains, with the number of divergences.
+    """
+    per_chain = -(-draws // CHAINS)
+    potential = _Potential(density, start)
+    starts = _starting_points(density, start, generator)
+    chains: list[np.ndarray] = []
+    divergences = 0
+    with (progress or SilentProgress()).stage("Sampling (NUTS)", total=CHAINS * (warm_up + per_chain)) as advance:
+        for place in starts:
+            seed = int(generator.integers(2**31))
+            whitened, divergent = _chain(potential, place, warm_up, per_chain, seed, advance)
+            chains.append(whitened)
+            divergences += divergent
+    whitened_chains = np.stack(chains)
+    points = start.points(whitened_chains)
+    log_density = np.stack([evaluate(density, chain) for chain in points])
+    return Samples(points, log_density, divergences=divergences, evaluations=0, gradients=potential.gradients)
+
+
+class _Potential:
+    """Negative log density in whitened coordinates, as Pyro wants it; counts its calls."""
+
+    def __init__(self, density: LogDensity, start: Gaussian) -> None:
+        self._density = density
+        self._mean, self._root = torch.from_numpy(start.mean), torch.from_numpy(start.root)
+        self.gradients = 0
+
+    def __call__(self, parameters: dict[str, Tensor]) -> Tensor:
+        self.gradients += 1
+        point = self._mean + self._root @ parameters["whitened"]
+        value = -self._density(point[None])[0]
+        if bool(torch.isfinite(value)):
+            return value
+        return OUT_OF_SUPPORT + 0.0 * parameters["whitened"].sum()
+
+
+def _chain(
+    potential: _Potential,
+    place: Float[np.ndarray, "dimension"],
+    warm_up: int,
+    draws: int,
+    seed: int,
+    advance: Advance,
+) -> tuple[Float[np.ndarray, "draw dimension"], int]:
+    kernel = NUTS(
+        potential_fn=potential,
+        adapt_mass_matrix=True,
+        full_mass=False,
+        max_tree_depth=TREE_DEPTH,
+        target_accept_prob=ACCEPTANCE,
+    )
+    state = torch.get_rng_state()
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            pyro.set_rng_seed(seed)
+            sampler = MCMC(
+                kernel,
+                num_samples=draws,
+                warmup_steps=warm_up,
+                initial_params={"whitened": torch.from_numpy(place)},
+                disable_progbar=True,
+                hook_fn=lambda *_: advance(1),
+            )
+            sampler.run()
+    finally:
+        torch.set_rng_state(state)
+    diverging = sampler.diagnostics()["divergences"]
+    return sampler.get_samples()["whitened"].detach().numpy(), sum(len(places) for places in diverging.values())
+
+
+def _starting_points(
+    density: LogDensity, start: Gaussian, generator: np.random.Generator
+) -> list[Float[np.ndarray, "dimension"]]:
+    """Different starting points of good log density, in whitened coordinates."""
+    pool = generator.standard_normal((START_POOL, len(start.mean)))
+    values = evaluate(density, start.points(pool))
+    if np.isfinite(values).sum() < CHAINS:
+        return [0.1 * place for place in pool[:CHAINS]]
+    weights, _ = smoothed_weights(values + (pool**2).sum(axis=1) / 2)
+    best = np.argsort(-weights)[:CHAINS]
+    return [pool[index] for index in best]

@@ -1,0 +1,123 @@
+"""How tracks are measured: which numbers were seen, how they are whitened, and the noise scales that are inferred."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from vrdp_prob.scene import Shape, Tracks
+
+NOISE_SHARE_OF_RADIUS = 0.05
+"""Prior median of the position noise as a share of the bodies' radius, where nobody measured it."""
+NOISE_WITHOUT_RADIUS = 0.01
+"""Prior median of the position noise in m where no radius is known either."""
+ANGLE_NOISE = 0.02
+"""Prior median of the angle noise in rad."""
+NOISE_LOG_SD = 2.0
+"""Prior standard deviation of the log noise scale: two orders of magnitude either way."""
+SMALLEST_SHARE = 1e-3
+"""A covariance is not believed below this share (in standard deviation) of the median one."""
+
+
+@dataclass(frozen=True)
+class Observations:
+    """What was seen of one video as flat lists, positions first.
+
+    Parameters
+    ----------
+    frame, body
+        Frame and body of each seen position.
+    position
+        The positions in m.
+    whitening
+        Matrix that turns a position difference into two independent numbers of unit variance at noise scale 1 (1/m).
+    position_reference
+        Standard deviation in m that noise scale 1 stands for (the median one where covariances are given).
+    angle_frame, angle_body, angle
+        Frame, body and value (rad) of each measured angle that says something (the yaw of a sphere does not).
+    angle_reference
+        Standard deviation in rad that angle noise scale 1 stands for.
+    """
+
+    frame: Int[np.ndarray, "observation"]
+    body: Int[np.ndarray, "observation"]
+    position: Float[np.ndarray, "observation 2"]
+    whitening: Float[np.ndarray, "observation 2 2"]
+    position_reference: float
+    angle_frame: Int[np.ndarray, "angle"]
+    angle_body: Int[np.ndarray, "angle"]
+    angle: Float[np.ndarray, "angle"]
+    angle_reference: float
+
+    @classmethod
+    def of(cls, tracks: Tracks) -> "Observations":
+        """What the tracks hold, whitened by their covariances where these are given."""
+        frame, body = np.nonzero(tracks.seen)
+        position = tracks.positions[frame, body]
+        whitening, reference = _whitening(tracks, frame, body)
+        angle_seen = _angles_that_tell(tracks)
+        angle_frame, angle_body = np.nonzero(angle_seen)
+        angles = tracks.angles
+        angle = np.zeros(0) if angles is None else angles[angle_frame, angle_body]
+        return cls(frame, body, position, whitening, reference, angle_frame, angle_body, angle, ANGLE_NOISE)
+
+    @property
+    def angle_bodies(self) -> tuple[int, ...]:
+        """Bodies with a measured angle."""
+        return tuple(int(index) for index in np.unique(self.angle_body))
+
+    def until(self, frame_count: int) -> "Observations":
+        """Only what was seen in the first frames."""
+        positions, angles = self.frame < frame_count, self.angle_frame < frame_count
+        return Observations(
+            self.frame[positions],
+            self.body[positions],
+            self.position[positions],
+            self.whitening[positions],
+            self.position_reference,
+            self.angle_frame[angles],
+            self.angle_body[angles],
+            self.angle[angles],
+            self.angle_reference,
+        )
+
+    def position_residuals(
+        self, trajectory: Float[np.ndarray, "world time body 3"]
+    ) -> Float[np.ndarray, "world observation 2"]:
+        """Whitened differences of predicted and seen positions (unit variance at noise scale 1)."""
+        difference = trajectory[:, self.frame, self.body, :2] - self.position
+        residuals: Float[np.ndarray, "world observation 2"] = np.einsum("oij,woj->woi", self.whitening, difference)
+        return residuals
+
+
+def _whitening(
+    tracks: Tracks, frame: Int[np.ndarray, "observation"], body: Int[np.ndarray, "observation"]
+) -> tuple[Float[np.ndarray, "observation 2 2"], float]:
+    radii = [candidate.radius for candidate in tracks.bodies if candidate.radius is not None]
+    reference = NOISE_SHARE_OF_RADIUS * float(np.median(radii)) if radii else NOISE_WITHOUT_RADIUS
+    covariance = tracks.position_covariance
+    whitening = np.tile(np.eye(2) / reference, (len(frame), 1, 1))
+    if covariance is None:
+        return whitening, reference
+    seen = covariance[frame, body]
+    known = np.isfinite(seen).all(axis=(-1, -2))
+    if not known.any():
+        return whitening, reference
+    variance = np.trace(seen[known], axis1=-2, axis2=-1) / 2
+    reference = float(np.sqrt(np.median(variance)))
+    if not reference > 0:
+        return whitening, NOISE_WITHOUT_RADIUS
+    floor = (SMALLEST_SHARE * reference) ** 2
+    values, vectors = np.linalg.eigh(seen[known])
+    scale = 1 / np.sqrt(np.maximum(values, floor))
+    whitening = np.tile(np.eye(2) / reference, (len(frame), 1, 1))
+    whitening[known] = scale[..., :, None] * np.swapaxes(vectors, -1, -2)
+    return whitening, reference
+
+
+def _angles_that_tell(tracks: Tracks) -> Bool[np.ndarray, "time body"]:
+    angles = tracks.angles
+    if angles is None:
+        return np.zeros(tracks.seen.shape, dtype=bool)
+    tells = np.array([body.shape is not Shape.SPHERE for body in tracks.bodies])
+    return np.isfinite(angles) & tells & tracks.seen

@@ -1,0 +1,223 @@
+"""Geometry of the page's static figures: tracks and rollouts as SVG paths, intervals as shares of an axis."""
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+
+from vrdp_prob.report.content import Interval, ReportContent, WorldKind
+from vrdp_prob.report.wording import color_of, tags
+from vrdp_prob.scene import Camera
+from vrdp_prob.scene.camera import REST_HEIGHT
+
+FIGURE_DRAWS = 24
+"""Rollouts drawn in the still figure."""
+
+_PLAIN_WIDTH, _PLAIN_HEIGHT = 480, 320
+
+Projection = Callable[[Float[np.ndarray, "*points 2"]], Float[np.ndarray, "*points 2"]]
+
+
+@dataclass(frozen=True)
+class TrackFigure:
+    """One body in the still figure; all paths in picture coordinates (pixels).
+
+    Parameters
+    ----------
+    color, tag
+        Colour name and mark of the body.
+    dots
+        Measured positions, thinned.
+    seen, future
+        SVG path data of each rollout until the last frame seen, and after it.
+    ends
+        Where each rollout stands at the end of the future.
+    label
+        Where the mark stands.
+    """
+
+    color: str
+    tag: str
+    dots: list[tuple[float, float]]
+    seen: list[str]
+    future: list[str]
+    ends: list[tuple[float, float]]
+    label: tuple[float, float]
+
+
+@dataclass(frozen=True)
+class StillFigure:
+    """The still with the tracks and rollouts over it, or the plane from above where there is no camera."""
+
+    width: int
+    height: int
+    tracks: list[TrackFigure]
+
+
+def still_figure(content: ReportContent) -> StillFigure:
+    """Tracks and posterior rollouts in picture coordinates."""
+    camera = content.tracks.camera
+    projection = plane_projection(content) if camera is None else camera_projection(camera, _height(content))
+    width, height = (_PLAIN_WIDTH, _PLAIN_HEIGHT) if camera is None else (camera.width, camera.height)
+    tag = tags(content.tracks.bodies)
+    figures = []
+    for index, body in enumerate(content.tracks.bodies):
+        measured = projection(content.tracks.positions[:, index])
+        measured = measured[np.isfinite(measured).all(axis=-1)]
+        seen, future, ends = _rollouts(content, index, projection, (width, height))
+        figures.append(
+            TrackFigure(
+                color_of(body, index),
+                tag[body.id],
+                _points(_thinned(measured, 4.0)),
+                seen,
+                future,
+                ends,
+                _points(measured[-1:])[0],
+            )
+        )
+    return StillFigure(width, height, figures)
+
+
+def camera_projection(camera: Camera, height: float) -> Projection:
+    """Picture coordinates (pixels) of points of the plane at a height (m)."""
+
+    def project(points: Float[np.ndarray, "*points 2"]) -> Float[np.ndarray, "*points 2"]:
+        raised = np.concatenate([points, np.full((*points.shape[:-1], 1), height)], axis=-1)
+        return camera.project(raised)
+
+    return project
+
+
+def plane_projection(content: ReportContent) -> Projection:
+    """Figure coordinates of points of the plane seen from above, with all measured positions in the figure."""
+    positions = content.tracks.positions.reshape(-1, 2)
+    low, high = np.nanmin(positions, axis=0), np.nanmax(positions, axis=0)
+    room = np.array([_PLAIN_WIDTH, _PLAIN_HEIGHT]) * 0.8
+    scale = float((room / np.maximum(high - low, 1e-6)).min())
+    middle, centre = (low + high) / 2, np.array([_PLAIN_WIDTH, _PLAIN_HEIGHT]) / 2
+
+    def project(points: Float[np.ndarray, "*points 2"]) -> Float[np.ndarray, "*points 2"]:
+        return centre + scale * (points - middle) * np.array([1.0, -1.0])
+
+    return project
+
+
+def _height(content: ReportContent) -> float:
+    radii = [body.radius for body in content.tracks.bodies if body.radius is not None]
+    return float(np.median(radii)) if radii else REST_HEIGHT
+
+
+def _rollouts(
+    content: ReportContent, index: int, projection: Projection, size: tuple[int, int]
+) -> tuple[list[str], list[str], list[tuple[float, float]]]:
+    world = content.world(WorldKind.FUTURE) or content.world(WorldKind.FACTUAL)
+    if world is None:
+        return [], [], []
+    split = int(np.searchsorted(world.times, content.tracks.times[-1] + 1e-9))
+    seen, future, ends = [], [], []
+    for draw in range(min(world.draws, FIGURE_DRAWS)):
+        exists = world.exists[draw, :, index]
+        points = projection(world.trajectory[draw, :, index, :2])
+        before, after = points[:split][exists[:split]], points[max(split - 1, 0) :][exists[max(split - 1, 0) :]]
+        seen.append(path_data(_clipped(before, size)))
+        if len(after) > 1:
+            future.append(path_data(_clipped(after, size)))
+            ends.extend(_points(after[-1:]) if _inside(after[-1], size) else [])
+    return [path for path in seen if path], [path for path in future if path], ends
+
+
+def _inside(point: Float[np.ndarray, "2"], size: tuple[int, int]) -> bool:
+    return bool((point >= -20).all() and (point <= np.array(size) + 20).all())
+
+
+def _clipped(points: Float[np.ndarray, "time 2"], size: tuple[int, int]) -> Float[np.ndarray, "kept 2"]:
+    """The part of a path from its first to its last point in or near the picture."""
+    near = np.flatnonzero([_inside(point, size) for point in points])
+    return points[near[0] : near[-1] + 1] if len(near) else points[:0]
+
+
+def path_data(points: Float[np.ndarray, "time 2"]) -> str:
+    """SVG path through points, thinned to what can be seen; empty where fewer than two are left."""
+    kept = _simplified(points, 0.35)
+    if len(kept) < 2:
+        return ""
+    return "M" + "L".join(f"{u:.1f} {v:.1f}" for u, v in kept)
+
+
+def _simplified(points: Float[np.ndarray, "time 2"], tolerance: float) -> Float[np.ndarray, "kept 2"]:
+    """Fewest points (Ramer, Douglas and Peucker) whose polygon stays within a tolerance of all of them."""
+    if len(points) < 3:
+        return points
+    keep = np.zeros(len(points), dtype=bool)
+    keep[[0, -1]] = True
+    spans = [(0, len(points) - 1)]
+    while spans:
+        first, last = spans.pop()
+        chord = points[last] - points[first]
+        offsets = points[first + 1 : last] - points[first]
+        along = np.clip(offsets @ chord / max(float(chord @ chord), 1e-12), 0, 1)
+        distances = np.linalg.norm(offsets - along[:, None] * chord, axis=-1)
+        if len(distances) and distances.max() > tolerance:
+            middle = first + 1 + int(distances.argmax())
+            keep[middle] = True
+            spans += [(first, middle), (middle, last)]
+    return points[keep]
+
+
+def _thinned(points: Float[np.ndarray, "time 2"], spacing: float) -> Float[np.ndarray, "kept 2"]:
+    """Points at least a spacing (pixels) apart, the first one always."""
+    kept = [points[0]]
+    for point in points[1:]:
+        if np.linalg.norm(point - kept[-1]) >= spacing:
+            kept.append(point)
+    return np.array(kept)
+
+
+def _points(points: Float[np.ndarray, "count 2"]) -> list[tuple[float, float]]:
+    return [(round(float(u), 1), round(float(v), 1)) for u, v in points]
+
+
+@dataclass(frozen=True)
+class Axis:
+    """A horizontal axis for intervals; places on it are percentages of its width.
+
+    Parameters
+    ----------
+    low, high
+        Its ends.
+    logarithmic
+        Whether equal ratios are equal lengths.
+    ticks
+        Values with a label.
+    """
+
+    low: float
+    high: float
+    logarithmic: bool
+    ticks: tuple[float, ...]
+
+    def place(self, value: float) -> float:
+        """Percentage of the width at which a value stands; values beyond an end stand at that end."""
+        low, high, at = self.low, self.high, min(max(value, self.low), self.high)
+        if self.logarithmic:
+            low, high, at = math.log(low), math.log(high), math.log(at)
+        return round(100 * (at - low) / (high - low), 2)
+
+
+_LOG_TICKS = (0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0)
+
+
+def log_axis(intervals: Sequence[Interval]) -> Axis:
+    """A logarithmic axis that holds all intervals and 1, with ticks at 1, 2 and 5 times powers of ten."""
+    low = max(min([0.5, *(interval.q05 for interval in intervals)]) * 0.9, 1e-3)
+    high = min(max([2.0, *(interval.q95 for interval in intervals)]) * 1.1, 1e3)
+    return Axis(low, high, True, tuple(tick for tick in _LOG_TICKS if low <= tick <= high))
+
+
+def unit_axis(intervals: Sequence[Interval]) -> Axis:
+    """A linear axis from 0 to 1, longer where an interval needs it."""
+    high = max([1.0, *(min(interval.q95, 3.0) for interval in intervals)])
+    return Axis(0.0, high, False, (0.0, 0.25, 0.5, 0.75, 1.0))

@@ -1,0 +1,269 @@
+"""report.html: one page that opens from disk, with all it needs inside it."""
+
+import base64
+import json
+import math
+from importlib import resources
+from typing import Any
+
+import cv2
+import jinja2
+import numpy as np
+from jaxtyping import UInt8
+from markupsafe import Markup
+
+from vrdp_prob.report.content import AnswerContent, BodyContent, Interval, PairContent, ReportContent, WorldKind
+from vrdp_prob.report.figures import FIGURE_DRAWS, log_axis, still_figure, unit_axis
+from vrdp_prob.report.payload import player_data
+from vrdp_prob.report.summary import (
+    TYPE_WORDS,
+    answer_words,
+    by_doubt,
+    convergence_words,
+    is_doubtful,
+    summary,
+)
+from vrdp_prob.report.wording import (
+    color_of,
+    counted,
+    interval_words,
+    listed,
+    mass_status,
+    names,
+    percent,
+    percent_error,
+    restitution_status,
+    seconds,
+    sentence,
+    tags,
+    world_label,
+)
+
+SCRIPTS = ("worlds.js", "views.js", "scene.js", "player.js")
+"""The player's sources, in the order they go into the page."""
+
+_JPEG_QUALITY = 90
+
+
+def render(content: ReportContent) -> str:
+    """The page as HTML text; the same content gives the same text."""
+    environment = jinja2.Environment(
+        loader=jinja2.PackageLoader("vrdp_prob.report", "templates"),
+        autoescape=True,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        undefined=jinja2.StrictUndefined,
+    )
+    values = {**_opening(content), **_player(content), **_questions(content), **_estimates(content), **_closing(content)}
+    return environment.get_template("page.html.j2").render(values)
+
+
+def _asset(name: str) -> Markup:
+    return Markup((resources.files("vrdp_prob.report") / "assets" / name).read_text(encoding="utf-8"))
+
+
+def _picture(image: UInt8[np.ndarray, "height width 3"]) -> str:
+    ok, encoded = cv2.imencode(".jpg", image[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, _JPEG_QUALITY])
+    if not ok:
+        raise ValueError("the still could not be encoded as JPEG")
+    return "data:image/jpeg;base64," + base64.b64encode(encoded.tobytes()).decode("ascii")
+
+
+def _objects(content: ReportContent) -> list[dict[str, Any]]:
+    name, tag = names(content.tracks.bodies), tags(content.tracks.bodies)
+    return [
+        {
+            "id": body.id,
+            "name": name[body.id],
+            "tag": tag[body.id],
+            "color": color_of(body, index),
+            "shape": str(body.shape),
+        }
+        for index, body in enumerate(content.tracks.bodies)
+    ]
+
+
+def _opening(content: ReportContent) -> dict[str, Any]:
+    still = content.still
+    draws = max((min(world.draws, FIGURE_DRAWS) for world in content.worlds[:2]), default=0)
+    future = content.world(WorldKind.FUTURE)
+    caption = f"The frame at {seconds(still.time)}. " if still is not None else "The plane from above. "
+    caption += "Dots: measured positions."
+    if draws:
+        caption += f" Lines: {draws} posterior draws"
+        caption += f", carried on to {seconds(float(future.times[-1]))}, where the rings stand." if future else "."
+    return {
+        "css": _asset("page.css"),
+        "video": content.tracks.video,
+        "summary": " ".join(summary(content)),
+        "limits": content.warnings,
+        "converged": content.convergence.converged,
+        "objects": _objects(content),
+        "still": still_figure(content),
+        "still_image": _picture(still.image) if still is not None else None,
+        "still_caption": caption,
+        "still_label": "Measured tracks and posterior rollouts of "
+        + listed(f"the {name}" for name in names(content.tracks.bodies).values()),
+    }
+
+
+def _player(content: ReportContent) -> dict[str, Any]:
+    floor = None
+    if content.still is not None and content.tracks.camera is not None:
+        floor = content.still.image if content.still.floor is None else content.still.floor
+    return {
+        "has_worlds": bool(content.worlds),
+        "has_camera": content.tracks.camera is not None,
+        "floor_image": None if floor is None else _picture(floor),
+        "player_data": _script_json(player_data(content)) if content.worlds else None,
+        "javascript": Markup("\n").join(_asset(name) for name in SCRIPTS),
+    }
+
+
+def _script_json(value: Any) -> Markup:
+    """Strict JSON that cannot end the script element it stands in."""
+    text = json.dumps(value, allow_nan=False, separators=(",", ":"))
+    return Markup(text.replace("&", "\\u0026").replace("<", "\\u003c").replace(">", "\\u003e"))
+
+
+def _questions(content: ReportContent) -> dict[str, Any]:
+    ordered = by_doubt(content.answers)
+    parts = (
+        ("Doubtful", "at least as open as 80 to 20", [answer for answer in ordered if is_doubtful(answer)]),
+        ("Clear", "", [answer for answer in ordered if not is_doubtful(answer)]),
+    )
+    return {
+        "groups": [
+            {"title": title, "meaning": meaning, "questions": [_question(answer, content) for answer in answers]}
+            for title, meaning, answers in parts
+            if answers
+        ]
+    }
+
+
+def _question(answer: AnswerContent, content: ReportContent) -> dict[str, Any]:
+    name = names(content.tracks.bodies)
+    notes = list(answer.notes)
+    if answer.relies_on_default:
+        who = listed(f"the {name.get(body, body)}" for body in answer.relies_on_default)
+        notes.insert(0, f"Rests on default values of {who}, which this video does not determine.")
+    world = next((world for world in content.worlds if world.key == answer.world), None)
+    if world is not None and world.kind is WorldKind.FACTUAL:
+        world = None  # the page opens with it
+    label = "" if world is None else world_label(world, content.tracks)
+    return {
+        "kind": sentence(TYPE_WORDS[answer.question_type]),
+        "text": answer.question,
+        "entropy": round(answer.entropy, 6),
+        "answer": answer_words(answer),
+        "multiple": bool(answer.choices),
+        "probability": percent(answer.probability),
+        "error": percent_error(answer.mc_error),
+        "bars": _bars(answer),
+        "notes": notes,
+        "world": None if world is None else world.key,
+        "world_label": f"Show {label[:1].lower()}{label[1:]}",
+    }
+
+
+def _bars(answer: AnswerContent) -> list[dict[str, Any]]:
+    if answer.choices:
+        chosen = answer.answer if isinstance(answer.answer, tuple) else ()
+        return [
+            _bar(choice.choice, choice.probability, choice.mc_error, choice.choice_id in chosen)
+            for choice in answer.choices
+        ]
+    shown = sorted(answer.distribution.items(), key=lambda item: -item[1])
+    bars = []
+    for value, probability in shown:
+        if probability >= 0.005 or value == str(answer.answer):
+            chosen_one = value == str(answer.answer)
+            bars.append(_bar(value, probability, answer.mc_error if chosen_one else 0.0, chosen_one))
+    rest = 1 - sum(bar["probability"] for bar in bars)
+    return [*bars, _bar("something else", rest, 0.0, False)] if bars and rest >= 0.005 else bars
+
+
+def _bar(text: str, probability: float, error: float, chosen: bool) -> dict[str, Any]:
+    words = f"{percent(probability)} {percent_error(error)}".strip()
+    return {
+        "text": text,
+        "probability": round(probability, 6),
+        "place": round(100 * min(max(probability, 0), 1), 2),
+        "error_low": round(100 * max(probability - error, 0), 2),
+        "error_high": round(100 * min(probability + error, 1), 2),
+        "chosen": chosen,
+        "percent": percent(probability),
+        "error": percent_error(error),
+        "label": f"{text}: {words}",
+    }
+
+
+def _estimates(content: ReportContent) -> dict[str, Any]:
+    objects = {item["id"]: item for item in _objects(content)}
+    name = names(content.tracks.bodies)
+    pairs = content.restitution_pairs
+    weighed = any(item.body.mass is not None for item in content.bodies)
+    return {
+        "mass_unit": "kg" if weighed else "relative to 1",
+        "mass_axis": log_axis([item.mass.interval for item in content.bodies]),
+        "masses": [_body_row(item, objects, item.mass.interval, mass=True, name=name) for item in content.bodies],
+        "restitution_axis": unit_axis(
+            [item.restitution.interval for item in content.bodies] + [pair.interval for pair in pairs]
+        ),
+        "restitutions": [
+            _body_row(item, objects, item.restitution.interval, mass=False, name=name) for item in content.bodies
+        ],
+        "ratio_axis": log_axis([pair.interval for pair in content.mass_ratios]),
+        "ratios": [_pair_row(pair, objects, "over") for pair in content.mass_ratios],
+        "pairs": [_pair_row(pair, objects, "and") for pair in pairs],
+    }
+
+
+def _body_row(
+    item: BodyContent, objects: dict[str, dict[str, Any]], interval: Interval, *, mass: bool, name: dict[str, str]
+) -> dict[str, Any]:
+    words = mass_status(item.mass, item.body, name) if mass else restitution_status(item.restitution, name)
+    known = (item.mass if mass else item.restitution).status != "default" or (mass and item.body.mass is not None)
+    return {**_row([objects[item.body.id]], interval), "words": words, "known": known, "between": ""}
+
+
+def _pair_row(pair: PairContent, objects: dict[str, dict[str, Any]], between: str) -> dict[str, Any]:
+    row = _row([objects[body] for body in pair.objects], pair.interval)
+    return {**row, "words": "", "known": True, "between": between}
+
+
+def _row(objects: list[dict[str, Any]], interval: Interval) -> dict[str, Any]:
+    mean, span = interval_words(interval)
+    label = f"{listed(item['name'] for item in objects)}: {mean}, 90 % interval {span}"
+    return {"objects": objects, "interval": interval, "mean": mean, "range": span, "label": label}
+
+
+def _closing(content: ReportContent) -> dict[str, Any]:
+    return {
+        "convergence_words": convergence_words(content.convergence),
+        "diagnostics": _diagnostics(content),
+        "model": content.model,
+        "effects": listed(effect.replace("_", " ") for effect in content.effects) if content.effects else "",
+        "sampler": content.convergence.sampler,
+        "seed": content.seed,
+        "version": content.version,
+    }
+
+
+def _diagnostics(content: ReportContent) -> list[tuple[str, str, str]]:
+    """Term, value and meaning of each diagnostic that applies."""
+    convergence = content.convergence
+    rows = [("Sampler", convergence.sampler, "")]
+    if convergence.r_hat is not None and math.isfinite(convergence.r_hat):
+        rows.append(("R-hat, largest", f"{convergence.r_hat:.3f}", "1 where independent runs agree; below 1.01 is good"))
+    if convergence.ess_bulk is not None and math.isfinite(convergence.ess_bulk):
+        meaning = "independent draws that the dependent ones are worth; above 400 is good"
+        rows.append(("Effective sample size, smallest", f"{convergence.ess_bulk:.0f}", meaning))
+    if convergence.divergences is not None:
+        rows.append(("Divergences", str(convergence.divergences), "steps at which the sampler lost its way; 0 is good"))
+    if convergence.pareto_k is not None and math.isfinite(convergence.pareto_k):
+        meaning = "tail of the importance weights; below 0.7 is good"
+        rows.append(("Pareto k", f"{convergence.pareto_k:.2f}", meaning))
+    if content.worlds:
+        rows.append(("Draws in the player", counted(content.worlds[0].draws, "draw"), "a sample of the posterior"))
+    return rows

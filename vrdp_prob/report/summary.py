@@ -1,0 +1,112 @@
+"""The report in one paragraph: what is there, what happened, whether to trust it, how much is in doubt."""
+
+from vrdp_prob.report.content import AnswerContent, ConvergenceContent, ReportContent, WorldKind
+from vrdp_prob.report.wording import collision_shares, counted, listed, names, number_word, percent, seconds, sentence
+from vrdp_prob.scene import QuestionType
+
+CERTAIN_SHARE = 0.95
+"""Share of the draws from which on a collision is told as a fact."""
+
+RARE_SHARE = 0.05
+"""Share of the draws up to which a collision is not worth telling."""
+
+DOUBTFUL_ENTROPY = 0.5
+"""Entropy in nats from which on an answer is called doubtful: that of a yes or no at 80 to 20."""
+
+
+def is_doubtful(answer: AnswerContent) -> bool:
+    """Whether an answer is to be read as a distribution rather than as an answer."""
+    return answer.entropy >= DOUBTFUL_ENTROPY
+
+
+def by_doubt(answers: tuple[AnswerContent, ...]) -> list[AnswerContent]:
+    """Answers with the most ambiguous (largest entropy) first; equal ones stay in the order asked."""
+    return sorted(answers, key=lambda answer: -answer.entropy)
+
+
+def summary(content: ReportContent) -> list[str]:
+    """Sentences of the opening paragraph."""
+    parts = [_objects(content), *_collisions(content), _trust(content), _answers(content)]
+    return [part for part in parts if part]
+
+
+def _objects(content: ReportContent) -> str:
+    name = names(content.tracks.bodies)
+    listing = listed(f"the {name[body.id]}" for body in content.tracks.bodies)
+    count = len(content.bodies)
+    length = seconds(float(content.tracks.times[-1] - content.tracks.times[0]))
+    if count > 6:
+        return sentence(f"{counted(count, 'object')} move through {length} of video.")
+    return sentence(
+        f"{counted(count, 'object')} {'appears' if count == 1 else 'appear'} in {length} of video: {listing}."
+    )
+
+
+def _collisions(content: ReportContent) -> list[str]:
+    world = content.world(WorldKind.FACTUAL)
+    if world is None:
+        return []
+    ids = [body.id for body in content.tracks.bodies]
+    name = names(content.tracks.bodies)
+    sure, unsure = [], []
+    for (first, second), share, time in collision_shares(world):
+        pair = f"the {name[ids[first]]} with the {name[ids[second]]}"
+        if share >= CERTAIN_SHARE:
+            sure.append(f"{pair} at {seconds(time)}")
+        elif share > RARE_SHARE:
+            unsure.append(f"{pair} ({percent(share)} of the draws)")
+    told = sentence(f"{counted(len(sure), 'collision')} happened{': ' + listed(sure) if sure else ''}.")
+    return [told, f"Whether others happened is not certain: {listed(unsure)}."] if unsure else [told]
+
+
+def _trust(content: ReportContent) -> str:
+    if not content.convergence.converged:
+        return "The fit has not converged: take every number on this page as provisional."
+    if not content.warnings:
+        return "The fit has converged and nothing speaks against trusting it."
+    limits = counted(len(content.warnings), "thing")
+    verb = "limits" if len(content.warnings) == 1 else "limit"
+    return sentence(f"the fit has converged; {limits} {verb} what it can say, listed below.")
+
+
+def _answers(content: ReportContent) -> str:
+    answers = content.answers
+    if not answers:
+        return ""
+    doubtful = sum(is_doubtful(answer) for answer in answers)
+    if not doubtful:
+        return sentence(f"{'the question has' if len(answers) == 1 else 'all questions have'} a clear answer.")
+    verb = "is" if doubtful == 1 else "are"
+    return f"Of {counted(len(answers), 'question')}, {number_word(doubtful)} {verb} doubtful."
+
+
+def convergence_words(convergence: ConvergenceContent) -> list[str]:
+    """How the sampler did, in plain sentences."""
+    if convergence.sentences:
+        return list(convergence.sentences)
+    sampler = {"nuts": "NUTS", "emcee": "emcee", "laplace": "The Laplace approximation"}[convergence.sampler]
+    if convergence.converged:
+        return [f"{sampler} has converged: its draws agree with each other well enough to be counted."]
+    return [f"{sampler} has not converged: another run, or a longer one, may give other numbers."]
+
+
+def answer_words(answer: AnswerContent) -> str:
+    """The most probable answer in words."""
+    if not isinstance(answer.answer, tuple):
+        return str(answer.answer)
+    count, correct = len(answer.choices), len(answer.answer)
+    if count == 1:
+        return "correct" if correct else "wrong"
+    if correct in (0, count):
+        which = ("none", "neither") if correct == 0 else ("all", "both")
+        return f"{which[count == 2]} of the choices {'are' if count > 2 and correct else 'is'} correct"
+    return f"{counted(correct, 'choice')} of {number_word(count)} {'is' if correct == 1 else 'are'} correct"
+
+
+TYPE_WORDS = {
+    QuestionType.DESCRIPTIVE: "what is there",
+    QuestionType.EXPLANATORY: "why it happened",
+    QuestionType.PREDICTIVE: "what comes next",
+    QuestionType.COUNTERFACTUAL: "what if",
+}
+"""What each kind of question asks, in words."""

@@ -1,0 +1,166 @@
+"""The report's words: names of objects and worlds, numbers rounded to what they mean, and sentences."""
+
+import math
+import string
+from collections import Counter
+from collections.abc import Callable, Iterable, Mapping, Sequence
+
+import numpy as np
+
+from vrdp_prob.report.content import Interval, ParameterContent, WorldContent, WorldKind
+from vrdp_prob.scene import Body, Shape, Tracks
+from vrdp_prob.scene.body import COLORS
+
+NEUTRAL_COLORS = ("ink1", "ink2", "ink3", "ink4", "ink5", "ink6", "ink7")
+"""Colours for objects whose own colour is not known; their values stand in the page's style sheet."""
+
+
+def names(bodies: Sequence[Body]) -> dict[str, str]:
+    """Name in words of each body by id: the shortest description that fits it alone, else its shape and id."""
+    ways: tuple[Callable[[Body], tuple[str | None, ...]], ...] = (
+        lambda body: (body.color, str(body.shape)),
+        lambda body: (body.material, str(body.shape)),
+        lambda body: (body.color, body.material, str(body.shape)),
+    )
+    found: dict[str, str] = {}
+    for way in ways:
+        count = Counter(way(body) for body in bodies)
+        for body in bodies:
+            description = way(body)
+            if body.id not in found and None not in description and count[description] == 1:
+                found[body.id] = " ".join(part for part in description if part)
+    return {body.id: found.get(body.id, _by_id(body)) for body in bodies}
+
+
+def _by_id(body: Body) -> str:
+    if body.id.isdigit():
+        return " ".join(part for part in (body.color, str(body.shape), body.id) if part)
+    return f"{body.shape} “{body.id}”" if body.shape is not Shape.CYLINDER else f"“{body.id}”"
+
+
+def tags(bodies: Sequence[Body]) -> dict[str, str]:
+    """A mark of at most three letters for each body, drawn beside it: its id, or A, B, C... where ids are long."""
+    if all(len(body.id) <= 3 for body in bodies):
+        return {body.id: body.id for body in bodies}
+    letters = string.ascii_uppercase
+    return {
+        body.id: letters[index] if len(bodies) <= len(letters) else str(index + 1) for index, body in enumerate(bodies)
+    }
+
+
+def color_of(body: Body, index: int) -> str:
+    """Name of the colour (of the style sheet) that a body is drawn in."""
+    return body.color if body.color in COLORS else NEUTRAL_COLORS[index % len(NEUTRAL_COLORS)]
+
+
+def world_label(world: WorldContent, tracks: Tracks) -> str:
+    """What is shown in a world, in words."""
+    if world.kind is WorldKind.FACTUAL:
+        return "What was seen"
+    if world.kind is WorldKind.FUTURE:
+        return "What happens next"
+    name = names(tracks.bodies)[world.body or ""]
+    if world.kind is WorldKind.REMOVED:
+        return f"Without the {name}"
+    return f"If the {name} were {world.kind}"
+
+
+def world_group(kind: WorldKind) -> str:
+    """Heading under which the player lists a world."""
+    return {
+        WorldKind.FACTUAL: "This video",
+        WorldKind.FUTURE: "This video",
+        WorldKind.REMOVED: "One object removed",
+        WorldKind.HEAVIER: "One object heavier",
+        WorldKind.LIGHTER: "One object lighter",
+    }[kind]
+
+
+def listed(items: Iterable[str]) -> str:
+    """Items as a list in a sentence: 'a', 'a and b', 'a, b and c'."""
+    parts = list(items)
+    return parts[0] if len(parts) == 1 else f"{', '.join(parts[:-1])} and {parts[-1]}" if parts else "none"
+
+
+def counted(count: int, noun: str) -> str:
+    """A small number in words with its noun: 'two objects', 'one object', 'no objects', '14 questions'."""
+    return f"{number_word(count)} {noun}{'s' * (count != 1)}"
+
+
+def number_word(count: int) -> str:
+    """A small number as a word, a larger one in digits."""
+    words = ("no", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine")
+    return words[count] if count < len(words) else str(count)
+
+
+def sentence(text: str) -> str:
+    """A text with a capital letter at its start."""
+    return text[:1].upper() + text[1:]
+
+
+def percent(probability: float) -> str:
+    """A probability in per cent, never rounded to certainty."""
+    if probability <= 0 or probability >= 1:
+        return f"{100 * probability:.0f} %"
+    if probability < 0.005:
+        return "< 1 %"
+    return "> 99 %" if probability > 0.995 else f"{100 * probability:.0f} %"
+
+
+def percent_error(error: float) -> str:
+    """A Monte Carlo error in percentage points; empty where it is too small to show."""
+    return "" if error < 0.0005 else f"± {100 * error:.1f}" if error < 0.0095 else f"± {100 * error:.0f}"
+
+
+def decimals(interval: Interval) -> int:
+    """Decimal places that the width of an interval supports (two digits of its half width, between 0 and 3)."""
+    width = interval.q95 - interval.q05
+    if width <= 0:
+        return 2
+    return min(max(1 - math.floor(math.log10(width / 2)), 0), 3)
+
+
+def interval_words(interval: Interval) -> tuple[str, str]:
+    """The mean, and the 90 % interval, rounded to what the interval supports."""
+    places = min(decimals(interval), 2) if interval.mean >= 0.1 else decimals(interval)
+    return f"{interval.mean:.{places}f}", f"{interval.q05:.{places}f} to {interval.q95:.{places}f}"
+
+
+def seconds(time: float) -> str:
+    """A time in seconds."""
+    return f"{time:.1f} s"
+
+
+def mass_status(parameter: ParameterContent, body: Body, name: Mapping[str, str]) -> str:
+    """What the data say about a mass, in words."""
+    if body.mass is not None:
+        return "Weighed: given with the input."
+    if parameter.status == "default":
+        return "Never collided in the video: a default value, the data say nothing."
+    if parameter.status == "identified":
+        return "Known from its collisions."
+    return f"Only its ratio to {_the(parameter.partners, name)} is known, not the mass itself."
+
+
+def restitution_status(parameter: ParameterContent, name: Mapping[str, str]) -> str:
+    """What the data say about a restitution factor, in words."""
+    if parameter.status == "default":
+        return "Never collided in the video: a default value, the data say nothing."
+    if parameter.status == "identified":
+        return "Known from its collisions."
+    return f"Only its product with that of {_the(parameter.partners, name)} is known."
+
+
+def _the(partners: Sequence[str], name: Mapping[str, str]) -> str:
+    return listed(f"the {name[partner]}" for partner in partners) if partners else "its collision partners"
+
+
+def collision_shares(world: WorldContent) -> list[tuple[tuple[int, int], float, float]]:
+    """Pairs of body indices that collide in a world, each with its share of the draws and median time in s, by time."""
+    pairs = np.sort(world.collisions.bodies, axis=1)
+    found = []
+    for first, second in np.unique(pairs, axis=0):
+        rows = (pairs == (first, second)).all(axis=1)
+        share = len(np.unique(world.collisions.draw[rows])) / world.draws
+        found.append(((int(first), int(second)), share, float(np.median(world.collisions.time[rows]))))
+    return sorted(found, key=lambda entry: entry[2])

@@ -1,0 +1,207 @@
+"""Place the known objects in one frame: nearest first, each judged by what it would show in front of the others."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import cv2
+import numpy as np
+from jaxtyping import Float, UInt8
+
+from vrdp_prob.perception.appearance import Appearance, Evidence
+from vrdp_prob.perception.contour import ContourFit, fit_contour
+from vrdp_prob.perception.region import Gain, Window, apparent_radius, climb, paint, polygon_area
+from vrdp_prob.perception.solids import Pose, Solid, depth
+from vrdp_prob.scene.body import Shape
+from vrdp_prob.scene.camera import Camera
+
+_STEPS = (0.3, 0.15, 0.07)
+"""Compass steps of the search in apparent radii."""
+_PROFILES = (0.24, 0.2, 0.16)
+"""Half lengths of the contour's profiles in apparent radii."""
+_SHORTEST_PROFILE = 3.0
+_COVER_MARGIN = 1
+"""Pixels around a nearer object in which nothing is measured of the one behind."""
+_LEAST_VISIBLE = 0.1
+"""Share of an object's picture that must show for it to count as seen."""
+_LEAST_ODDS = 1.0
+"""Mean log odds per visible pixel below which the object is not there."""
+_FAINT_ODDS = 0.3
+_FAINT_SUPPORT = 0.7
+"""Where the colours say little (a gray object in its own shadow's colour), so much of the outline must lie on edges."""
+_LEARN_VISIBLE = 0.5
+_LEARN_EVERY = 3
+_LEARN_FIRST = 5
+_MEMORY = 0.85
+_FLOOR_LIKE = -9.0
+"""Log density above which a pixel looks like plain floor."""
+
+
+@dataclass(frozen=True)
+class Sighting:
+    """One object in one frame.
+
+    Parameters
+    ----------
+    pose
+        Where it is.
+    contour
+        The fit of its outline, None where too little of it shows.
+    visible
+        Share of its picture that lies in the frame and in front of the others.
+    hidden
+        Share of its picture that lies in the frame behind others.
+    odds
+        Mean log odds per visible pixel that the object is there.
+    """
+
+    pose: Pose
+    contour: ContourFit | None
+    visible: float
+    hidden: float
+    odds: float
+
+    @property
+    def seen(self) -> bool:
+        """Whether the picture shows it."""
+        outlined = self.contour is not None and self.contour.support >= _FAINT_SUPPORT
+        return self.visible >= _LEAST_VISIBLE and self.odds >= (_FAINT_ODDS if outlined else _LEAST_ODDS)
+
+
+@dataclass
+class Track:
+    """One object through the frames.
+
+    Parameters
+    ----------
+    number
+        Order of discovery.
+    radius
+        Radius or half side in m.
+    shape
+        Current belief.
+    appearance
+        Its colours.
+    sightings
+        By frame; frames in which it was not seen are absent.
+    shape_scores
+        Evidence for each shape, in log odds summed over the frames that were looked at.
+    expected
+        Where it is thought to be now.
+    """
+
+    number: int
+    radius: float
+    shape: Shape
+    appearance: Appearance
+    sightings: dict[int, Sighting] = field(default_factory=dict)
+    shape_scores: dict[Shape, float] = field(default_factory=lambda: dict.fromkeys(Shape, 0.0))
+    shape_frames: int = 0
+    expected: Pose = field(default_factory=lambda: Pose(0.0, 0.0))
+    gone: bool = False
+
+    @property
+    def solid(self) -> Solid:
+        """What is looked for."""
+        return Solid(self.shape, self.radius)
+
+    def predict(self, frame: int, direction: int) -> Pose | None:
+        """Pose in a frame if it goes on as in the nearest two sightings; None where there is none near."""
+        near = [frame - direction * back for back in range(1, 6) if frame - direction * back in self.sightings]
+        if not near:
+            return None
+        last = self.sightings[near[0]].pose
+        if len(near) == 1:
+            return last
+        before = self.sightings[near[1]].pose
+        share = (frame - near[0]) / (near[0] - near[1])
+        return last.moved(*(share * (getattr(last, name) - getattr(before, name)) for name in ("x", "y", "yaw")))
+
+
+class Placer:
+    """Places objects in frames of one camera."""
+
+    def __init__(self, camera: Camera) -> None:
+        self.camera = camera
+
+    def window(self, solid: Solid, pose: Pose) -> Window:
+        """The solid's pixels."""
+        return paint(solid.polygon(self.camera, pose), self.camera.height, self.camera.width)
+
+    def place(
+        self, evidence: Evidence, tracks: Sequence[Track], starts: Mapping[int, Sequence[Pose]]
+    ) -> dict[int, Sighting]:
+        """Sightings of all tracks in one frame, each from its candidate starts (by track number)."""
+        order = sorted(tracks, key=lambda track: depth(self.camera, starts[track.number][0], track.radius))
+        windows = {track.number: self.window(track.solid, starts[track.number][0]) for track in order}
+        covered = np.zeros(evidence.floor.shape, np.uint8)
+        sightings: dict[int, Sighting] = {}
+        for index, track in enumerate(order):
+            behind = [(windows[other.number], other.appearance) for other in order[index + 1 :]]
+            gain = Gain.of(evidence, track.appearance, covered, behind)
+            sighting = self.sight(evidence, gain, track.solid, starts[track.number], covered)
+            sightings[track.number] = sighting
+            if sighting.seen:
+                window = self.window(track.solid, sighting.pose)
+                covered[window.place] |= window.mask
+        return sightings
+
+    def sight(
+        self,
+        evidence: Evidence,
+        gain: Gain,
+        solid: Solid,
+        starts: Sequence[Pose],
+        covered: UInt8[np.ndarray, "height width"],
+    ) -> Sighting:
+        """Best pose of one solid: region search from every start, then its outline."""
+
+        def score(pose: Pose) -> float:
+            return gain.score(self.camera, solid, pose)
+
+        best = max(starts, key=score)
+        pose, value = climb(score, self.camera, solid, best, _STEPS)
+        contour = self.refine(evidence, solid, pose, covered)
+        if contour is not None:
+            fitted = score(contour.pose)
+            if fitted > value - 0.08 * abs(value) - 30:
+                pose = contour.pose
+                value = fitted
+            else:
+                contour = None
+        visible, hidden = self.visibility(solid, pose, covered)
+        pixels = visible * polygon_area(solid.polygon(self.camera, pose))
+        return Sighting(pose, contour, visible, hidden, value / max(pixels, 1.0))
+
+    def refine(
+        self, evidence: Evidence, solid: Solid, pose: Pose, covered: UInt8[np.ndarray, "height width"]
+    ) -> ContourFit | None:
+        """Fit the outline where nothing nearer hides it."""
+        size = apparent_radius(self.camera, solid, pose)
+        halves = tuple(max(_SHORTEST_PROFILE, share * size) for share in _PROFILES)
+        blocked = cv2.dilate(covered, np.ones((2 * _COVER_MARGIN + 1,) * 2, np.uint8)) if covered.any() else None
+        return fit_contour(evidence.picture, self.camera, solid, pose, halves, blocked)
+
+    def visibility(self, solid: Solid, pose: Pose, covered: UInt8[np.ndarray, "height width"]) -> tuple[float, float]:
+        """Shares of the solid's picture that show, and that lie in the frame behind something nearer."""
+        polygon = solid.polygon(self.camera, pose)
+        window = paint(polygon, self.camera.height, self.camera.width)
+        full = max(polygon_area(polygon), 1.0)
+        behind = int(np.count_nonzero(window.mask & (covered[window.place] > 0)))
+        return min(1.0, (window.area - behind) / full), min(1.0, behind / full)
+
+    def learn(
+        self, evidence: Evidence, track: Track, sighting: Sighting, covered: UInt8[np.ndarray, "height width"]
+    ) -> None:
+        """Update a track's colours from a sighting that shows enough of it."""
+        count = len(track.sightings)
+        if sighting.visible < _LEARN_VISIBLE or (count > _LEARN_FIRST and count % _LEARN_EVERY):
+            return
+        window = self.window(track.solid, sighting.pose)
+        core = cv2.erode(window.mask, np.ones((3, 3), np.uint8)) > 0
+        core &= (covered[window.place] == 0) & (evidence.floor[window.place] < _FLOOR_LIKE)
+        track.appearance.learn(evidence.bins[window.place][core], memory=_MEMORY)
+
+
+def stack_poses(poses: Sequence[Pose]) -> Float[np.ndarray, "pose 3"]:
+    """Poses as rows of x, y, yaw."""
+    return np.array([(pose.x, pose.y, pose.yaw) for pose in poses], dtype=float).reshape(-1, 3)

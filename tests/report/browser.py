@@ -7,11 +7,23 @@ import os
 import select
 import shutil
 import subprocess
+import sys
 import time
 from pathlib import Path
 
 CANDIDATES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome")
 FLAGS = ("--headless=new", "--no-sandbox", "--disable-gpu", "--no-first-run", "--remote-debugging-pipe")
+
+PLACE_PIPES = """
+import os, sys
+read, write = (os.dup(int(number)) for number in sys.argv[1:3])
+os.dup2(read, 3)
+os.dup2(write, 4)
+os.set_inheritable(3, True)
+os.set_inheritable(4, True)
+os.execv(sys.argv[3], sys.argv[3:])
+"""
+"""Chromium reads commands from descriptor 3 and answers on 4."""
 
 
 def find_chromium() -> str | None:
@@ -23,18 +35,17 @@ class Browser:
     """One page of a headless Chromium; collects its console messages and network requests."""
 
     def __init__(self, executable: str, profile: Path) -> None:
-        self._command_read, self._command = os.pipe()
-        self._answer, self._answer_write = os.pipe()
+        own = (f"--user-data-dir={profile}", "about:blank")
+        command, self._command = os.pipe()
+        self._answer, answer = os.pipe()
         self._process = subprocess.Popen(
-            [executable, *FLAGS, f"--user-data-dir={profile}", "about:blank"],
+            [sys.executable, "-c", PLACE_PIPES, str(command), str(answer), executable, *FLAGS, *own],
             stdout=subprocess.DEVNULL,
             stderr=subprocess.DEVNULL,
-            preexec_fn=self._place_pipes,
-            close_fds=True,
-            pass_fds=(3, 4),
+            pass_fds=(command, answer),
         )
-        os.close(self._command_read)
-        os.close(self._answer_write)
+        os.close(command)
+        os.close(answer)
         self._ids = itertools.count(1)
         self._buffer = b""
         self.problems: list[str] = []
@@ -44,13 +55,6 @@ class Browser:
         self._session = self._call("Target.attachToTarget", targetId=page, flatten=True)["sessionId"]
         for domain in ("Runtime", "Page", "Network", "Log"):
             self.call(f"{domain}.enable")
-
-    def _place_pipes(self) -> None:
-        """In the child: Chromium reads commands from descriptor 3 and answers on 4."""
-        read, write = os.dup(self._command_read), os.dup(self._answer_write)
-        read, write = (os.dup(fd) if fd in (3, 4) else fd for fd in (read, write))
-        os.dup2(read, 3)
-        os.dup2(write, 4)
 
     def __enter__(self) -> "Browser":
         return self
@@ -116,8 +120,10 @@ class Browser:
     def open(self, page: Path) -> None:
         """Load a file and wait until its player stands."""
         self.call("Page.navigate", url=page.resolve().as_uri())
-        self.wait("document.readyState === 'complete' && (!document.getElementById('player')"
-                  " || document.getElementById('player').dataset.ready === 'true')")
+        self.wait(
+            "document.readyState === 'complete' && (!document.getElementById('player')"
+            " || document.getElementById('player').dataset.ready === 'true')"
+        )
 
     def wait(self, condition: str, seconds: float = 20) -> None:
         """Wait until a JavaScript condition holds."""

@@ -1,4 +1,4 @@
-"""A report's content made by hand: five objects, rollouts of a little disc world that shares no code with the package."""
+"""A report's content made by hand: five objects and rollouts of a little disc world of its own."""
 
 from dataclasses import dataclass, replace
 
@@ -49,6 +49,18 @@ class Draws:
     bounce: np.ndarray
 
 
+@dataclass(frozen=True)
+class Moment:
+    """State of all draws at one time; its arrays are changed in place."""
+
+    time: float
+    position: np.ndarray
+    velocity: np.ndarray
+    mass: np.ndarray
+    spin: np.ndarray
+    out: np.ndarray
+
+
 def make_draws(count: int = DRAWS, seed: int = 0) -> Draws:
     random = np.random.default_rng(seed)
     spread = np.array([0.03, 0.015, 0.015, 0.03, 0.05])[:, None]
@@ -87,13 +99,14 @@ def roll(draws: Draws, frames: int, kind: WorldKind, body: str | None = None) ->
             position = position + np.where(out[..., None], velocity, 0.0) * FRAME / steps
             angle = angle + np.where(out, spin, 0.0) * FRAME / steps
             spin = np.where(out, 0.995 * spin, spin)
-            _bounce(draws, position, velocity, mass, spin, out, time, events)
+            _bounce(draws, Moment(time, position, velocity, mass, spin, out), events)
     return WorldContent(
         kind, body, FRAME * np.arange(frames), np.stack(trajectory, axis=1), np.stack(exists, axis=1), _table(events)
     )
 
 
-def _bounce(draws, position, velocity, mass, spin, out, time, events):
+def _bounce(draws: Draws, now: Moment, events: dict) -> None:
+    position, velocity, mass, spin, out = now.position, now.velocity, now.mass, now.spin, now.out
     for a in range(len(IDS)):
         for b in range(a + 1, len(IDS)):
             apart = position[:, b] - position[:, a]
@@ -108,7 +121,7 @@ def _bounce(draws, position, velocity, mass, spin, out, time, events):
             for draw in np.flatnonzero(hit):
                 spin[draw, [a, b]] += [0.8, -0.8]
                 point = (position[draw, a] + position[draw, b]) / 2
-                events.setdefault((int(draw), a, b), (time, point))
+                events.setdefault((int(draw), a, b), (now.time, point))
 
 
 def _table(events) -> Collisions:
@@ -186,9 +199,7 @@ def _choices(number, question, kind, choices, world, **more) -> AnswerContent:
     joint = float(np.prod([max(p, 1 - p) for _, p in choices]))
     entropy = sum(_entropy([p, 1 - p]) for _, p in choices)
     error = float(np.sqrt(joint * (1 - joint) / 500))
-    return AnswerContent(
-        number, question, kind, chosen, joint, error, entropy, choices=items, world=world, **more
-    )
+    return AnswerContent(number, question, kind, chosen, joint, error, entropy, choices=items, world=world, **more)
 
 
 def make_answers() -> tuple[AnswerContent, ...]:
@@ -198,7 +209,9 @@ def make_answers() -> tuple[AnswerContent, ...]:
         QuestionType.COUNTERFACTUAL,
     )
     return (
-        _open(0, "What is the material of the object to collide with the cyan sphere?", {"metal": 0.996, "rubber": 0.004}),
+        _open(
+            0, "What is the material of the object to collide with the cyan sphere?", {"metal": 0.996, "rubber": 0.004}
+        ),
         _open(1, "How many collisions happen?", {"2": 0.962, "3": 0.03, "1": 0.008}),
         _open(2, "Are there any stationary cyan objects when the video begins?", {"no": 1.0}),
         _choices(
@@ -215,7 +228,10 @@ def make_answers() -> tuple[AnswerContent, ...]:
             4,
             "Which of the following will happen next?",
             predictive,
-            [("The rubber cube and the yellow object collide", 0.93), ("The cylinder collides with the cyan cube", 0.02)],
+            [
+                ("The rubber cube and the yellow object collide", 0.93),
+                ("The cylinder collides with the cyan cube", 0.02),
+            ],
             "future",
             relies_on_default=("4",),
         ),

@@ -54,7 +54,13 @@ def render(content: ReportContent) -> str:
         lstrip_blocks=True,
         undefined=jinja2.StrictUndefined,
     )
-    values = {**_opening(content), **_player(content), **_questions(content), **_estimates(content), **_closing(content)}
+    values = {
+        **_opening(content),
+        **_player(content),
+        **_questions(content),
+        **_estimates(content),
+        **_closing(content),
+    }
     return environment.get_template("page.html.j2").render(values)
 
 
@@ -253,9 +259,11 @@ def _closing(content: ReportContent) -> dict[str, Any]:
 def _diagnostics(content: ReportContent) -> list[tuple[str, str, str]]:
     """Term, value and meaning of each diagnostic that applies."""
     convergence = content.convergence
-    rows = [("Sampler", convergence.sampler, "")]
+    rows: list[tuple[str, str, str]] = [("Sampler", convergence.sampler, "")]
     if convergence.r_hat is not None and math.isfinite(convergence.r_hat):
-        rows.append(("R-hat, largest", f"{convergence.r_hat:.3f}", "1 where independent runs agree; below 1.01 is good"))
+        rows.append(
+            ("R-hat, largest", f"{convergence.r_hat:.3f}", "1 where independent runs agree; below 1.01 is good")
+        )
     if convergence.ess_bulk is not None and math.isfinite(convergence.ess_bulk):
         meaning = "independent draws that the dependent ones are worth; above 400 is good"
         rows.append(("Effective sample size, smallest", f"{convergence.ess_bulk:.0f}", meaning))

@@ -14,6 +14,7 @@ from jaxtyping import Float, Int
 
 from vrdp_prob.report.content import ReportContent, WorldContent
 from vrdp_prob.report.wording import color_of, names, tags, world_group, world_label
+from vrdp_prob.scene import Camera
 
 _STEPS = 16000
 """Steps of length on each side of the origin."""
@@ -47,6 +48,7 @@ def player_data(content: ReportContent) -> dict[str, Any]:
         "seenUntil": round(float(tracks.times[-1]), 6),
         "tracks": {"times": _rounded(tracks.times), "positions": _measured(tracks.positions)},
         "view": _view(content),
+        "pictureEdge": None if camera is None else _picture_edge(camera),
         "worlds": [_world(world, content, reach) for world in content.worlds],
     }
 
@@ -109,13 +111,23 @@ def _view(content: ReportContent) -> list[float]:
     """Rectangle (x1, y1, x2, y2) in m that the bird's-eye view shows: what was seen, and nearly all that was drawn."""
     positions = content.tracks.positions.reshape(-1, 2)
     low, high = np.nanmin(positions, axis=0), np.nanmax(positions, axis=0)
-    room = 0.35 * (high - low) + 2 * max((body.radius or 0.0 for body in content.tracks.bodies), default=0.0)
+    room = 0.2 * (high - low) + 2 * max((body.radius or 0.0 for body in content.tracks.bodies), default=0.0)
     for world in content.worlds[:2]:
         drawn = world.trajectory[..., :2][world.exists]
         if len(drawn):
             inner, outer = np.quantile(drawn, [0.005, 0.995], axis=0)
             low, high = np.minimum(low, np.maximum(inner, low - room)), np.maximum(high, np.minimum(outer, high + room))
     return [round(float(value), 3) for value in (*low, *high)]
+
+
+def _picture_edge(camera: Camera) -> list[list[float]] | None:
+    """Corners of the picture on the floor in m, None where one of them looks above the horizon."""
+    u, v = float(camera.width), float(camera.height)
+    corners = camera.to_plane(np.array([[0.0, 0.0], [u, 0.0], [u, v], [0.0, v]]), 0.0)
+    grounded = np.column_stack([corners, np.zeros(4), np.ones(4)])
+    if not np.isfinite(corners).all() or (grounded @ camera.projection[2] <= 0).any():
+        return None
+    return np.round(corners, 3).tolist()
 
 
 def _measured(positions: Float[np.ndarray, "time body 2"]) -> list[list[list[float] | None]]:

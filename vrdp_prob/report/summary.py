@@ -99,7 +99,7 @@ def answer_words(answer: AnswerContent) -> str:
         return "correct" if correct else "wrong"
     if correct in (0, count):
         which = ("none", "neither") if correct == 0 else ("all", "both")
-        return f"{which[count == 2]} of the choices {'are' if count > 2 and correct else 'is'} correct"
+        return f"{which[count == 2]} of the choices {'are' if correct else 'is'} correct"
     return f"{counted(correct, 'choice')} of {number_word(count)} {'is' if correct == 1 else 'are'} correct"
 
 

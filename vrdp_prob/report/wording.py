@@ -102,9 +102,9 @@ def percent(probability: float) -> str:
     """A probability in per cent, never rounded to certainty."""
     if probability <= 0 or probability >= 1:
         return f"{100 * probability:.0f} %"
-    if probability < 0.005:
+    if probability <= 0.005:
         return "< 1 %"
-    return "> 99 %" if probability > 0.995 else f"{100 * probability:.0f} %"
+    return "> 99 %" if probability >= 0.995 else f"{100 * probability:.0f} %"
 
 
 def percent_error(error: float) -> str:

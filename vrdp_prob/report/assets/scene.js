@@ -32,8 +32,8 @@ class Scene {
     const ratio = window.devicePixelRatio || 1;
     this.canvas.style.aspectRatio = String(this.view.aspect);
     for (const canvas of [this.canvas, this.paths]) {
-      canvas.width = Math.round(width * ratio);
-      canvas.height = Math.round(height * ratio);
+      canvas.width = Math.max(1, Math.round(width * ratio));
+      canvas.height = Math.max(1, Math.round(height * ratio));
     }
     this.size = [width, height];
     this.ratio = ratio;
@@ -48,8 +48,9 @@ class Scene {
   }
 
   draw(world, time, { paths, measured }) {
-    const context = this.context(this.canvas);
     const [width, height] = this.size;
+    if (!width) return; /* not laid out */
+    const context = this.context(this.canvas);
     this.view.backdrop(context, this.colors, width, height, this.floor);
     if (paths) this.drawPaths(context, world);
     const centres = this.drawBodies(context, world, time);
@@ -172,13 +173,8 @@ class Scene {
       const [outline] = this.view.outline(this.data.bodies[body], { x, y, angle: 0 });
       const top = Math.min(...outline.map((point) => point[1]));
       const [u] = this.view.point(x, y, radius);
-      context.lineWidth = 3;
-      context.strokeStyle = this.colors.paper;
-      context.strokeText(this.data.bodies[body].tag, u, top - 5);
-      context.fillStyle = this.colors.ink;
-      context.fillText(this.data.bodies[body].tag, u, top - 5);
+      label(context, this.colors, this.data.bodies[body].tag, u, top - 5, this.colors.ink);
     }
-    context.textAlign = "left";
   }
 }
 

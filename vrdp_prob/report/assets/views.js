@@ -100,7 +100,7 @@ class PlaneView {
     const { camera, view } = data;
     this.aspect = camera ? camera.width / camera.height : 1.5;
     this.right = [1, 0];
-    this.camera = camera;
+    this.pictureEdge = data.pictureEdge;
     const corners = [[view[0], view[1]], [view[0], view[3]], [view[2], view[1]], [view[2], view[3]]];
     if (camera) {
       const [cx, cy] = [(view[0] + view[2]) / 2, (view[1] + view[3]) / 2];
@@ -162,10 +162,29 @@ class PlaneView {
     for (let u = this.offset[0] % pixels; u < width; u += pixels) { context.moveTo(u, 0); context.lineTo(u, height); }
     for (let v = (height - this.offset[1]) % pixels; v < height; v += pixels) { context.moveTo(0, v); context.lineTo(width, v); }
     context.stroke();
-    context.fillStyle = colors.muted;
-    context.font = "12px system-ui, sans-serif";
+    const edge = this.pictureEdge ? "dashed: what the camera sees · " : "";
+    if (edge) this.drawPictureEdge(context, colors);
     context.textAlign = "right";
-    context.fillText(`one square: ${+step.toPrecision(2)} m`, width - 10, height - 10);
-    context.textAlign = "left";
+    context.font = "12px system-ui, sans-serif";
+    label(context, colors, `${edge}one square: ${+step.toPrecision(2)} m`, width - 10, height - 10, colors.muted);
   }
+
+  drawPictureEdge(context, colors) {
+    context.strokeStyle = colors.muted;
+    context.setLineDash([4, 4]);
+    context.beginPath();
+    for (const [x, y] of this.pictureEdge) context.lineTo(...this.point(x, y));
+    context.closePath();
+    context.stroke();
+    context.setLineDash([]);
+  }
+}
+
+/* Text that stays readable over anything. */
+function label(context, colors, text, u, v, color) {
+  context.lineWidth = 3;
+  context.strokeStyle = colors.paper;
+  context.strokeText(text, u, v);
+  context.fillStyle = color;
+  context.fillText(text, u, v);
 }

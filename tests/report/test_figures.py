@@ -1,0 +1,79 @@
+"""Geometry of the static figures."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from vrdp_prob.report.content import Interval
+from vrdp_prob.report.figures import log_axis, path_data, still_figure, unit_axis
+from vrdp_prob.report.floor import clear_floor
+
+
+def test_log_axis_gives_equal_ratios_equal_lengths():
+    axis = log_axis([Interval(1.0, 0.1, 0.25, 4.0)])
+    assert axis.place(1.0) - axis.place(0.5) == pytest.approx(axis.place(2.0) - axis.place(1.0), abs=0.02)
+    assert (axis.place(1e-9), axis.place(1e9)) == (0.0, 100.0)
+
+
+def test_axes_hold_their_intervals():
+    wide = Interval(20.0, 9.0, 0.02, 60.0)
+    axis = log_axis([wide])
+    assert 0 < axis.place(wide.q05) < axis.place(wide.q95) < 100
+    assert unit_axis([Interval(1.1, 0.1, 0.9, 1.3)]).high == 1.3
+    assert log_axis([]).ticks == (0.5, 1.0, 2.0)
+
+
+@given(st.integers(0, 2**32 - 1))
+def test_thinned_paths_stay_close(seed):
+    points = np.cumsum(np.random.default_rng(seed).normal(size=(60, 2)), axis=0)
+    kept = np.array([[float(x) for x in pair.split()] for pair in path_data(points)[1:].split("L")])
+    starts, chords = kept[:-1], np.diff(kept, axis=0)
+    offsets = points[:, None] - starts
+    along = np.clip((offsets * chords).sum(-1) / np.maximum((chords**2).sum(-1), 1e-12), 0, 1)
+    distances = np.linalg.norm(offsets - along[..., None] * chords, axis=-1).min(axis=1)
+    assert distances.max() < 0.35 + 0.1
+
+
+def test_straight_path_needs_two_points():
+    line = np.linspace([0.0, 0.0], [100.0, 50.0], 200)
+    assert path_data(line) == "M0.0 0.0L100.0 50.0"
+    assert path_data(line[:1]) == ""
+
+
+def test_figure_lies_in_the_picture(content, plain_content):
+    for case in (content, plain_content):
+        figure = still_figure(case)
+        dots = np.array([dot for track in figure.tracks for dot in track.dots])
+        assert (dots >= -1).all()
+        assert (dots <= [figure.width + 1, figure.height + 1]).all()
+
+
+def test_future_of_the_rollouts_is_drawn(content):
+    figure = still_figure(content)
+    assert all(track.seen for track in figure.tracks)
+    assert any(track.future and track.ends for track in figure.tracks)
+
+
+def test_figure_without_worlds_shows_the_tracks(content):
+    figure = still_figure(replace(content, worlds=()))
+    assert all(track.dots and not track.seen for track in figure.tracks)
+
+
+def test_floor_is_cleared_of_objects(content):
+    camera, tracks, time = content.tracks.camera, content.tracks, 4.4
+    image = np.full((camera.height, camera.width, 3), 160, dtype=np.uint8)
+    frame = int(np.abs(tracks.times - time).argmin())
+    for position in tracks.positions[frame]:
+        if np.isfinite(position).all():
+            u, v = np.rint(camera.project(np.array([*position, 0.2]))).astype(int)
+            image[max(v - 12, 0) : v + 12, max(u - 12, 0) : u + 12] = 20
+    assert image.min() == 20
+    assert clear_floor(image, tracks, time).min() > 140
+
+
+def test_floor_without_a_camera_stays(plain_content):
+    image = np.zeros((4, 4, 3), dtype=np.uint8)
+    assert clear_floor(image, plain_content.tracks, 0.0) is image

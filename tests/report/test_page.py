@@ -1,0 +1,139 @@
+"""report.html: self-contained, safe, complete."""
+
+import json
+import re
+from dataclasses import replace
+from html.parser import HTMLParser
+
+import pytest
+from example_content import with_question
+
+from vrdp_prob.report import render
+from vrdp_prob.report.payload import player_data
+
+VOID = {"meta", "link", "input", "img", "br"}
+
+
+class Outline(HTMLParser):
+    """Checks that elements nest, and keeps text and attributes."""
+
+    def __init__(self, page):
+        super().__init__()
+        self.open, self.texts, self.attributes = [], [], []
+        self.feed(page)
+        self.close()
+        assert self.open == []
+
+    def handle_starttag(self, tag, attrs):
+        self.attributes.append((tag, dict(attrs)))
+        if tag not in VOID:
+            self.open.append(tag)
+
+    def handle_startendtag(self, tag, attrs):
+        self.attributes.append((tag, dict(attrs)))
+
+    def handle_endtag(self, tag):
+        assert self.open.pop() == tag
+
+    def handle_data(self, data):
+        if not self.open or self.open[-1] not in ("script", "style"):
+            self.texts.append(data)
+
+    @property
+    def text(self):
+        return " ".join(" ".join(self.texts).split())
+
+
+@pytest.fixture(scope="module")
+def page(content):
+    return render(content)
+
+
+def test_page_needs_nothing_from_outside(page):
+    addresses = re.findall(r"(?:src|href|action|data)=\"([^\"]*)\"", page)
+    assert addresses
+    assert all(address.startswith("data:") for address in addresses)
+    assert not re.search(r"@import|url\(|https?://", page)
+    assert "default-src 'none'" in page
+
+
+def test_page_is_of_modest_size(page):
+    assert len(page) < 3e6
+
+
+def test_same_content_gives_the_same_page(content, page):
+    assert render(content) == page
+
+
+def test_page_says_everything(content, page):
+    text = Outline(page).text
+    for answer in content.answers:
+        assert answer.question in text
+        assert all(choice.choice in text for choice in answer.choices)
+    for warning in content.warnings:
+        assert warning in text
+    assert "Never collided in the video: a default value, the data say nothing." in text
+    assert "Only its ratio to the gray cylinder and the cyan sphere is known" in text
+    assert "Rests on default values of the cyan cube and the yellow sphere" in text
+    assert "sliding friction, rolling resistance and air drag" in text
+    assert "seed 0" in text
+
+
+def test_questions_stand_in_the_order_of_doubt(page):
+    entropies = [
+        float(attributes["data-entropy"]) for _, attributes in Outline(page).attributes if "data-entropy" in attributes
+    ]
+    assert len(entropies) == 10
+    assert entropies == sorted(entropies, reverse=True)
+
+
+def test_hypotheses_have_a_way_to_the_player(page):
+    worlds = [
+        attributes["data-world"]
+        for tag, attributes in Outline(page).attributes
+        if tag == "button" and "data-world" in attributes
+    ]
+    assert sorted(worlds) == ["future", "heavier:2", "lighter:3", "removed:1"]
+
+
+def test_text_of_others_is_escaped(content):
+    attack = "What <script>alert('x')</script> & \"why\"?"
+    page = render(with_question(content, attack))
+    assert "<script>alert" not in page
+    assert attack in Outline(page).text
+
+
+def test_names_cannot_end_the_script_that_holds_them(content):
+    evil = replace(content.tracks.bodies[0], id="</script><b>", color=None)
+    bodies = (evil, *content.tracks.bodies[1:])
+    data = content.tracks.data.assign_coords(body=[body.id for body in bodies])
+    first = replace(content.bodies[0], body=evil)
+    hostile = replace(
+        content,
+        tracks=replace(content.tracks, bodies=bodies, data=data),
+        bodies=(first, *content.bodies[1:]),
+        answers=(),
+        worlds=content.worlds[:2],
+    )
+    page = render(hostile)
+    assert "</script><b>" not in page
+    stored = re.search(r'id="player-data">(.*?)</script>', page, re.DOTALL).group(1)
+    assert json.loads(stored) == json.loads(json.dumps(player_data(hostile)))
+
+
+def test_page_without_camera_worlds_or_questions(plain_content):
+    text = Outline(render(plain_content)).text
+    assert "The plane from above." in text
+    bare = Outline(
+        render(replace(plain_content, worlds=(), answers=(), warnings=(), mass_ratios=(), restitution_pairs=()))
+    )
+    assert "Watch it" not in bare.text
+    assert "Questions" not in bare.text
+    assert "No limit was found" in bare.text
+
+
+def test_page_of_a_fit_that_has_not_converged_does_not_claim_otherwise(content):
+    failed = replace(content, convergence=replace(content.convergence, converged=False), warnings=())
+    text = Outline(render(failed)).text
+    assert "No limit was found" not in text
+    assert "not converged" in text

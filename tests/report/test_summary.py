@@ -1,0 +1,43 @@
+"""The opening paragraph and the order of the questions."""
+
+from dataclasses import replace
+
+from vrdp_prob.report.content import ConvergenceContent
+from vrdp_prob.report.summary import answer_words, by_doubt, convergence_words, summary
+
+
+def test_paragraph_says_what_there_is_and_what_happened(content):
+    text = " ".join(summary(content))
+    assert text.startswith("Five objects appear in 5.1 s of video: the cyan cube, the purple cube, the gray cylinder,")
+    assert "Two collisions happened: the gray cylinder with the cyan sphere at 2.4 s" in text
+    assert "The fit has converged; two things limit what it can say" in text
+    assert text.endswith("Of 10 questions, four are doubtful.")
+
+
+def test_paragraph_does_not_trust_a_fit_that_has_not_converged(content):
+    failed = replace(content, convergence=ConvergenceContent("nuts", False, 1.4))
+    assert "has not converged: take every number on this page as provisional" in " ".join(summary(failed))
+    assert "not converged" in convergence_words(failed.convergence)[0]
+
+
+def test_paragraph_without_warnings_questions_or_worlds(content):
+    text = " ".join(summary(replace(content, warnings=(), answers=(), worlds=())))
+    assert text.endswith("nothing speaks against trusting it.")
+
+
+def test_most_ambiguous_question_comes_first(content):
+    entropies = [answer.entropy for answer in by_doubt(content.answers)]
+    assert entropies == sorted(entropies, reverse=True)
+
+
+def test_answers_in_words(content):
+    words = {answer.question_id: answer_words(answer) for answer in content.answers}
+    assert words[1] == "2"
+    assert words[6] == "one choice of four is correct"
+    assert words[7] == "two choices of three are correct"
+    both = replace(content.answers[3], answer=(0, 1))
+    none = replace(content.answers[3], answer=())
+    assert (answer_words(both), answer_words(none)) == (
+        "both of the choices are correct",
+        "neither of the choices is correct",
+    )

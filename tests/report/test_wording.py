@@ -1,0 +1,99 @@
+"""Names, numbers and sentences."""
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from vrdp_prob.report.content import Interval, ParameterContent
+from vrdp_prob.report.wording import (
+    counted,
+    interval_words,
+    listed,
+    mass_status,
+    names,
+    percent,
+    percent_error,
+    restitution_status,
+    tags,
+)
+from vrdp_prob.scene import Body, Shape
+
+
+def body(identity, color=None, material=None, shape=Shape.SPHERE, **more):
+    return Body(identity, shape, 0.2, color=color, material=material, **more)
+
+
+@pytest.mark.parametrize(
+    ("bodies", "expected"),
+    [
+        ((body("0", "red"), body("1", "blue")), ["red sphere", "blue sphere"]),
+        ((body("0", "red", "metal"), body("1", "red", "rubber")), ["metal sphere", "rubber sphere"]),
+        (
+            (body("0", "red", "metal"), body("1", "red", "rubber"), body("2", "blue", "metal")),
+            ["red metal sphere", "rubber sphere", "blue sphere"],
+        ),
+        ((body("7"), body("8")), ["sphere 7", "sphere 8"]),
+        ((body("left", shape=Shape.CYLINDER), body("right", shape=Shape.CYLINDER)), ["“left”", "“right”"]),
+    ],
+)
+def test_names_fit_one_body_alone(bodies, expected):
+    assert list(names(bodies).values()) == expected
+
+
+@given(
+    st.lists(
+        st.tuples(st.sampled_from([None, "red", "blue"]), st.sampled_from([None, "metal"]), st.sampled_from(Shape)),
+        min_size=1,
+        max_size=8,
+    )
+)
+def test_names_are_unique(kinds):
+    bodies = [body(str(index), *kind[:2], shape=kind[2]) for index, kind in enumerate(kinds)]
+    assert len(set(names(bodies).values())) == len(bodies)
+
+
+def test_long_ids_become_letters():
+    assert list(tags([body("a puck"), body("another")]).values()) == ["A", "B"]
+
+
+@given(st.floats(0, 1))
+def test_percent_is_certain_only_where_the_probability_is(probability):
+    assert (percent(probability) in ("0 %", "100 %")) == (probability in (0, 1))
+
+
+def test_percent_errors():
+    assert [percent_error(value) for value in (0.0, 0.004, 0.02)] == ["", "± 0.4", "± 2"]
+
+
+@pytest.mark.parametrize(
+    ("interval", "words"),
+    [
+        (Interval(1.0234, 0.1, 0.8765, 1.1912), ("1.02", "0.88 to 1.19")),
+        (Interval(3.2, 2.0, 0.4, 9.87), ("3.2", "0.4 to 9.9")),
+        (Interval(0.031, 0.0004, 0.0302, 0.0318), ("0.031", "0.030 to 0.032")),
+        (Interval(1.0, 0.0, 1.0, 1.0), ("1.00", "1.00 to 1.00")),
+    ],
+)
+def test_numbers_are_rounded_to_what_the_interval_supports(interval, words):
+    assert interval_words(interval) == words
+
+
+def test_lists_and_counts():
+    assert [listed(["a"]), listed(["a", "b"]), listed(["a", "b", "c"])] == ["a", "a and b", "a, b and c"]
+    assert [counted(0, "object"), counted(1, "object"), counted(14, "object")] == [
+        "no objects",
+        "one object",
+        "14 objects",
+    ]
+
+
+def test_status_in_words():
+    name = {"1": "cyan cube", "2": "red sphere"}
+    some = Interval(1.0, 0.1, 0.9, 1.1)
+    ratio = ParameterContent(some, "ratio_only", ("1",))
+    assert mass_status(ratio, body("0"), name) == "Only its ratio to the cyan cube is known, not the mass itself."
+    product = ParameterContent(some, "product_only", ("1", "2"))
+    assert "product with that of the cyan cube and the red sphere" in restitution_status(product, name)
+    default = ParameterContent(some, "default")
+    assert "the data say nothing" in mass_status(default, body("0"), name)
+    assert mass_status(default, body("0", mass=0.03), name) == "Weighed: given with the input."

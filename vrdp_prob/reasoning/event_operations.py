@@ -1,0 +1,239 @@
+"""Operations on events: the worlds' event lists, filters by kind, object, order and cause, and what an event tells."""
+
+import numpy as np
+from jaxtyping import Bool
+
+from vrdp_prob.reasoning.events import EventTable, EventUniverse
+from vrdp_prob.reasoning.operations import operation
+from vrdp_prob.reasoning.run import Run
+from vrdp_prob.reasoning.tokens import ORDERS
+from vrdp_prob.reasoning.values import Change, EventRef, EventSet, Moment, ObjectRef, ObjectSet, Word, noun_phrase
+
+FUTURE = "future"
+_PLACES = {"first": 0, "second": 1, "third": 2}
+_PHRASES = {"collision": "collision", "in": "entrance", "out": "exit"}
+
+
+@operation("events", gives=EventSet)
+def events(run: Run) -> EventSet:
+    """What happens in the video, its start and end among it."""
+    table = run.facts.events()
+    return EventSet(table.happens, table.time)
+
+
+@operation("unseen_events", gives=EventSet)
+def unseen_events(run: Run) -> EventSet:
+    """What happens after the video."""
+    run.looked_at.add(FUTURE)
+    table = run.facts.unseen_events()
+    return EventSet(table.happens, table.time)
+
+
+@operation("all_events", gives=EventSet)
+def all_events(run: Run) -> EventSet:
+    """One possible collision of each pair, without a time."""
+    universe = _universe(run)
+    mask = np.broadcast_to(universe.mask(universe.collisions), (run.facts.draws, universe.size)).copy()
+    return EventSet(mask, np.full(mask.shape, np.nan))
+
+
+@operation("start", gives=EventRef)
+def start(run: Run) -> EventRef:
+    """The start of the video."""
+    return _always(run, _universe(run).start, "start of the video")
+
+
+@operation("end", gives=EventRef)
+def end(run: Run) -> EventRef:
+    """The end of the video."""
+    return _always(run, _universe(run).end, "end of the video")
+
+
+@operation("filter_start", EventSet, gives=EventRef)
+def filter_start(run: Run, chosen: EventSet) -> EventRef:
+    """The start event of a list of events."""
+    return _only(run, chosen, _universe(run).start, "start of the video")
+
+
+@operation("filter_end", EventSet, gives=EventRef)
+def filter_end(run: Run, chosen: EventSet) -> EventRef:
+    """The end event of a list of events."""
+    return _only(run, chosen, _universe(run).end, "end of the video")
+
+
+@operation("filter_in", EventSet, (ObjectSet, ObjectRef), gives=EventSet)
+def filter_in(run: Run, chosen: EventSet, who: ObjectSet | ObjectRef) -> EventSet:
+    """The entrances of the objects."""
+    return _of_kind(run, chosen, who, "in", _universe(run).entrances)
+
+
+@operation("filter_out", EventSet, (ObjectSet, ObjectRef), gives=EventSet)
+def filter_out(run: Run, chosen: EventSet, who: ObjectSet | ObjectRef) -> EventSet:
+    """The exits of the objects."""
+    return _of_kind(run, chosen, who, "out", _universe(run).exits)
+
+
+@operation("filter_collision", EventSet, (ObjectSet, ObjectRef), gives=EventSet)
+def filter_collision(run: Run, chosen: EventSet, who: ObjectSet | ObjectRef) -> EventSet:
+    """The collisions in which any of the objects takes part."""
+    return _of_kind(run, chosen, who, "collision", _universe(run).collisions)
+
+
+@operation("filter_before", EventSet, EventRef, gives=EventSet)
+def filter_before(run: Run, chosen: EventSet, event: EventRef) -> EventSet:
+    """The events before an event."""
+    _require_present(run, event)
+    return EventSet(chosen.mask & (chosen.time < event.time[:, None]), chosen.time, f"{chosen.phrase} before it")
+
+
+@operation("filter_after", EventSet, EventRef, gives=EventSet)
+def filter_after(run: Run, chosen: EventSet, event: EventRef) -> EventSet:
+    """The events after an event."""
+    _require_present(run, event)
+    return EventSet(chosen.mask & (chosen.time > event.time[:, None]), chosen.time, f"{chosen.phrase} after it")
+
+
+@operation("filter_order", EventSet, Word, gives=EventRef, words=ORDERS)
+def filter_order(run: Run, chosen: EventSet, order: Word) -> EventRef:
+    """The first, second, third or last of the events."""
+    times = np.where(chosen.mask, chosen.time, np.inf)
+    ranked = np.argsort(times, axis=1, kind="stable")
+    count = chosen.mask.sum(axis=1)
+    place = np.maximum(count - 1, 0) if order.text == "last" else np.full(len(count), _PLACES[order.text])
+    present = count > place
+    index = np.take_along_axis(ranked, np.minimum(place, times.shape[1] - 1)[:, None], axis=1)[:, 0]
+    return _ref(chosen, index, present, f"{order.text} {chosen.phrase}")
+
+
+@operation("filter_ancestor", EventSet, EventRef, gives=EventSet)
+def filter_ancestor(run: Run, chosen: EventSet, event: EventRef) -> EventSet:
+    """The events that lie on the way back from an event, object by object, to the previous event."""
+    _require_present(run, event)
+    reached = run.facts.events().ancestors()[np.arange(run.facts.draws), event.index]
+    return EventSet(chosen.mask & reached, chosen.time, f"cause of the {event.phrase}")
+
+
+@operation("unique", EventSet, gives=EventRef)
+def unique(run: Run, chosen: EventSet) -> EventRef:
+    """The only event of a set; draws in which two events fit leave the question."""
+    count = chosen.mask.sum(axis=1)
+    run.require(count <= 1, f"several events fit 'the {chosen.phrase}'; say which by naming the objects.")
+    return _ref(chosen, chosen.mask.argmax(axis=1), count == 1, chosen.phrase)
+
+
+@operation("get_frame", EventRef, gives=Moment)
+def get_frame(run: Run, event: EventRef) -> Moment:
+    """The frame of an event."""
+    _require_present(run, event)
+    return Moment(event.time)
+
+
+@operation("get_object", EventRef, gives=ObjectRef)
+def get_object(run: Run, event: EventRef) -> ObjectRef:
+    """The object that enters or leaves."""
+    _require_present(run, event)
+    takes_part = _universe(run).takes_part[event.index]
+    run.require(takes_part.sum(axis=1) == 1, f"the {event.phrase} is no entrance or exit of one object.")
+    return ObjectRef(takes_part.argmax(axis=1))
+
+
+@operation("get_col_partner", EventRef, ObjectRef, gives=ObjectRef)
+def get_col_partner(run: Run, event: EventRef, who: ObjectRef) -> ObjectRef:
+    """The other object of a collision."""
+    _require_present(run, event)
+    takes_part = _universe(run).takes_part[event.index].copy()
+    draws = np.arange(run.facts.draws)
+    fits = (takes_part.sum(axis=1) == 2) & takes_part[draws, who.index]
+    run.require(fits, f"the {event.phrase} is no collision of {who.phrase}.")
+    takes_part[draws, who.index] = False
+    return ObjectRef(takes_part.argmax(axis=1))
+
+
+@operation("get_counterfact", EventSet, ObjectRef, gives=EventSet)
+def get_counterfact(run: Run, chosen: EventSet, who: ObjectRef) -> EventSet:
+    """Those of the events that happen with the object removed, or changed as `apply_*` says."""
+    return _changed(run, chosen, who, who.change or Change.REMOVED)
+
+
+@operation("counterfact_heavier", EventSet, ObjectRef, gives=EventSet)
+def counterfact_heavier(run: Run, chosen: EventSet, who: ObjectRef) -> EventSet:
+    """Those of the events that happen with the object five times heavier."""
+    return _changed(run, chosen, who, Change.HEAVIER)
+
+
+@operation("counterfact_lighter", EventSet, ObjectRef, gives=EventSet)
+def counterfact_lighter(run: Run, chosen: EventSet, who: ObjectRef) -> EventSet:
+    """Those of the events that happen with the object five times lighter."""
+    return _changed(run, chosen, who, Change.LIGHTER)
+
+
+@operation("get_counterfact", ObjectRef, gives=EventSet)
+def counterfactual_events(run: Run, who: ObjectRef) -> EventSet:
+    """What happens with the object removed, or changed as `apply_*` says."""
+    return _changed(run, None, who, who.change or Change.REMOVED)
+
+
+@operation("counterfact_heavier", ObjectRef, gives=EventSet)
+def heavier_events(run: Run, who: ObjectRef) -> EventSet:
+    """What happens with the object five times heavier."""
+    return _changed(run, None, who, Change.HEAVIER)
+
+
+@operation("counterfact_lighter", ObjectRef, gives=EventSet)
+def lighter_events(run: Run, who: ObjectRef) -> EventSet:
+    """What happens with the object five times lighter."""
+    return _changed(run, None, who, Change.LIGHTER)
+
+
+def _universe(run: Run) -> EventUniverse:
+    return run.facts.events().universe
+
+
+def _ref(chosen: EventSet, index: np.ndarray, present: Bool[np.ndarray, "draw"], phrase: str) -> EventRef:
+    time = np.take_along_axis(chosen.time, index[:, None], axis=1)[:, 0]
+    return EventRef(index, present, time, phrase)
+
+
+def _always(run: Run, place: int, phrase: str) -> EventRef:
+    table = run.facts.events()
+    return EventRef(np.full(run.facts.draws, place), np.ones(run.facts.draws, dtype=bool), table.time[:, place], phrase)
+
+
+def _only(run: Run, chosen: EventSet, place: int, phrase: str) -> EventRef:
+    run.require(chosen.mask[:, place], f"the events do not hold the {phrase}.")
+    return _always(run, place, phrase)
+
+
+def _members(run: Run, who: ObjectSet | ObjectRef) -> Bool[np.ndarray, "draw body"]:
+    if isinstance(who, ObjectSet):
+        return who.mask
+    return np.arange(len(run.facts.bodies)) == who.index[:, None]
+
+
+def _of_kind(run: Run, chosen: EventSet, who: ObjectSet | ObjectRef, kind: str, part: slice) -> EventSet:
+    universe = _universe(run)
+    involved = (_members(run, who).astype(np.int64) @ universe.takes_part.T.astype(np.int64)) > 0
+    mask = chosen.mask & universe.mask(part) & involved
+    name = noun_phrase(who.words)
+    if kind == "collision" and chosen.phrase.startswith("collision of the"):
+        phrase = f"{chosen.phrase} with the {name}"
+    else:
+        phrase = f"{_PHRASES[kind]} of the {name}"
+    return EventSet(mask, chosen.time, phrase)
+
+
+def _changed(run: Run, chosen: EventSet | None, who: ObjectRef, change: Change) -> EventSet:
+    universe = _universe(run)
+    happens = np.zeros((run.facts.draws, universe.size), dtype=bool)
+    time = np.full(happens.shape, np.nan)
+    for body in np.unique(who.index[run.valid]).tolist():
+        run.looked_at.add((change, body))
+        table: EventTable = run.facts.counterfactual_events(change, body)
+        draws = who.index == body
+        happens[draws], time[draws] = table.happens[draws], table.time[draws]
+    phrase = f"event with {who.phrase} {change}"
+    return EventSet(happens if chosen is None else happens & chosen.mask, time, phrase)
+
+
+def _require_present(run: Run, event: EventRef) -> None:
+    run.require(event.present, f"there is no {event.phrase} in the video.")

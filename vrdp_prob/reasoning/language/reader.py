@@ -1,0 +1,115 @@
+"""A reader of words that can go back, and remembers how far any reading got."""
+
+from collections.abc import Callable
+from typing import TypeVar
+
+from vrdp_prob.errors import InputError
+from vrdp_prob.reasoning.language.words import split
+
+Result = TypeVar("Result")
+
+KNOWN_HINT = "docs/questions.md lists the wordings that are understood"
+
+
+class NoReadingError(Exception):
+    """The words do not fit this rule; another may be tried."""
+
+
+class Reader:
+    """Words of one text, read from left to right.
+
+    Parameters
+    ----------
+    text
+        A question or a choice.
+    kind
+        What it is, for messages.
+    """
+
+    def __init__(self, text: str, kind: str = "question") -> None:
+        self.text = text
+        self.kind = kind
+        self.words = split(text)
+        self.place = 0
+        self._furthest = 0
+
+    @property
+    def next(self) -> str:
+        """The next word, empty at the end."""
+        return self.words[self.place] if self.place < len(self.words) else ""
+
+    def accept(self, *phrases: str) -> bool:
+        """Read one of the phrases if it comes next; the first that fits counts."""
+        for phrase in phrases:
+            wanted = tuple(phrase.split())
+            given = self.words[self.place : self.place + len(wanted)]
+            if given == wanted:
+                self.place += len(wanted)
+                return True
+            agree = next((n for n, (a, b) in enumerate(zip(given, wanted, strict=False)) if a != b), len(given))
+            self._furthest = max(self._furthest, self.place + agree)
+        return False
+
+    def expect(self, *phrases: str) -> None:
+        """Read one of the phrases, or give up this reading."""
+        if not self.accept(*phrases):
+            raise NoReadingError
+
+    def one_of(self, table: dict[str, Result]) -> Result:
+        """Read a word of a table and give what it stands for, or give up this reading."""
+        if self.next in table:
+            self.place += 1
+            return table[self.words[self.place - 1]]
+        self._furthest = max(self._furthest, self.place)
+        raise NoReadingError
+
+    def first(self, *rules: Callable[[], Result]) -> Result:
+        """What the first rule that fits gives; rules that do not fit leave no trace."""
+        start = self.place
+        for rule in rules:
+            try:
+                return rule()
+            except NoReadingError:
+                self.place = start
+        raise NoReadingError
+
+    def maybe(self, rule: Callable[[], Result]) -> Result | None:
+        """What a rule gives, None where it does not fit."""
+        start = self.place
+        try:
+            return rule()
+        except NoReadingError:
+            self.place = start
+            return None
+
+    def whole(self, *rules: Callable[[], Result]) -> Result:
+        """What the first rule that reads all words gives.
+
+        Raises
+        ------
+        InputError
+            If there are no words, or no rule reads all of them; the message names the first word that nothing fits.
+        """
+        if not self.words:
+            raise InputError(f"the {self.kind} is empty; {KNOWN_HINT}.")
+
+        def to_the_end(rule: Callable[[], Result]) -> Callable[[], Result]:
+            def read() -> Result:
+                result = rule()
+                if self.place < len(self.words):
+                    self._furthest = max(self._furthest, self.place)
+                    raise NoReadingError
+                return result
+
+            return read
+
+        try:
+            return self.first(*(to_the_end(rule) for rule in rules))
+        except NoReadingError:
+            raise InputError(self._complaint()) from None
+
+    def _complaint(self) -> str:
+        if self._furthest >= len(self.words):
+            return f"'{self.text}' ends too early, after '{self.words[-1]}'; {KNOWN_HINT}."
+        word = self.words[self._furthest]
+        return f"'{self.text}' is not understood at '{word}' (word {self._furthest + 1}); {KNOWN_HINT}."

@@ -1,0 +1,125 @@
+"""Operations on objects: all objects, filters by attribute and motion, the only one, interventions on one."""
+
+import numpy as np
+from jaxtyping import Bool
+
+from vrdp_prob.reasoning.operations import operation
+from vrdp_prob.reasoning.run import Run
+from vrdp_prob.reasoning.tokens import ANY_FRAME, SHAPES
+from vrdp_prob.reasoning.values import Change, Moment, ObjectRef, ObjectSet, Word, noun_phrase
+from vrdp_prob.scene.body import COLORS, MATERIALS
+
+COUNT_WORDS = {2: "two", 3: "three", 4: "four", 5: "five", 6: "six"}
+
+
+@operation("objects", gives=ObjectSet)
+def objects(run: Run) -> ObjectSet:
+    """All objects of the video."""
+    return ObjectSet(np.ones((run.facts.draws, len(run.facts.bodies)), dtype=bool))
+
+
+@operation("filter_color", ObjectSet, Word, gives=ObjectSet, words=COLORS)
+def filter_color(run: Run, chosen: ObjectSet, color: Word) -> ObjectSet:
+    """The objects of a colour."""
+    return _with_attribute(run, chosen, "color", color)
+
+
+@operation("filter_material", ObjectSet, Word, gives=ObjectSet, words=MATERIALS)
+def filter_material(run: Run, chosen: ObjectSet, material: Word) -> ObjectSet:
+    """The objects of a material."""
+    return _with_attribute(run, chosen, "material", material)
+
+
+@operation("filter_shape", ObjectSet, Word, gives=ObjectSet, words=SHAPES)
+def filter_shape(run: Run, chosen: ObjectSet, shape: Word) -> ObjectSet:
+    """The objects of a shape."""
+    return _with_attribute(run, chosen, "shape", shape)
+
+
+@operation("filter_moving", ObjectSet, Moment, gives=ObjectSet)
+def filter_moving(run: Run, chosen: ObjectSet, moment: Moment) -> ObjectSet:
+    """The objects that are in view and move at a frame."""
+    _, moving = _motion_at(run, moment)
+    return ObjectSet(chosen.mask & moving, ("moving", *chosen.words))
+
+
+@operation("filter_moving", ObjectSet, Word, gives=ObjectSet, words=(ANY_FRAME,))
+def filter_ever_moving(run: Run, chosen: ObjectSet, any_frame: Word) -> ObjectSet:
+    """The objects that move in view at any time of the video."""
+    del any_frame
+    return ObjectSet(chosen.mask & run.facts.motion().moving.any(axis=1), ("moving", *chosen.words))
+
+
+@operation("filter_stationary", ObjectSet, Moment, gives=ObjectSet)
+def filter_stationary(run: Run, chosen: ObjectSet, moment: Moment) -> ObjectSet:
+    """The objects that are in view and do not move at a frame."""
+    in_view, moving = _motion_at(run, moment)
+    return ObjectSet(chosen.mask & in_view & ~moving, ("stationary", *chosen.words))
+
+
+@operation("filter_stationary", ObjectSet, Word, gives=ObjectSet, words=(ANY_FRAME,))
+def filter_never_moving(run: Run, chosen: ObjectSet, any_frame: Word) -> ObjectSet:
+    """The objects that are in view in the video and never move there."""
+    del any_frame
+    motion = run.facts.motion()
+    mask = motion.in_view.any(axis=1) & ~motion.moving.any(axis=1)
+    return ObjectSet(chosen.mask & mask, ("stationary", *chosen.words))
+
+
+@operation("unique", ObjectSet, gives=ObjectRef)
+def unique(run: Run, chosen: ObjectSet) -> ObjectRef:
+    """The only object of a set; draws in which it does not have exactly one leave the question."""
+    count = chosen.mask.sum(axis=1)
+    run.require(count == 1, _why_not_one(run, chosen, count))
+    return ObjectRef(chosen.mask.argmax(axis=1), chosen.words)
+
+
+@operation("apply_heavier", ObjectRef, gives=ObjectRef)
+def apply_heavier(run: Run, chosen: ObjectRef) -> ObjectRef:
+    """The object, to be made five times heavier in the counterfactual that follows."""
+    del run
+    return ObjectRef(chosen.index, chosen.words, Change.HEAVIER)
+
+
+@operation("apply_lighter", ObjectRef, gives=ObjectRef)
+def apply_lighter(run: Run, chosen: ObjectRef) -> ObjectRef:
+    """The object, to be made five times lighter in the counterfactual that follows."""
+    del run
+    return ObjectRef(chosen.index, chosen.words, Change.LIGHTER)
+
+
+def _with_attribute(run: Run, chosen: ObjectSet, name: str, word: Word) -> ObjectSet:
+    labels = run.facts.attribute(name)
+    mask = np.stack([label.index == label.names.index(word.text) for label in labels], axis=1)
+    return ObjectSet(chosen.mask & mask, (*chosen.words, word.text))
+
+
+def _motion_at(run: Run, moment: Moment) -> tuple[Bool[np.ndarray, "draw body"], Bool[np.ndarray, "draw body"]]:
+    motion = run.facts.motion()
+    draws = np.arange(run.facts.draws)
+    frame = motion.frame(np.where(np.isfinite(moment.time), moment.time, motion.times[0]))
+    in_view: Bool[np.ndarray, "draw body"] = motion.in_view[draws % len(motion.in_view), frame]
+    moving: Bool[np.ndarray, "draw body"] = motion.moving[draws % len(motion.moving), frame]
+    return in_view, moving
+
+
+def _why_not_one(run: Run, chosen: ObjectSet, count: np.ndarray) -> str:
+    phrase = noun_phrase(chosen.words)
+    if np.mean(count == 0) >= np.mean(count > 1):
+        names = ", ".join(_name(run, place) for place in range(len(run.facts.bodies)))
+        return f"there is no {phrase} in the video; its objects are: {names}."
+    most = int(np.bincount(count[count > 1]).argmax())
+    fitting = np.flatnonzero(chosen.mask[np.flatnonzero(count == most)[0]])
+    names = ", ".join(_name(run, place) for place in fitting.tolist())
+    number = COUNT_WORDS.get(most, str(most))
+    return f"{number} objects fit 'the {phrase}' ({names}); say which by its color, material or shape."
+
+
+def _name(run: Run, place: int) -> str:
+    """An object by its most probable attributes; by its id where it has no colour."""
+    words = []
+    for attribute in ("color", "material", "shape"):
+        label = run.facts.attribute(attribute)[place]
+        words.append(label.names[int(np.bincount(label.index).argmax())])
+    described = " ".join(word for word in words if word)
+    return described if words[0] else f"{described} {run.facts.bodies[place].id}"

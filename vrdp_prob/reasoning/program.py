@@ -1,0 +1,167 @@
+"""Programs in postfix order: read, type-checked before anything runs, and run for all draws at once.
+
+Errors point at the token: its place in the program (counting from 1), the token, and what was there instead.
+"""
+
+import difflib
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from vrdp_prob.errors import InputError
+from vrdp_prob.reasoning import event_operations, object_operations, output_operations
+from vrdp_prob.reasoning.operations import REGISTRY, Operation
+from vrdp_prob.reasoning.run import Run
+from vrdp_prob.reasoning.tokens import ANY_FRAME, CONCEPTS, OTHER_SPELLINGS, meaningful
+from vrdp_prob.reasoning.values import (
+    TYPE_NAMES,
+    Count,
+    EventRef,
+    Label,
+    ObjectRef,
+    Truth,
+    Value,
+    Word,
+)
+from vrdp_prob.scene import QuestionType
+
+OPERATION_MODULES = (event_operations, object_operations, output_operations)
+"""Modules whose import fills the registry."""
+
+ANSWERS = (Truth, Count, Label)
+"""Types that a question may end in."""
+
+ENTRIES = (ObjectRef, EventRef)
+"""Types that a choice may end in: what the question's program then judges."""
+
+
+@dataclass(frozen=True)
+class Program:
+    """A type-checked program.
+
+    Parameters
+    ----------
+    tokens
+        Its tokens, in the data set's spelling.
+    steps
+        What each token does: an operation, or a word that is pushed.
+    gives
+        Type of its result.
+    """
+
+    tokens: tuple[str, ...]
+    steps: tuple[Operation | Word, ...]
+    gives: type
+
+    def run(self, run: Run) -> Value:
+        """Run it for all draws; `run` learns in which draws it makes sense."""
+        stack: list[Value] = []
+        for step in self.steps:
+            if isinstance(step, Word):
+                stack.append(step)
+            else:
+                count = len(step.takes)
+                arguments = stack[len(stack) - count :]
+                del stack[len(stack) - count :]
+                stack.append(step(run, *arguments))
+        return stack[-1]
+
+
+def check(program: Sequence[str], *, ends_in: tuple[type, ...] = ANSWERS) -> Program:
+    """Type-check a program.
+
+    Parameters
+    ----------
+    program
+        Tokens in postfix order, in any of the known spellings.
+    ends_in
+        Types that its result may have.
+
+    Raises
+    ------
+    InputError
+        If it is empty, a token is unknown, an operation does not find what it takes, something is left on the stack, or
+        the result is not of a wanted type. The message names the token and its place.
+    """
+    tokens = meaningful(tuple(program))
+    if not tokens:
+        raise InputError("the program is empty; give at least one token.")
+    stack: list[type] = []
+    words: list[str | None] = []
+    steps: list[Operation | Word] = []
+    for place, token in enumerate(tokens, start=1):
+        if token in REGISTRY:
+            chosen = _signature(place, token, stack)
+            count = len(chosen.takes)
+            _check_word(place, token, chosen, words[len(words) - count :])
+            del stack[len(stack) - count :]
+            del words[len(words) - count :]
+            stack.append(chosen.gives)
+            words.append(None)
+            steps.append(chosen)
+        elif token in CONCEPTS:
+            stack.append(Word)
+            words.append(token)
+            steps.append(Word(token))
+        else:
+            raise InputError(f"program token {place} '{token}' is unknown{_suggestion(token)}.")
+    if len(stack) > 1:
+        left = ", ".join(TYPE_NAMES[kind] for kind in stack[:-1])
+        raise InputError(
+            f"the program ends at token {len(tokens)} '{tokens[-1]}' with {left} left over; "
+            "every value must be taken by an operation."
+        )
+    if stack[-1] not in ends_in:
+        wanted = " or ".join(TYPE_NAMES[kind] for kind in ends_in)
+        raise InputError(
+            f"the program ends at token {len(tokens)} '{tokens[-1]}' with {TYPE_NAMES[stack[-1]]}; "
+            f"it must end with {wanted}."
+        )
+    return Program(tokens, tuple(steps), stack[-1])
+
+
+def needs_choices(program: Sequence[str]) -> bool:
+    """Whether a question's program judges choices: it takes something that it does not push itself."""
+    depth = 0
+    for token in meaningful(tuple(program)):
+        signatures = REGISTRY.get(token)
+        depth += 1 if signatures is None else 1 - len(signatures[0].takes)
+        if depth < 1:
+            return True
+    return False
+
+
+def question_type(program: Sequence[str]) -> QuestionType:
+    """Kind of a question, read off its program."""
+    tokens = set(meaningful(tuple(program)))
+    if tokens & {"get_counterfact", "counterfact_heavier", "counterfact_lighter"}:
+        return QuestionType.COUNTERFACTUAL
+    if "unseen_events" in tokens:
+        return QuestionType.PREDICTIVE
+    return QuestionType.EXPLANATORY if "filter_ancestor" in tokens else QuestionType.DESCRIPTIVE
+
+
+def _signature(place: int, token: str, stack: list[type]) -> Operation:
+    signatures = REGISTRY[token]
+    for candidate in signatures:
+        if candidate.fits(stack):
+            return candidate
+    wanted = " or ".join(dict.fromkeys(_takes(candidate) for candidate in signatures))
+    most = max(len(candidate.takes) for candidate in signatures)
+    found = ", then ".join(TYPE_NAMES[kind] for kind in stack[-most:]) or "nothing"
+    raise InputError(f"program token {place} '{token}' takes {wanted}, but finds {found}.")
+
+
+def _takes(candidate: Operation) -> str:
+    return ", then ".join(" or ".join(TYPE_NAMES[kind] for kind in kinds) for kinds in candidate.takes)
+
+
+def _check_word(place: int, token: str, chosen: Operation, given: list[str | None]) -> None:
+    for word in given:
+        if word is not None and word not in chosen.words:
+            raise InputError(f"program token {place} '{token}' takes one of {', '.join(chosen.words)}, not '{word}'.")
+
+
+def _suggestion(token: str) -> str:
+    known = [*REGISTRY, *OTHER_SPELLINGS, *(CONCEPTS - {ANY_FRAME})]
+    close = difflib.get_close_matches(token, known, n=1)
+    return f"; did you mean '{close[0]}'?" if close else "; see docs/questions.md for the tokens"

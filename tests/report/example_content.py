@@ -4,20 +4,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from vrdp_prob.report.content import (
-    AnswerContent,
-    BodyContent,
-    ChoiceContent,
-    Collisions,
-    ConvergenceContent,
-    Interval,
-    PairContent,
-    ParameterContent,
-    ReportContent,
-    Still,
-    WorldContent,
-    WorldKind,
-)
+from vrdp_prob.inference.samples import Convergence
+from vrdp_prob.inference.summaries import ObjectSummary, PairSummary, ParameterSummary, Summary
+from vrdp_prob.reasoning.answer import Answer, ChoiceAnswer
+from vrdp_prob.report.content import AnswerContent, Collisions, ReportContent, Still, WorldContent, WorldKind
 from vrdp_prob.scene import Body, Camera, QuestionType, Shape, Tracks
 
 FRAME = 0.04
@@ -151,15 +141,15 @@ def make_still(camera: Camera) -> Still:
 
 
 def _parameter(draws, status, *partners):
-    return ParameterContent(Interval.from_draws(draws), status, partners)
+    return ParameterSummary(Summary.of(draws), status, partners)
 
 
-def make_bodies(draws: Draws) -> tuple[BodyContent, ...]:
+def make_objects(draws: Draws) -> tuple[ObjectSummary, ...]:
     ratio = {"1": ("2", "3"), "2": ("3", "1"), "3": ("2", "1")}
     product = {"1": ("2",), "2": ("3", "1"), "3": ("2",)}
     return tuple(
-        BodyContent(
-            body,
+        ObjectSummary(
+            body.id,
             _parameter(draws.mass[:, index], "ratio_only" if body.id in ratio else "default", *ratio.get(body.id, ())),
             _parameter(
                 draws.bounce[:, index], "product_only" if body.id in product else "default", *product.get(body.id, ())
@@ -177,7 +167,7 @@ def _entropy(probabilities) -> float:
 def _open(number, question, distribution, world="factual", **more) -> AnswerContent:
     answer, probability = max(distribution.items(), key=lambda item: item[1])
     error = float(np.sqrt(probability * (1 - probability) / 500))
-    return AnswerContent(
+    answer = Answer(
         number,
         question,
         QuestionType.DESCRIPTIVE,
@@ -186,20 +176,21 @@ def _open(number, question, distribution, world="factual", **more) -> AnswerCont
         error,
         _entropy(distribution.values()),
         distribution,
-        world=world,
         **more,
     )
+    return AnswerContent(answer, world)
 
 
 def _choices(number, question, kind, choices, world, **more) -> AnswerContent:
     items = tuple(
-        ChoiceContent(index, text, p, float(np.sqrt(p * (1 - p) / 500))) for index, (text, p) in enumerate(choices)
+        ChoiceAnswer(index, text, p, float(np.sqrt(p * (1 - p) / 500))) for index, (text, p) in enumerate(choices)
     )
     chosen = tuple(item.choice_id for item in items if item.probability > 0.5)
     joint = float(np.prod([max(p, 1 - p) for _, p in choices]))
     entropy = sum(_entropy([p, 1 - p]) for _, p in choices)
     error = float(np.sqrt(joint * (1 - joint) / 500))
-    return AnswerContent(number, question, kind, chosen, joint, error, entropy, choices=items, world=world, **more)
+    answer = Answer(number, question, kind, chosen, joint, error, entropy, {}, choices=items, **more)
+    return AnswerContent(answer, world)
 
 
 def make_answers() -> tuple[AnswerContent, ...]:
@@ -284,16 +275,16 @@ def make_content(*, camera: Camera | None = None, draws: int = DRAWS) -> ReportC
     mass, bounce = unknown.mass, unknown.bounce
     return ReportContent(
         tracks=make_tracks(camera),
-        bodies=make_bodies(unknown),
+        objects=make_objects(unknown),
         mass_ratios=(
-            PairContent(("3", "2"), Interval.from_draws(mass[:, 3] / mass[:, 2])),
-            PairContent(("1", "2"), Interval.from_draws(mass[:, 1] / mass[:, 2])),
+            PairSummary(("3", "2"), Summary.of(mass[:, 3] / mass[:, 2])),
+            PairSummary(("1", "2"), Summary.of(mass[:, 1] / mass[:, 2])),
         ),
         restitution_pairs=(
-            PairContent(("2", "3"), Interval.from_draws(bounce[:, 2] * bounce[:, 3])),
-            PairContent(("1", "2"), Interval.from_draws(bounce[:, 1] * bounce[:, 2])),
+            PairSummary(("2", "3"), Summary.of(bounce[:, 2] * bounce[:, 3])),
+            PairSummary(("1", "2"), Summary.of(bounce[:, 1] * bounce[:, 2])),
         ),
-        convergence=ConvergenceContent("emcee", True, 1.006, 612.0, None, None),
+        convergence=Convergence("emcee", True, 1.006, 612.0, None, None, 0.08),
         warnings=(
             "The cyan sphere leaves its predicted path by 2.4 times the noise after 3.1 s: "
             "the model misses part of its motion.",
@@ -311,4 +302,8 @@ def make_content(*, camera: Camera | None = None, draws: int = DRAWS) -> ReportC
 
 def with_question(content: ReportContent, text: str) -> ReportContent:
     """The same content with one question's text replaced."""
-    return replace(content, answers=(replace(content.answers[0], question=text), *content.answers[1:]))
+    return replace(content, answers=(_asked(content.answers[0], text), *content.answers[1:]))
+
+
+def _asked(item: AnswerContent, text: str) -> AnswerContent:
+    return replace(item, answer=replace(item.answer, question=text))

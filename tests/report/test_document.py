@@ -4,11 +4,11 @@ import json
 from dataclasses import replace
 
 import jsonschema
-import numpy as np
 import pytest
 
-from vrdp_prob.report import schema, to_document
-from vrdp_prob.report.content import ConvergenceContent, Interval
+from vrdp_prob.inference.samples import Convergence
+from vrdp_prob.inference.summaries import PairSummary, Summary
+from vrdp_prob.report import schema, to_document, write_report
 
 
 def test_follows_the_schema(content, plain_content):
@@ -19,11 +19,11 @@ def test_follows_the_schema(content, plain_content):
 
 def test_answers_stay_in_the_order_asked(content):
     ids = [answer["question_id"] for answer in to_document(content)["answers"]]
-    assert ids == [answer.question_id for answer in content.answers]
+    assert ids == [item.answer.question_id for item in content.answers]
 
 
 def test_undefined_diagnostics_become_null(content):
-    convergence = ConvergenceContent("laplace", False, float("nan"), float("inf"), None, 0.8)
+    convergence = Convergence("laplace", False, float("nan"), float("inf"), None, 0.8)
     document = to_document(replace(content, convergence=convergence))["convergence"]
     assert document == {
         "sampler": "laplace",
@@ -35,14 +35,11 @@ def test_undefined_diagnostics_become_null(content):
     }
 
 
-def test_summary_that_is_not_finite_is_refused():
-    with pytest.raises(ValueError, match="not finite"):
-        Interval(1.0, float("nan"), 0.5, 1.5)
-
-
-def test_interval_of_draws():
-    interval = Interval.from_draws(np.arange(101.0))
-    assert (interval.mean, interval.q05, interval.q95) == (50.0, 5.0, 95.0)
+def test_number_that_is_not_finite_is_refused(content, tmp_path):
+    broken = PairSummary(("1", "2"), Summary(1.0, float("nan"), 0.5, 1.5))
+    with pytest.raises(ValueError, match="not JSON compliant"):
+        write_report(replace(content, mass_ratios=(broken,)), tmp_path)
+    assert not list(tmp_path.iterdir())
 
 
 @pytest.mark.parametrize("name", ["report", "finding", "evaluation"])

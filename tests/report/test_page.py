@@ -67,7 +67,7 @@ def test_same_content_gives_the_same_page(content, page):
 
 def test_page_says_everything(content, page):
     text = Outline(page).text
-    for answer in content.answers:
+    for answer in (item.answer for item in content.answers):
         assert answer.question in text
         assert all(choice.choice in text for choice in answer.choices)
     for warning in content.warnings:
@@ -107,11 +107,10 @@ def test_names_cannot_end_the_script_that_holds_them(content):
     evil = replace(content.tracks.bodies[0], id="</script><b>", color=None)
     bodies = (evil, *content.tracks.bodies[1:])
     data = content.tracks.data.assign_coords(body=[body.id for body in bodies])
-    first = replace(content.bodies[0], body=evil)
     hostile = replace(
         content,
         tracks=replace(content.tracks, bodies=bodies, data=data),
-        bodies=(first, *content.bodies[1:]),
+        objects=(replace(content.objects[0], body=evil.id), *content.objects[1:]),
         answers=(),
         worlds=content.worlds[:2],
     )

@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from vrdp_prob.report.content import Interval, ParameterContent
+from vrdp_prob.inference.summaries import ParameterSummary, Summary
 from vrdp_prob.report.wording import (
     counted,
     interval_words,
@@ -68,10 +68,10 @@ def test_percent_errors():
 @pytest.mark.parametrize(
     ("interval", "words"),
     [
-        (Interval(1.0234, 0.1, 0.8765, 1.1912), ("1.02", "0.88 to 1.19")),
-        (Interval(3.2, 2.0, 0.4, 9.87), ("3.2", "0.4 to 9.9")),
-        (Interval(0.031, 0.0004, 0.0302, 0.0318), ("0.031", "0.030 to 0.032")),
-        (Interval(1.0, 0.0, 1.0, 1.0), ("1.00", "1.00 to 1.00")),
+        (Summary(1.0234, 0.1, 0.8765, 1.1912), ("1.02", "0.88 to 1.19")),
+        (Summary(3.2, 2.0, 0.4, 9.87), ("3.2", "0.4 to 9.9")),
+        (Summary(0.031, 0.0004, 0.0302, 0.0318), ("0.031", "0.030 to 0.032")),
+        (Summary(1.0, 0.0, 1.0, 1.0), ("1.00", "1.00 to 1.00")),
     ],
 )
 def test_numbers_are_rounded_to_what_the_interval_supports(interval, words):
@@ -89,11 +89,11 @@ def test_lists_and_counts():
 
 def test_status_in_words():
     name = {"1": "cyan cube", "2": "red sphere"}
-    some = Interval(1.0, 0.1, 0.9, 1.1)
-    ratio = ParameterContent(some, "ratio_only", ("1",))
+    some = Summary(1.0, 0.1, 0.9, 1.1)
+    ratio = ParameterSummary(some, "ratio_only", ("1",))
     assert mass_status(ratio, body("0"), name) == "Only its ratio to the cyan cube is known, not the mass itself."
-    product = ParameterContent(some, "product_only", ("1", "2"))
+    product = ParameterSummary(some, "product_only", ("1", "2"))
     assert "product with that of the cyan cube and the red sphere" in restitution_status(product, name)
-    default = ParameterContent(some, "default")
+    default = ParameterSummary(some, "default")
     assert "the data say nothing" in mass_status(default, body("0"), name)
     assert mass_status(default, body("0", mass=0.03), name) == "Weighed: given with the input."

@@ -4,126 +4,16 @@ The adapter (`vrdp_prob.report.build`) fills a `ReportContent` from a posterior,
 the document and the player's data are renderings of it. So each rendering is tested with content made by hand.
 """
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from enum import StrEnum
-from typing import Literal
 
 import numpy as np
 from jaxtyping import Bool, Float, Int, UInt8
 
-from vrdp_prob.scene import Body, QuestionType, Tracks
-
-Status = Literal["identified", "ratio_only", "product_only", "default"]
-"""What the data say about one parameter of one body."""
-
-
-@dataclass(frozen=True)
-class Interval:
-    """Summary of the posterior of one positive number.
-
-    Parameters
-    ----------
-    mean, sd
-        Posterior mean and standard deviation.
-    q05, q95
-        Ends of the 90 % interval (5 % and 95 % quantiles).
-
-    Raises
-    ------
-    ValueError
-        If one of them is not finite.
-    """
-
-    mean: float
-    sd: float
-    q05: float
-    q95: float
-
-    def __post_init__(self) -> None:
-        if not np.isfinite([self.mean, self.sd, self.q05, self.q95]).all():
-            raise ValueError(f"a posterior summary is not finite: {self}")
-
-    @classmethod
-    def from_draws(cls, draws: Float[np.ndarray, "draw"]) -> "Interval":
-        """Summary of posterior draws, all of the same weight."""
-        low, high = np.quantile(draws, [0.05, 0.95])
-        return cls(float(draws.mean()), float(draws.std()), float(low), float(high))
-
-
-@dataclass(frozen=True)
-class ParameterContent:
-    """Mass (kg, relative to 1 where nothing was weighed) or restitution factor (dimensionless) of one body.
-
-    Parameters
-    ----------
-    interval
-        Its posterior.
-    status
-        What the data say about it.
-    partners
-        Ids of the bodies that a ratio or product refers to.
-    """
-
-    interval: Interval
-    status: Status
-    partners: tuple[str, ...] = ()
-
-
-@dataclass(frozen=True)
-class BodyContent:
-    """One body with what was learned of it."""
-
-    body: Body
-    mass: ParameterContent
-    restitution: ParameterContent
-
-
-@dataclass(frozen=True)
-class PairContent:
-    """A number that belongs to two bodies: a ratio of masses (first over second) or a pair's restitution."""
-
-    objects: tuple[str, str]
-    interval: Interval
-
-
-@dataclass(frozen=True)
-class ConvergenceContent:
-    """How well the sampler explored the posterior; None where a number does not apply to the sampler.
-
-    Parameters
-    ----------
-    sampler
-        Name of the sampler.
-    converged
-        Whether its draws can be relied on.
-    r_hat, ess_bulk
-        Largest split R-hat and smallest bulk effective sample size over all parameters.
-    divergences
-        Number of divergent transitions.
-    pareto_k
-        Shape of the importance weights' tail (k-hat).
-    sentences
-        The same in words, where the sampler has something of its own to say.
-    """
-
-    sampler: Literal["nuts", "emcee", "laplace"]
-    converged: bool
-    r_hat: float | None = None
-    ess_bulk: float | None = None
-    divergences: int | None = None
-    pareto_k: float | None = None
-    sentences: tuple[str, ...] = ()
-
-
-@dataclass(frozen=True)
-class ChoiceContent:
-    """One option of a multiple-choice question with the probability that it is correct."""
-
-    choice_id: int | str
-    choice: str
-    probability: float
-    mc_error: float
+from vrdp_prob.inference.samples import Convergence
+from vrdp_prob.inference.summaries import ObjectSummary, PairSummary
+from vrdp_prob.reasoning.answer import Answer
+from vrdp_prob.scene import Tracks
 
 
 @dataclass(frozen=True)
@@ -132,37 +22,13 @@ class AnswerContent:
 
     Parameters
     ----------
-    question_id, question, question_type
-        The question.
     answer
-        The most probable answer; for multiple choice the ids of the choices judged correct.
-    probability, mc_error
-        Probability of that answer (multiple choice: that every choice is judged right) and its Monte Carlo error.
-    entropy
-        Entropy of the answer distribution in nats.
-    distribution
-        Probability of each answer of an open question; empty for multiple choice.
-    choices
-        The options of a multiple-choice question.
-    relies_on_default
-        Ids of objects whose default mass or restitution the answer depends on.
-    notes
-        Further plain sentences about this answer.
+        Question and answer.
     world
         Key of the world (`WorldContent.key`) that the question is about, None where no world shows it.
     """
 
-    question_id: int | str | None
-    question: str
-    question_type: QuestionType
-    answer: str | int | tuple[int | str, ...]
-    probability: float
-    mc_error: float
-    entropy: float
-    distribution: Mapping[str, float] = field(default_factory=dict)
-    choices: tuple[ChoiceContent, ...] = ()
-    relies_on_default: tuple[str, ...] = ()
-    notes: tuple[str, ...] = ()
+    answer: Answer
     world: str | None = None
 
 
@@ -272,10 +138,10 @@ class ReportContent:
     ----------
     tracks
         The measured positions, with the video's name and its camera.
-    bodies
-        The bodies in the order of the tracks, with what was learned of them.
+    objects
+        What was learned of each body, in the order of the tracks.
     mass_ratios, restitution_pairs
-        What the data say about pairs.
+        What was learned of pairs.
     convergence
         How well the sampler did.
     warnings
@@ -293,10 +159,10 @@ class ReportContent:
     """
 
     tracks: Tracks
-    bodies: tuple[BodyContent, ...]
-    mass_ratios: tuple[PairContent, ...]
-    restitution_pairs: tuple[PairContent, ...]
-    convergence: ConvergenceContent
+    objects: tuple[ObjectSummary, ...]
+    mass_ratios: tuple[PairSummary, ...]
+    restitution_pairs: tuple[PairSummary, ...]
+    convergence: Convergence
     warnings: tuple[str, ...]
     answers: tuple[AnswerContent, ...]
     worlds: tuple[WorldContent, ...]

@@ -5,7 +5,7 @@ import math
 from importlib import resources
 from typing import Any, Literal
 
-from vrdp_prob.report.content import AnswerContent, Interval, PairContent, ParameterContent, ReportContent
+from vrdp_prob.report.content import ReportContent
 
 
 def schema(name: Literal["report", "finding", "evaluation"]) -> dict[str, Any]:
@@ -25,17 +25,17 @@ def to_document(content: ReportContent) -> dict[str, Any]:
         "model": {"name": content.model, "effects": list(content.effects)},
         "objects": [
             {
-                "id": item.body.id,
-                "shape": str(item.body.shape),
-                "color": item.body.color,
-                "material": item.body.material,
-                "mass": _parameter(item.mass),
-                "restitution": _parameter(item.restitution),
+                "id": body.id,
+                "shape": str(body.shape),
+                "color": body.color,
+                "material": body.material,
+                "mass": learned.mass.to_document(),
+                "restitution": learned.restitution.to_document(),
             }
-            for item in content.bodies
+            for body, learned in zip(content.tracks.bodies, content.objects, strict=True)
         ],
-        "mass_ratios": [_pair(pair) for pair in content.mass_ratios],
-        "restitution_pairs": [_pair(pair) for pair in content.restitution_pairs],
+        "mass_ratios": [pair.to_document() for pair in content.mass_ratios],
+        "restitution_pairs": [pair.to_document() for pair in content.restitution_pairs],
         "convergence": {
             "sampler": convergence.sampler,
             "converged": convergence.converged,
@@ -44,46 +44,10 @@ def to_document(content: ReportContent) -> dict[str, Any]:
             "divergences": convergence.divergences,
             "pareto_k": _finite(convergence.pareto_k),
         },
-        "answers": [_answer(answer) for answer in content.answers],
+        "answers": [item.answer.to_document() for item in content.answers],
         "warnings": list(content.warnings),
     }
 
 
-def _interval(interval: Interval) -> dict[str, float]:
-    return {"mean": interval.mean, "sd": interval.sd, "q05": interval.q05, "q95": interval.q95}
-
-
-def _parameter(parameter: ParameterContent) -> dict[str, Any]:
-    return {**_interval(parameter.interval), "status": parameter.status, "with": list(parameter.partners)}
-
-
-def _pair(pair: PairContent) -> dict[str, Any]:
-    return {"objects": list(pair.objects), **_interval(pair.interval)}
-
-
 def _finite(value: float | None) -> float | None:
     return value if value is not None and math.isfinite(value) else None
-
-
-def _answer(answer: AnswerContent) -> dict[str, Any]:
-    return {
-        "question_id": answer.question_id,
-        "question": answer.question,
-        "question_type": str(answer.question_type),
-        "answer": list(answer.answer) if isinstance(answer.answer, tuple) else answer.answer,
-        "probability": answer.probability,
-        "mc_error": answer.mc_error,
-        "entropy": answer.entropy,
-        "distribution": dict(answer.distribution),
-        "choices": [
-            {
-                "choice_id": choice.choice_id,
-                "choice": choice.choice,
-                "probability": choice.probability,
-                "mc_error": choice.mc_error,
-            }
-            for choice in answer.choices
-        ],
-        "relies_on_default": list(answer.relies_on_default),
-        "notes": list(answer.notes),
-    }

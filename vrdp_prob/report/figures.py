@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from vrdp_prob.report.content import Interval, ReportContent, WorldKind
+from vrdp_prob.inference.summaries import Summary
+from vrdp_prob.report.content import ReportContent, WorldKind
 from vrdp_prob.report.wording import color_of, tags
 from vrdp_prob.scene import Camera
 from vrdp_prob.scene.camera import REST_HEIGHT
@@ -210,14 +211,14 @@ class Axis:
 _LOG_TICKS = (0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0)
 
 
-def log_axis(intervals: Sequence[Interval]) -> Axis:
+def log_axis(intervals: Sequence[Summary]) -> Axis:
     """A logarithmic axis that holds all intervals and 1, with ticks at 1, 2 and 5 times powers of ten."""
     low = max(min([0.5, *(interval.q05 for interval in intervals)]) * 0.9, 1e-3)
     high = min(max([2.0, *(interval.q95 for interval in intervals)]) * 1.1, 1e3)
     return Axis(low, high, True, tuple(tick for tick in _LOG_TICKS if low <= tick <= high))
 
 
-def unit_axis(intervals: Sequence[Interval]) -> Axis:
+def unit_axis(intervals: Sequence[Summary]) -> Axis:
     """A linear axis from 0 to 1, longer where an interval needs it."""
     high = max([1.0, *(min(interval.q95, 3.0) for interval in intervals)])
     return Axis(0.0, high, False, (0.0, 0.25, 0.5, 0.75, 1.0))

@@ -12,14 +12,15 @@ import numpy as np
 from jaxtyping import UInt8
 from markupsafe import Markup
 
-from vrdp_prob.report.content import AnswerContent, BodyContent, Interval, PairContent, ReportContent, WorldKind
+from vrdp_prob.inference.summaries import PairSummary, ParameterSummary, Summary
+from vrdp_prob.reasoning.answer import Answer
+from vrdp_prob.report.content import AnswerContent, ReportContent, WorldKind
 from vrdp_prob.report.figures import FIGURE_DRAWS, log_axis, still_figure, unit_axis
 from vrdp_prob.report.payload import player_data
 from vrdp_prob.report.summary import (
     TYPE_WORDS,
     answer_words,
     by_doubt,
-    convergence_words,
     is_doubtful,
     summary,
 )
@@ -135,25 +136,26 @@ def _script_json(value: Any) -> Markup:
 def _questions(content: ReportContent) -> dict[str, Any]:
     ordered = by_doubt(content.answers)
     parts = (
-        ("Doubtful", "at least as open as 80 to 20", [answer for answer in ordered if is_doubtful(answer)]),
-        ("Clear", "", [answer for answer in ordered if not is_doubtful(answer)]),
+        ("Doubtful", "at least as open as 80 to 20", [item for item in ordered if is_doubtful(item.answer)]),
+        ("Clear", "", [item for item in ordered if not is_doubtful(item.answer)]),
     )
     return {
         "groups": [
-            {"title": title, "meaning": meaning, "questions": [_question(answer, content) for answer in answers]}
-            for title, meaning, answers in parts
-            if answers
+            {"title": title, "meaning": meaning, "questions": [_question(item, content) for item in items]}
+            for title, meaning, items in parts
+            if items
         ]
     }
 
 
-def _question(answer: AnswerContent, content: ReportContent) -> dict[str, Any]:
+def _question(item: AnswerContent, content: ReportContent) -> dict[str, Any]:
+    answer = item.answer
     name = names(content.tracks.bodies)
     notes = list(answer.notes)
     if answer.relies_on_default:
         who = listed(f"the {name.get(body, body)}" for body in answer.relies_on_default)
         notes.insert(0, f"Rests on default values of {who}, which this video does not determine.")
-    world = next((world for world in content.worlds if world.key == answer.world), None)
+    world = next((world for world in content.worlds if world.key == item.world), None)
     if world is not None and world.kind is WorldKind.FACTUAL:
         world = None  # the page opens with it
     label = "" if world is None else world_label(world, content.tracks)
@@ -172,7 +174,7 @@ def _question(answer: AnswerContent, content: ReportContent) -> dict[str, Any]:
     }
 
 
-def _bars(answer: AnswerContent) -> list[dict[str, Any]]:
+def _bars(answer: Answer) -> list[dict[str, Any]]:
     if answer.choices:
         chosen = answer.answer if isinstance(answer.answer, tuple) else ()
         return [
@@ -207,38 +209,38 @@ def _bar(text: str, probability: float, error: float, chosen: bool) -> dict[str,
 def _estimates(content: ReportContent) -> dict[str, Any]:
     objects = {item["id"]: item for item in _objects(content)}
     name = names(content.tracks.bodies)
+    known = list(zip(content.tracks.bodies, content.objects, strict=True))
     pairs = content.restitution_pairs
-    weighed = any(item.body.mass is not None for item in content.bodies)
     return {
-        "mass_unit": "kg" if weighed else "relative to 1",
-        "mass_axis": log_axis([item.mass.interval for item in content.bodies]),
-        "masses": [_body_row(item, objects, item.mass.interval, mass=True, name=name) for item in content.bodies],
+        "mass_unit": "kg" if any(body.mass is not None for body, _ in known) else "relative to 1",
+        "mass_axis": log_axis([learned.mass.summary for _, learned in known]),
+        "masses": [
+            _body_row(objects[body.id], learned.mass, mass_status(learned.mass, body, name)) for body, learned in known
+        ],
         "restitution_axis": unit_axis(
-            [item.restitution.interval for item in content.bodies] + [pair.interval for pair in pairs]
+            [learned.restitution.summary for _, learned in known] + [pair.summary for pair in pairs]
         ),
         "restitutions": [
-            _body_row(item, objects, item.restitution.interval, mass=False, name=name) for item in content.bodies
+            _body_row(objects[body.id], learned.restitution, restitution_status(learned.restitution, name))
+            for body, learned in known
         ],
-        "ratio_axis": log_axis([pair.interval for pair in content.mass_ratios]),
+        "ratio_axis": log_axis([pair.summary for pair in content.mass_ratios]),
         "ratios": [_pair_row(pair, objects, "over") for pair in content.mass_ratios],
         "pairs": [_pair_row(pair, objects, "and") for pair in pairs],
     }
 
 
-def _body_row(
-    item: BodyContent, objects: dict[str, dict[str, Any]], interval: Interval, *, mass: bool, name: dict[str, str]
-) -> dict[str, Any]:
-    words = mass_status(item.mass, item.body, name) if mass else restitution_status(item.restitution, name)
-    known = (item.mass if mass else item.restitution).status != "default" or (mass and item.body.mass is not None)
-    return {**_row([objects[item.body.id]], interval), "words": words, "known": known, "between": ""}
+def _body_row(shown: dict[str, Any], parameter: ParameterSummary, words: str) -> dict[str, Any]:
+    known = parameter.status != "default"
+    return {**_row([shown], parameter.summary), "words": words, "known": known, "between": ""}
 
 
-def _pair_row(pair: PairContent, objects: dict[str, dict[str, Any]], between: str) -> dict[str, Any]:
-    row = _row([objects[body] for body in pair.objects], pair.interval)
+def _pair_row(pair: PairSummary, objects: dict[str, dict[str, Any]], between: str) -> dict[str, Any]:
+    row = _row([objects[body] for body in pair.objects], pair.summary)
     return {**row, "words": "", "known": True, "between": between}
 
 
-def _row(objects: list[dict[str, Any]], interval: Interval) -> dict[str, Any]:
+def _row(objects: list[dict[str, Any]], interval: Summary) -> dict[str, Any]:
     mean, span = interval_words(interval)
     label = f"{listed(item['name'] for item in objects)}: {mean}, 90 % interval {span}"
     return {"objects": objects, "interval": interval, "mean": mean, "range": span, "label": label}
@@ -246,7 +248,7 @@ def _row(objects: list[dict[str, Any]], interval: Interval) -> dict[str, Any]:
 
 def _closing(content: ReportContent) -> dict[str, Any]:
     return {
-        "convergence_words": convergence_words(content.convergence),
+        "convergence_words": content.convergence.sentence,
         "diagnostics": _diagnostics(content),
         "model": content.model,
         "effects": listed(effect.replace("_", " ") for effect in content.effects) if content.effects else "",
@@ -272,6 +274,9 @@ def _diagnostics(content: ReportContent) -> list[tuple[str, str, str]]:
     if convergence.pareto_k is not None and math.isfinite(convergence.pareto_k):
         meaning = "tail of the importance weights; below 0.7 is good"
         rows.append(("Pareto k", f"{convergence.pareto_k:.2f}", meaning))
+    changes = convergence.collision_order_changes
+    if changes is not None:
+        rows.append(("Other order of collisions", percent(changes), "of the draws, against the most probable world"))
     if content.worlds:
         rows.append(("Draws in the player", counted(content.worlds[0].draws, "draw"), "a sample of the posterior"))
     return rows

@@ -1,6 +1,7 @@
 """The report in one paragraph: what is there, what happened, whether to trust it, how much is in doubt."""
 
-from vrdp_prob.report.content import AnswerContent, ConvergenceContent, ReportContent, WorldKind
+from vrdp_prob.reasoning.answer import Answer
+from vrdp_prob.report.content import AnswerContent, ReportContent, WorldKind
 from vrdp_prob.report.wording import collision_shares, counted, listed, names, number_word, percent, seconds, sentence
 from vrdp_prob.scene import QuestionType
 
@@ -14,14 +15,14 @@ DOUBTFUL_ENTROPY = 0.5
 """Entropy in nats from which on an answer is called doubtful: that of a yes or no at 80 to 20."""
 
 
-def is_doubtful(answer: AnswerContent) -> bool:
+def is_doubtful(answer: Answer) -> bool:
     """Whether an answer is to be read as a distribution rather than as an answer."""
     return answer.entropy >= DOUBTFUL_ENTROPY
 
 
 def by_doubt(answers: tuple[AnswerContent, ...]) -> list[AnswerContent]:
     """Answers with the most ambiguous (largest entropy) first; equal ones stay in the order asked."""
-    return sorted(answers, key=lambda answer: -answer.entropy)
+    return sorted(answers, key=lambda item: -item.answer.entropy)
 
 
 def summary(content: ReportContent) -> list[str]:
@@ -33,7 +34,7 @@ def summary(content: ReportContent) -> list[str]:
 def _objects(content: ReportContent) -> str:
     name = names(content.tracks.bodies)
     listing = listed(f"the {name[body.id]}" for body in content.tracks.bodies)
-    count = len(content.bodies)
+    count = len(content.objects)
     length = seconds(float(content.tracks.times[-1] - content.tracks.times[0]))
     if count > 6:
         return sentence(f"{counted(count, 'object')} move through {length} of video.")
@@ -73,24 +74,14 @@ def _answers(content: ReportContent) -> str:
     answers = content.answers
     if not answers:
         return ""
-    doubtful = sum(is_doubtful(answer) for answer in answers)
+    doubtful = sum(is_doubtful(item.answer) for item in answers)
     if not doubtful:
         return sentence(f"{'the question has' if len(answers) == 1 else 'all questions have'} a clear answer.")
     verb = "is" if doubtful == 1 else "are"
     return f"Of {counted(len(answers), 'question')}, {number_word(doubtful)} {verb} doubtful."
 
 
-def convergence_words(convergence: ConvergenceContent) -> list[str]:
-    """How the sampler did, in plain sentences."""
-    if convergence.sentences:
-        return list(convergence.sentences)
-    sampler = {"nuts": "NUTS", "emcee": "emcee", "laplace": "The Laplace approximation"}[convergence.sampler]
-    if convergence.converged:
-        return [f"{sampler} has converged: its draws agree with each other well enough to be counted."]
-    return [f"{sampler} has not converged: another run, or a longer one, may give other numbers."]
-
-
-def answer_words(answer: AnswerContent) -> str:
+def answer_words(answer: Answer) -> str:
     """The most probable answer in words."""
     if not isinstance(answer.answer, tuple):
         return str(answer.answer)

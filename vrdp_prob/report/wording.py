@@ -7,7 +7,8 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 
 import numpy as np
 
-from vrdp_prob.report.content import Interval, ParameterContent, WorldContent, WorldKind
+from vrdp_prob.inference.summaries import ParameterSummary, Summary
+from vrdp_prob.report.content import WorldContent, WorldKind
 from vrdp_prob.scene import Body, Shape, Tracks
 from vrdp_prob.scene.body import COLORS
 
@@ -112,7 +113,7 @@ def percent_error(error: float) -> str:
     return "" if error < 0.0005 else f"± {100 * error:.1f}" if error < 0.0095 else f"± {100 * error:.0f}"
 
 
-def decimals(interval: Interval) -> int:
+def decimals(interval: Summary) -> int:
     """Decimal places that the width of an interval supports (two digits of its half width, between 0 and 3)."""
     width = interval.q95 - interval.q05
     if width <= 0:
@@ -120,7 +121,7 @@ def decimals(interval: Interval) -> int:
     return min(max(1 - math.floor(math.log10(width / 2)), 0), 3)
 
 
-def interval_words(interval: Interval) -> tuple[str, str]:
+def interval_words(interval: Summary) -> tuple[str, str]:
     """The mean, and the 90 % interval, rounded to what the interval supports."""
     places = min(decimals(interval), 2) if interval.mean >= 0.1 else decimals(interval)
     return f"{interval.mean:.{places}f}", f"{interval.q05:.{places}f} to {interval.q95:.{places}f}"
@@ -131,7 +132,7 @@ def seconds(time: float) -> str:
     return f"{time:.1f} s"
 
 
-def mass_status(parameter: ParameterContent, body: Body, name: Mapping[str, str]) -> str:
+def mass_status(parameter: ParameterSummary, body: Body, name: Mapping[str, str]) -> str:
     """What the data say about a mass, in words."""
     if body.mass is not None:
         return "Weighed: given with the input."
@@ -142,7 +143,7 @@ def mass_status(parameter: ParameterContent, body: Body, name: Mapping[str, str]
     return f"Only its ratio to {_the(parameter.partners, name)} is known, not the mass itself."
 
 
-def restitution_status(parameter: ParameterContent, name: Mapping[str, str]) -> str:
+def restitution_status(parameter: ParameterSummary, name: Mapping[str, str]) -> str:
     """What the data say about a restitution factor, in words."""
     if parameter.status == "default":
         return "Never collided in the video: a default value, the data say nothing."
@@ -152,7 +153,7 @@ def restitution_status(parameter: ParameterContent, name: Mapping[str, str]) -> 
 
 
 def _the(partners: Sequence[str], name: Mapping[str, str]) -> str:
-    return listed(f"the {name[partner]}" for partner in partners) if partners else "its collision partners"
+    return listed(f"the {name.get(partner, partner)}" for partner in partners) if partners else "its collision partners"
 
 
 def collision_shares(world: WorldContent) -> list[tuple[tuple[int, int], float, float]]:

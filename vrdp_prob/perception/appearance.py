@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from jaxtyping import Bool, Float, Float32, Int, UInt8
+from jaxtyping import Bool, Float, Float32, Integer, UInt8
 from scipy.ndimage import gaussian_filter
 
 from vrdp_prob.perception.background import Background
@@ -36,7 +36,7 @@ class Appearance:
         self._counts = np.zeros((_LEVELS,) * 3)
         self._table: Float32[np.ndarray, "bin"] = np.full(_LEVELS**3, LOG_ANY_COLOUR, dtype=np.float32)
 
-    def learn(self, bins: Int[np.ndarray, "pixel"], *, memory: float = 1.0) -> None:
+    def learn(self, bins: Integer[np.ndarray, "pixel"], *, memory: float = 1.0) -> None:
         """Add pixels (their histogram bins); what was learned before keeps a share `memory`."""
         seen = np.bincount(bins, minlength=_LEVELS**3).reshape(self._counts.shape)
         self._counts = memory * self._counts + seen
@@ -44,7 +44,7 @@ class Appearance:
         density = (1 - _STRAY) * blurred / max(blurred.sum(), 1e-9) / _BIN_WIDTH**3 + _STRAY / 256.0**3
         self._table = np.log(density).astype(np.float32).ravel()
 
-    def log_density(self, bins: Int[np.ndarray, "*pixels"]) -> Float32[np.ndarray, "*pixels"]:
+    def log_density(self, bins: Integer[np.ndarray, "*pixels"]) -> Float32[np.ndarray, "*pixels"]:
         """Log density of the colours in the given bins."""
         return self._table[bins]
 
@@ -74,7 +74,7 @@ class Evidence:
     """
 
     picture: UInt8[np.ndarray, "height width 3"]
-    bins: Int[np.ndarray, "height width"]
+    bins: Integer[np.ndarray, "height width"]
     floor: Float32[np.ndarray, "height width"]
     strange: Bool[np.ndarray, "height width"]
     dark: Bool[np.ndarray, "height width"]
@@ -83,9 +83,10 @@ class Evidence:
 def frame_evidence(picture: UInt8[np.ndarray, "height width 3"], background: Background) -> Evidence:
     """Weigh one frame against the empty floor."""
     noise = max(2.5, 1.2 * background.spread)
-    small = (picture // _BIN_WIDTH).astype(np.int32)
+    small = (picture // _BIN_WIDTH).astype(np.uint16)
     bins = (small[..., 0] * _LEVELS + small[..., 1]) * _LEVELS + small[..., 2]
-    departure = np.abs(picture.astype(np.float32) - background.picture.astype(np.float32)).max(axis=-1)
+    channels = cv2.split(cv2.absdiff(picture, background.rounded))
+    departure = cv2.max(cv2.max(channels[0], channels[1]), channels[2])
     lit = -1.5 * np.log(2 * np.pi) - 3 * np.log(noise)
     floor = np.full(picture.shape[:2], lit, dtype=np.float32)
     strange, dark = np.zeros(floor.shape, dtype=bool), np.zeros(floor.shape, dtype=bool)

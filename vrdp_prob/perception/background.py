@@ -6,6 +6,7 @@ where none does, the surface itself is the floor.
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from jaxtyping import Float, UInt8
@@ -36,6 +37,11 @@ class Background:
 
     picture: Float[np.ndarray, "height width 3"]
     spread: float
+
+    @cached_property
+    def rounded(self) -> UInt8[np.ndarray, "height width 3"]:
+        """The floor as a picture."""
+        return np.clip(np.rint(self.picture), 0, 255).astype(np.uint8)
 
 
 def estimate_background(frames: UInt8[np.ndarray, "frame height width 3"]) -> Background:
@@ -82,7 +88,8 @@ def _axis(position: Float[np.ndarray, "point"]) -> Float[np.ndarray, "point term
 
 def _terms() -> tuple[np.ndarray, np.ndarray]:
     first, second = np.indices((_DEGREE + 1, _DEGREE + 1))
-    return np.nonzero(first + second <= _DEGREE)
+    rows, columns = np.nonzero(first + second <= _DEGREE)
+    return rows, columns
 
 
 def _basis(rows: Float[np.ndarray, "row"], columns: Float[np.ndarray, "column"]) -> Float[np.ndarray, "point term"]:

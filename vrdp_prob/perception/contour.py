@@ -20,11 +20,14 @@ _MISMATCH = 0.22
 """Largest departure of a profile from a clean step, as a share of the contrast."""
 _EDGE_BLUR = 1.6
 """Pixels over which a picture's edge is spread."""
+_STEEP_WIDTH = 1.25
+"""Pixels around the steepest place of a profile that are averaged."""
 _REACH = 0.7
 """Share of the half length within which an edge counts."""
 _BISQUARE = 4.7
 _LEAST_SCALE = 0.15
 """Pixels; edges are never trusted more than this."""
+_ROUNDS = 3
 _FEWEST_EDGES = 12
 _MISFIT_SCALE = 0.7
 """Pixels by which the edges of a solid of the right shape typically leave its outline."""
@@ -95,8 +98,13 @@ def measure_edges(
     outline: Outline,
     half: float,
     covered: UInt8[np.ndarray, "height width"] | None = None,
+    *,
+    rounded: bool = False,
 ) -> Edges:
     """Look for a step of colour along each normal, `half` pixels inward and outward.
+
+    On flat faces the place of the step is where the mixture of inner and outer colour, summed along the profile, puts
+    it. A sphere's shade changes up to its rim (`rounded`), which would shift that; there the steepest place counts.
 
     Points whose profile leaves the picture or meets something nearer (`covered` not 0) are left out.
     """
@@ -104,22 +112,42 @@ def measure_edges(
     step = reach[1] - reach[0]
     # the middle of the first pixel is at 0.5 for the camera and at 0 for OpenCV
     places = outline.pixels[:, None, :] + reach[None, :, None] * outline.normals[:, None, :] - 0.5
-    maps = places.astype(np.float32)
+    across, down = (np.ascontiguousarray(places[..., axis], dtype=np.float32) for axis in (0, 1))
     height, width = picture.shape[:2]
     ends = places[:, [0, -1]]
     visible = ((ends > 0) & (ends < (width - 1, height - 1))).all(axis=(1, 2))
     if covered is not None:
-        visible &= cv2.remap(covered, maps, None, cv2.INTER_NEAREST, borderMode=cv2.BORDER_REPLICATE).max(axis=1) == 0
-    colour = cv2.remap(picture, maps, None, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE).astype(float)
+        visible &= cv2.remap(covered, across, down, cv2.INTER_NEAREST, borderMode=cv2.BORDER_REPLICATE).max(axis=1) == 0
+    colour = cv2.remap(picture, across, down, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE).astype(float)
     inside, outside = colour[:, :_END_SAMPLES].mean(axis=1), colour[:, -_END_SAMPLES:].mean(axis=1)
     difference = inside - outside
     contrast = np.linalg.norm(difference, axis=1)
     share = ((colour - outside[:, None]) * difference[:, None]).sum(axis=2) / np.maximum(contrast**2, 1e-6)[:, None]
     offset = np.clip(share, -0.3, 1.3).sum(axis=1) * step - half - step / 2
+    if rounded:
+        offset = _steepest(share, reach)
     ideal = np.clip((offset[:, None] - reach) / _EDGE_BLUR + 0.5, 0, 1)
     mismatch = np.sqrt(((share - ideal) ** 2).mean(axis=1))
     good = visible & (contrast > _CONTRAST) & (mismatch < _MISMATCH) & (np.abs(offset) < _REACH * half)
     return Edges(offset, good, visible)
+
+
+def _steepest(
+    share: Float[np.ndarray, "point sample"], reach: Float[np.ndarray, "sample"]
+) -> Float[np.ndarray, "point"]:
+    """Centre of the steepest fall of a profile."""
+    fall = np.clip(share[:, :-1] - share[:, 1:], 0, None)
+    middle = (reach[1:] + reach[:-1]) / 2
+    smooth = fall.copy()
+    smooth[:, 1:] += fall[:, :-1]
+    smooth[:, :-1] += fall[:, 1:]
+    place = middle[smooth.argmax(axis=1)]
+    width = _STEEP_WIDTH + middle[1] - middle[0]
+    for _ in range(2):
+        weights = fall * np.clip(1 - ((middle - place[:, None]) / width) ** 4, 0, 1)
+        total = weights.sum(axis=1)
+        place = np.where(total > 1e-9, (weights * middle).sum(axis=1) / np.maximum(total, 1e-9), place)
+    return place
 
 
 def fit_contour(
@@ -127,6 +155,7 @@ def fit_contour(
     camera: Camera,
     solid: Solid,
     pose: Pose,
+    *,
     halves: tuple[float, ...],
     covered: UInt8[np.ndarray, "height width"] | None = None,
 ) -> ContourFit | None:
@@ -151,7 +180,7 @@ def fit_contour(
     scale, information, weights, edges = 1.0, np.zeros((3, 3)), np.zeros(_POINTS), None
     for half in halves:
         outline = solid.outline(camera, pose, _POINTS)
-        edges = measure_edges(picture, outline, half, covered)
+        edges = measure_edges(picture, outline, half, covered, rounded=solid.shape is Shape.SPHERE)
         if edges.good.sum() < _FEWEST_EDGES:
             return None
         sensitivity = outline.sensitivity(camera, pose)[:, :count]
@@ -176,7 +205,7 @@ def _robust_step(
     weights = good.astype(float)
     ridge = 1e-6 * np.eye(sensitivity.shape[1])
     step, scale = np.zeros(sensitivity.shape[1]), 1.0
-    for _ in range(5):
+    for _ in range(_ROUNDS):
         weighted = sensitivity * weights[:, None]
         step = np.linalg.solve(weighted.T @ sensitivity + ridge, weighted.T @ offset)
         residual = np.abs(offset - sensitivity @ step)

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 
 import cv2
 import numpy as np
-from jaxtyping import Float, UInt8
+from jaxtyping import UInt8
 
 from vrdp_prob.perception.appearance import Appearance, Evidence
 from vrdp_prob.perception.contour import ContourFit, fit_contour
@@ -16,6 +16,10 @@ from vrdp_prob.scene.camera import Camera
 
 _STEPS = (0.3, 0.15, 0.07)
 """Compass steps of the search in apparent radii."""
+_CLEAR_SUPPORT = 0.9
+"""Share of the visible outline on clean edges from which a guess needs no search."""
+_SEARCH_MARGIN = 2.0
+"""Apparent radii around the first guesses in which an object is looked for."""
 _PROFILES = (0.24, 0.2, 0.16)
 """Half lengths of the contour's profiles in apparent radii."""
 _SHORTEST_PROFILE = 3.0
@@ -127,6 +131,16 @@ class Placer:
         """The solid's pixels."""
         return paint(solid.polygon(self.camera, pose), self.camera.height, self.camera.width)
 
+    def surroundings(self, solid: Solid, poses: Sequence[Pose]) -> tuple[slice, slice]:
+        """Rectangle of the frame in which a search from the given poses stays."""
+        size = max(apparent_radius(self.camera, solid, pose) for pose in poses)
+        points = np.concatenate([solid.polygon(self.camera, pose) for pose in poses])
+        low = np.floor(points.min(axis=0) - _SEARCH_MARGIN * size).astype(int)
+        high = np.ceil(points.max(axis=0) + _SEARCH_MARGIN * size).astype(int)
+        limits = np.array([self.camera.width, self.camera.height])
+        (left, top), (right, bottom) = np.clip(low, 0, limits), np.clip(high, 0, limits)
+        return slice(int(top), int(bottom)), slice(int(left), int(right))
+
     def place(
         self, evidence: Evidence, tracks: Sequence[Track], starts: Mapping[int, Sequence[Pose]]
     ) -> dict[int, Sighting]:
@@ -137,7 +151,8 @@ class Placer:
         sightings: dict[int, Sighting] = {}
         for index, track in enumerate(order):
             behind = [(windows[other.number], other.appearance) for other in order[index + 1 :]]
-            gain = Gain.of(evidence, track.appearance, covered, behind)
+            place = self.surroundings(track.solid, starts[track.number])
+            gain = Gain.of(evidence, track.appearance, covered, behind, place)
             sighting = self.sight(evidence, gain, track.solid, starts[track.number], covered)
             sightings[track.number] = sighting
             if sighting.seen:
@@ -153,16 +168,16 @@ class Placer:
         starts: Sequence[Pose],
         covered: UInt8[np.ndarray, "height width"],
     ) -> Sighting:
-        """Best pose of one solid: region search from every start, then its outline."""
-
-        def score(pose: Pose) -> float:
-            return gain.score(self.camera, solid, pose)
-
-        best = max(starts, key=score)
-        pose, value = climb(score, self.camera, solid, best, _STEPS)
-        contour = self.refine(evidence, solid, pose, covered)
+        """Best pose of one solid: its outline where a guess is near enough, else a search by region before that."""
+        best = max(starts, key=lambda start: gain.score(solid.polygon(self.camera, start)))
+        contour = self.refine(evidence, solid, best, covered)
+        if contour is None or contour.support < _CLEAR_SUPPORT:
+            pose, value = climb(gain, self.camera, solid, best, _STEPS)
+            contour = self.refine(evidence, solid, pose, covered)
+        else:
+            pose, value = contour.pose, gain.score(solid.polygon(self.camera, contour.pose))
         if contour is not None:
-            fitted = score(contour.pose)
+            fitted = gain.score(solid.polygon(self.camera, contour.pose))
             if fitted > value - 0.08 * abs(value) - 30:
                 pose = contour.pose
                 value = fitted
@@ -179,7 +194,7 @@ class Placer:
         size = apparent_radius(self.camera, solid, pose)
         halves = tuple(max(_SHORTEST_PROFILE, share * size) for share in _PROFILES)
         blocked = cv2.dilate(covered, np.ones((2 * _COVER_MARGIN + 1,) * 2, np.uint8)) if covered.any() else None
-        return fit_contour(evidence.picture, self.camera, solid, pose, halves, blocked)
+        return fit_contour(evidence.picture, self.camera, solid, pose, halves=halves, covered=blocked)
 
     def visibility(self, solid: Solid, pose: Pose, covered: UInt8[np.ndarray, "height width"]) -> tuple[float, float]:
         """Shares of the solid's picture that show, and that lie in the frame behind something nearer."""
@@ -200,8 +215,3 @@ class Placer:
         core = cv2.erode(window.mask, np.ones((3, 3), np.uint8)) > 0
         core &= (covered[window.place] == 0) & (evidence.floor[window.place] < _FLOOR_LIKE)
         track.appearance.learn(evidence.bins[window.place][core], memory=_MEMORY)
-
-
-def stack_poses(poses: Sequence[Pose]) -> Float[np.ndarray, "pose 3"]:
-    """Poses as rows of x, y, yaw."""
-    return np.array([(pose.x, pose.y, pose.yaw) for pose in poses], dtype=float).reshape(-1, 3)

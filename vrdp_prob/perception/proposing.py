@@ -128,17 +128,15 @@ def _from_colour(
         for offset in _STARTS:
             x, y = placer.camera.to_plane(middle + size * np.array(offset), radius)
             pose = Pose(float(x), float(y), yaw)
-            trials.append((gain.score(placer.camera, solid, pose), solid, pose))
+            trials.append((gain.score(solid.polygon(placer.camera, pose)), solid, pose))
     trials.sort(key=lambda trial: -trial[0])
     chosen = [next((trial for trial in trials if trial[1].shape is shape), trials[0]) for shape in Shape]
     best: tuple[float, Solid, Pose] | None = None
     for _, solid, start in [*chosen, *trials[:_KEPT]]:
-        pose, value = climb(
-            lambda pose, solid=solid: gain.score(placer.camera, solid, pose), placer.camera, solid, start, _STEPS
-        )
+        pose, value = climb(gain, placer.camera, solid, start, _STEPS)
         if best is None or value > best[0]:
             best = (value, solid, pose)
-    if best is None or not _fills(placer, best[1], best[2], patch, evidence.strange, explained):
+    if best is None or not _fills(placer, best[1], best[2], patch=patch, wanted=evidence.strange, explained=explained):
         return None
     return Proposal(best[1].shape, best[2], appearance)
 
@@ -152,6 +150,7 @@ def _fills(
     placer: Placer,
     solid: Solid,
     pose: Pose,
+    *,
     patch: Bool[np.ndarray, "height width"],
     wanted: Bool[np.ndarray, "height width"],
     explained: UInt8[np.ndarray, "height width"],

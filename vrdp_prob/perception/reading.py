@@ -125,8 +125,9 @@ def _arrays(track: Track, camera: Camera, count: int) -> Float[np.ndarray, "fram
     for frame, sighting in track.sightings.items():
         place = np.array([sighting.pose.x, sighting.pose.y])
         covariance = position_covariance(camera, track.solid, sighting)
-        sharp = covariance is not None and float(np.linalg.eigvalsh(covariance)[-1]) < _LARGEST_SD**2
-        if sharp and bool(camera.in_view(place, track.radius)):
+        if covariance is None or float(np.linalg.eigvalsh(covariance)[-1]) > _LARGEST_SD**2:
+            continue
+        if bool(camera.in_view(place, track.radius)):
             rows[frame] = (*place, sighting.pose.yaw, *np.ravel(covariance))
     return rows
 

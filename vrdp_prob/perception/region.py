@@ -1,6 +1,6 @@
 """Score a solid's pose by the pixels its picture would cover, and look for the best pose nearby."""
 
-from collections.abc import Callable
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import cv2
@@ -15,7 +15,10 @@ from vrdp_prob.scene.camera import Camera
 _LARGEST_GAIN = 6.0
 """Log odds beyond which one pixel says no more: neighbouring pixels share their errors."""
 _SUBPIXEL_BITS = 4
-_COMPASS = ((1, 0), (-1, 0), (0, 1), (0, -1))
+_COMPASS = np.array([(1, 0), (-1, 0), (0, 1), (0, -1)])
+_LONGEST_WALK = 12
+_LONGEST_STEP = 2.5
+"""Steps on the plane are at most so many times those across the line of sight, however flat the view."""
 _YAW_STEP = 0.35
 """Turn (rad) per step of one apparent radius in the search."""
 
@@ -74,10 +77,14 @@ class Gain:
     Parameters
     ----------
     odds
-        Log odds, 0 where something nearer hides the object.
+        Log odds in a rectangle of the frame, 0 where something nearer hides the object.
+    top, left
+        Corner of the rectangle in the frame.
     """
 
-    odds: Float32[np.ndarray, "height width"]
+    odds: Float32[np.ndarray, "row column"]
+    top: int = 0
+    left: int = 0
 
     @classmethod
     def of(
@@ -85,63 +92,82 @@ class Gain:
         evidence: Evidence,
         appearance: Appearance,
         nearer: UInt8[np.ndarray, "height width"],
-        behind: list[tuple[Window, Appearance]],
+        behind: Sequence[tuple[Window, Appearance]],
+        place: tuple[slice, slice] = (slice(None), slice(None)),
     ) -> "Gain":
-        """Weigh an appearance against the floor and the objects behind it."""
-        other = evidence.floor.copy()
+        """Weigh an appearance against the floor and the objects behind it, inside a rectangle."""
+        height, width = nearer.shape
+        top, bottom, _ = place[0].indices(height)
+        left, right, _ = place[1].indices(width)
+        other = evidence.floor[place].copy()
         for window, farther in behind:
-            claimed = farther.log_density(evidence.bins[window.place])
-            region = other[window.place]
-            np.maximum(region, np.where(window.mask > 0, claimed, region), out=region)
-        odds = np.clip(appearance.log_density(evidence.bins) - other, -_LARGEST_GAIN, _LARGEST_GAIN)
-        odds[nearer > 0] = 0
-        return cls(odds.astype(np.float32))
+            rows = slice(max(window.rows.start, top), min(window.rows.stop, bottom))
+            columns = slice(max(window.columns.start, left), min(window.columns.stop, right))
+            if rows.start >= rows.stop or columns.start >= columns.stop:
+                continue
+            mask = window.mask[_shifted(rows, window.rows.start), _shifted(columns, window.columns.start)]
+            region = other[_shifted(rows, top), _shifted(columns, left)]
+            claimed = farther.log_density(evidence.bins[rows, columns])
+            np.maximum(region, np.where(mask > 0, claimed, region), out=region)
+        odds = np.clip(appearance.log_density(evidence.bins[place]) - other, -_LARGEST_GAIN, _LARGEST_GAIN)
+        odds[nearer[place] > 0] = 0
+        return cls(odds.astype(np.float32), top, left)
 
-    def score(self, camera: Camera, solid: Solid, pose: Pose) -> float:
-        """Sum of the log odds over the solid's picture."""
-        height, width = self.odds.shape
-        window = paint(solid.polygon(camera, pose), height, width)
+    def score(self, polygon: Float[np.ndarray, "point 2"]) -> float:
+        """Sum of the log odds over an outline's inside."""
+        window = paint(polygon - (self.left, self.top), *self.odds.shape)
         if window.mask.size == 0:
             return 0.0
         return float(np.vdot(self.odds[window.place], window.mask.astype(np.float32)))
 
 
-def climb(
-    score: Callable[[Pose], float],
-    camera: Camera,
-    solid: Solid,
-    start: Pose,
-    steps: tuple[float, ...],
-) -> tuple[Pose, float]:
+def _shifted(piece: slice, start: int) -> slice:
+    return slice(piece.start - start, piece.stop - start)
+
+
+def climb(gain: Gain, camera: Camera, solid: Solid, start: Pose, steps: tuple[float, ...]) -> tuple[Pose, float]:
     """Walk uphill in compass steps measured in apparent radii; returns the pose and its score."""
-    pose, best = start, score(start)
+    pose, polygon = start, solid.polygon(camera, start)
+    best = gain.score(polygon)
     for step in steps:
-        moves = _moves(camera, solid, pose, step)
-        for _ in range(12):
-            trials = [(score(trial), trial) for trial in (pose.moved(*move) for move in moves)]
-            value, trial = max(trials, key=lambda item: item[0])
+        for _ in range(_LONGEST_WALK):
+            trials = [
+                (gain.score(outline), trial, outline) for trial, outline in _moves(camera, solid, pose, polygon, step)
+            ]
+            value, trial, _ = max(trials, key=lambda item: item[0])
             if value <= best:
                 break
-            pose, best = trial, value
+            # the shifted outline is only nearly that of the moved solid
+            pose, polygon = trial, solid.polygon(camera, trial)
+            best = gain.score(polygon)
     return pose, best
 
 
-def _moves(camera: Camera, solid: Solid, pose: Pose, step: float) -> list[tuple[float, float, float]]:
-    pixels = step * apparent_radius(camera, solid, pose)
+def _moves(
+    camera: Camera, solid: Solid, pose: Pose, polygon: Float[np.ndarray, "point 2"], step: float
+) -> Iterator[tuple[Pose, Float[np.ndarray, "point 2"]]]:
+    """Poses one step away in the picture, with their outlines."""
     to_plane = camera.plane_jacobian(np.array([pose.x, pose.y]), solid.radius)
-    moves = []
+    pixels = step * solid.radius / _across(to_plane)
     for direction in _COMPASS:
-        x, y = to_plane @ (pixels * np.array(direction))
+        shift = pixels * direction
+        x, y = to_plane @ shift
         length = float(np.hypot(x, y))
-        shrink = min(1.0, 2.5 * step * solid.radius / max(length, 1e-9))
-        moves.append((float(x) * shrink, float(y) * shrink, 0.0))
+        shrink = min(1.0, _LONGEST_STEP * step * solid.radius / max(length, 1e-9))
+        yield pose.moved(float(x) * shrink, float(y) * shrink), polygon + shrink * shift
     if solid.shape is Shape.CUBE:
-        moves += [(0.0, 0.0, _YAW_STEP * step), (0.0, 0.0, -_YAW_STEP * step)]
-    return moves
+        for turn in (_YAW_STEP * step, -_YAW_STEP * step):
+            turned = pose.moved(0.0, 0.0, turn)
+            yield turned, solid.polygon(camera, turned)
 
 
 def apparent_radius(camera: Camera, solid: Solid, pose: Pose) -> float:
     """Radius in pixels at which a sphere of the solid's radius would appear there."""
-    jacobian = camera.plane_jacobian(np.array([pose.x, pose.y]), solid.radius)
-    # the direction across the line of sight is the one that is not foreshortened
-    return solid.radius / max(float(np.linalg.svd(jacobian, compute_uv=False)[-1]), 1e-9)
+    return solid.radius / _across(camera.plane_jacobian(np.array([pose.x, pose.y]), solid.radius))
+
+
+def _across(jacobian: Float[np.ndarray, "2 2"]) -> float:
+    """Metres per pixel across the line of sight, the direction that is not foreshortened."""
+    half_sum = float((jacobian**2).sum()) / 2
+    determinant = float(jacobian[0, 0] * jacobian[1, 1] - jacobian[0, 1] * jacobian[1, 0])
+    return float(np.sqrt(max(half_sum - np.sqrt(max(half_sum**2 - determinant**2, 0.0)), 1e-18)))

@@ -32,7 +32,7 @@ class Pose:
     yaw: float = 0.0
 
     def moved(self, x: float, y: float, yaw: float = 0.0) -> "Pose":
-        """This pose with a step added."""
+        """The pose with a step added."""
         return Pose(self.x + x, self.y + y, self.yaw + yaw)
 
 

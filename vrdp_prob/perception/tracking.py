@@ -1,8 +1,7 @@
 """Follow objects through the frames: forward to find them and learn what they are, backward to measure them."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
-import cv2
 import numpy as np
 from jaxtyping import UInt8
 from scipy.optimize import linear_sum_assignment
@@ -18,7 +17,7 @@ from vrdp_prob.progress import ProgressDisplay, SilentProgress
 from vrdp_prob.scene.body import Shape
 from vrdp_prob.scene.camera import Camera
 
-_SHAPE_EVERY = 5
+_SHAPE_EVERY = 8
 """Frames between looks at a track's shape after the first few."""
 _SHAPE_FIRST = 4
 _SHAPE_VISIBLE = 0.9
@@ -27,6 +26,7 @@ _SHAPE_STEPS = (0.2, 0.1, 0.05)
 _REUNION_DISTANCE = 1.0
 """Metres from the expected place within which a lost object may be found again."""
 _REUNION_LIKENESS = 0.5
+_NO_PAIR = 1e3
 _FEWEST_FRAMES = 4
 """Sightings below which a track is taken for a passing disturbance."""
 
@@ -110,21 +110,20 @@ class Tracker:
         last = track.sightings.get(frame - direction)
         return [predicted] if last is None else [predicted, last.pose]
 
-    def _record(self, evidence: Evidence, frame: int, live: Sequence[Track], sightings: dict[int, Sighting]) -> None:
+    def _record(self, evidence: Evidence, frame: int, live: Sequence[Track], sightings: Mapping[int, Sighting]) -> None:
         for track in live:
             sighting = sightings[track.number]
             if sighting.seen:
                 track.sightings[frame] = sighting
                 track.expected = sighting.pose
-                covered = self.covered(track, live, sightings)
-                self.placer.learn(evidence, track, sighting, covered)
-                self._weigh_shapes(evidence, track, sighting, covered, live, sightings)
+                self.placer.learn(evidence, track, sighting, self.covered(track, live, sightings))
+                self._weigh_shapes(evidence, track, live, sightings)
             else:
                 track.expected = track.predict(frame, 1) or track.expected
                 track.gone = self.placer.window(track.solid, track.expected).area == 0
 
     def covered(
-        self, track: Track, live: Sequence[Track], sightings: dict[int, Sighting]
+        self, track: Track, live: Sequence[Track], sightings: Mapping[int, Sighting]
     ) -> UInt8[np.ndarray, "height width"]:
         """Pixels of what is seen nearer than a track."""
         covered = np.zeros(self.frames.shape[1:3], np.uint8)
@@ -140,21 +139,22 @@ class Tracker:
         self,
         evidence: Evidence,
         track: Track,
-        sighting: Sighting,
-        covered: UInt8[np.ndarray, "height width"],
         live: Sequence[Track],
-        sightings: dict[int, Sighting],
+        sightings: Mapping[int, Sighting],
     ) -> None:
         """Compare the shapes in a frame that shows the object whole; take the best so far."""
         due = track.shape_frames < _SHAPE_FIRST or len(track.sightings) % _SHAPE_EVERY == 0
+        sighting = sightings[track.number]
         if not due or sighting.visible < _SHAPE_VISIBLE:
             return
+        covered = self.covered(track, live, sightings)
         behind = [
             (self.placer.window(other.solid, sightings[other.number].pose), other.appearance)
             for other in live
             if other is not track and sightings[other.number].seen
         ]
-        gain = Gain.of(evidence, track.appearance, covered, behind)
+        place = self.placer.surroundings(track.solid, [sighting.pose])
+        gain = Gain.of(evidence, track.appearance, covered, behind, place)
         results: dict[Shape, Pose] = {}
         for shape in Shape:
             solid = Solid(shape, track.radius)
@@ -179,14 +179,14 @@ class Tracker:
         """Best pose of one shape and how badly its outline fits there."""
         best, least = starts[0], np.inf
         for start in starts:
-            pose, _ = climb(lambda pose: gain.score(self.camera, solid, pose), self.camera, solid, start, _SHAPE_STEPS)
+            pose, _ = climb(gain, self.camera, solid, start, _SHAPE_STEPS)
             fit = self.placer.refine(evidence, solid, pose, covered)
             if fit is not None and fit.misfit < least:
                 best, least = fit.pose, fit.misfit
         return best, min(least, WORST_MISFIT)
 
     def _explained(
-        self, evidence: Evidence, live: Sequence[Track], sightings: dict[int, Sighting]
+        self, evidence: Evidence, live: Sequence[Track], sightings: Mapping[int, Sighting]
     ) -> UInt8[np.ndarray, "height width"]:
         explained = np.zeros(evidence.floor.shape, np.uint8)
         for track in live:
@@ -198,7 +198,7 @@ class Tracker:
     def _adopt(self, evidence: Evidence, frame: int, proposals: Sequence[Proposal]) -> None:
         """Give each new sighting to a lost track that it continues, or else a track of its own."""
         lost = [track for track in self.tracks if not track.gone and frame not in track.sightings]
-        costs = np.full((len(proposals), len(lost)), 1e3)
+        costs = np.full((len(proposals), len(lost)), _NO_PAIR)
         for row, proposal in enumerate(proposals):
             for column, track in enumerate(lost):
                 distance = np.hypot(proposal.pose.x - track.expected.x, proposal.pose.y - track.expected.y)
@@ -207,9 +207,8 @@ class Tracker:
                     costs[row, column] = distance / _REUNION_DISTANCE + 1 - likeness
         pairs = dict(zip(*linear_sum_assignment(costs), strict=True)) if costs.size else {}
         for row, proposal in enumerate(proposals):
-            column = pairs.get(row)
-            if column is not None and costs[row, column] < 1e3:
-                track = lost[column]
+            if row in pairs and costs[row, pairs[row]] < _NO_PAIR:
+                track = lost[pairs[row]]
             else:
                 track = Track(len(self.tracks), self.radius, proposal.shape, proposal.appearance)
                 self.tracks.append(track)
@@ -218,8 +217,3 @@ class Tracker:
             gain = Gain.of(evidence, track.appearance, nothing, [])
             sighting = self.placer.sight(evidence, gain, track.solid, [proposal.pose], nothing)
             track.sightings[frame] = sighting
-
-
-def dilate(mask: UInt8[np.ndarray, "height width"], pixels: int) -> UInt8[np.ndarray, "height width"]:
-    """Widen a mask by some pixels."""
-    return np.asarray(cv2.dilate(mask, np.ones((2 * pixels + 1,) * 2, np.uint8)), dtype=np.uint8)

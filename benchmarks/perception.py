@@ -1,0 +1,185 @@
+"""Measure perception against the annotations of the practice videos.
+
+    python benchmarks/perception.py [--json FILE] [--videos 1,2,4]
+
+Development videos (1, 2, 4-9) and report videos (0, 3, 10-15) are told apart, and so are the two renderers (Cycles: 0-3,
+the fast renderer: the others). The data lie in ../shared/data/clevrer_bullet; without them every check is unmeasured.
+"""
+
+import argparse
+import json
+import sys
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from scipy.optimize import linear_sum_assignment
+
+from vrdp_prob.perception import read_video
+from vrdp_prob.scene import Camera, Tracks
+
+DATA = Path(__file__).parents[2] / "shared" / "data" / "clevrer_bullet"
+DEVELOPMENT = (1, 2, 4, 5, 6, 7, 8, 9)
+REPORT = (0, 3, 10, 11, 12, 13, 14, 15)
+CYCLES = (0, 1, 2, 3)
+MATCHED = 0.5
+"""Metres of mean distance within which a track belongs to an annotated object."""
+SWITCH_MARGIN = 0.1
+"""Metres by which a row must be nearer to another object to count as an identity switch."""
+CHI_SQUARE_95 = 5.991
+"""95th percentile of the squared normalised error of two coordinates."""
+
+
+@dataclass
+class Tally:
+    """What was measured over some videos."""
+
+    errors: list[float] = field(default_factory=list)
+    normalised: list[float] = field(default_factory=list)
+    entry_lags: list[int] = field(default_factory=list)
+    right: dict[str, list[bool]] = field(default_factory=lambda: {"color": [], "material": [], "shape": []})
+    mirrored: list[bool] = field(default_factory=list)
+    material_odds: list[float] = field(default_factory=list)
+    rows: int = 0
+    rows_in_view: int = 0
+    objects: int = 0
+    found: int = 0
+    extra: int = 0
+    switches: int = 0
+    invented: int = 0
+    seconds: list[float] = field(default_factory=list)
+
+    def add(self, other: "Tally") -> None:
+        """Take another tally in."""
+        for name, value in vars(other).items():
+            if isinstance(value, dict):
+                for key, items in value.items():
+                    getattr(self, name)[key] += items
+            else:
+                setattr(self, name, getattr(self, name) + value)
+
+
+def truth(annotation: dict) -> np.ndarray:
+    """True positions (time, object, 2), NaN out of view."""
+    frames = annotation["motion_trajectory"]
+    positions = np.full((len(frames), len(annotation["object_property"]), 2), np.nan)
+    for index, frame in enumerate(frames):
+        for item in frame["objects"]:
+            if item["inside_camera_view"]:
+                positions[index, item["object_id"]] = item["location"][:2]
+    return positions
+
+
+def score(tracks: Tracks, annotation: dict, seconds: float) -> Tally:
+    """Compare the tracks of one video with its annotation."""
+    true, measured = truth(annotation), tracks.positions
+    distance = np.linalg.norm(measured[:, :, None] - true[:, None], axis=-1)
+    both = np.isfinite(distance)
+    mean = np.where(both, np.minimum(np.nan_to_num(distance), 1), 0).sum(axis=0) / np.maximum(both.sum(axis=0), 1)
+    mean[~both.any(axis=0)] = 10
+    pairs = [(row, column) for row, column in zip(*linear_sum_assignment(mean), strict=True) if mean[row, column] < MATCHED]
+    tally = Tally(objects=int(np.isfinite(true[..., 0]).any(axis=0).sum()), found=len(pairs), seconds=[seconds])
+    tally.extra = measured.shape[1] - len(pairs)
+    for row, column in pairs:
+        _score_object(tally, tracks, annotation["object_property"][column], true, distance, row, column)
+    return tally
+
+
+def _score_object(
+    tally: Tally, tracks: Tracks, properties: dict, true: np.ndarray, distance: np.ndarray, row: int, column: int
+) -> None:
+    in_view, seen = np.isfinite(true[:, column, 0]), tracks.seen[:, row]
+    both = in_view & seen
+    error = tracks.positions[both, row] - true[both, column]
+    covariance = tracks.position_covariance
+    assert covariance is not None
+    tally.errors += np.linalg.norm(error, axis=1).tolist()
+    tally.normalised += np.einsum("ni,nij,nj->n", error, np.linalg.inv(covariance[both, row]), error).tolist()
+    tally.rows_in_view += int(in_view.sum())
+    tally.rows += int(both.sum())
+    tally.invented += int((seen & ~in_view).sum())
+    tally.entry_lags.append(abs(int(seen.argmax()) - int(in_view.argmax())))
+    nearest = np.nanmin(np.where(np.isfinite(distance[:, row]), distance[:, row], np.inf), axis=1)
+    tally.switches += int((nearest[both] + SWITCH_MARGIN < distance[both, row, column]).sum())
+    body = tracks.bodies[row]
+    for name in tally.right:
+        tally.right[name].append(str(getattr(body, name)) == properties[name])
+    if properties["shape"] == "sphere":
+        tally.mirrored.append(body.material == properties["material"])
+    tally.material_odds.append(float(body.probabilities("material").get(properties["material"], 0.0)))
+
+
+def checks(name: str, tally: Tally) -> list[dict]:
+    """The goals, measured on one group of videos."""
+
+    def percent(values: Sequence[bool]) -> float | None:
+        return round(100 * float(np.mean(values)), 1) if values else None
+
+    def quantile(values: Sequence[float], share: float) -> float | None:
+        return round(float(np.quantile(values, share)), 4) if values else None
+
+    normalised = np.array(tally.normalised)
+    rows: list[tuple[str, float | None, float | None, str]] = [
+        ("position error, median (m)", quantile(tally.errors, 0.5), 0.03, "<="),
+        ("position error, 95th percentile (m)", quantile(tally.errors, 0.95), 0.10, "<="),
+        ("position error, largest (m)", quantile(tally.errors, 1.0), None, ""),
+        ("identity switches (rows)", tally.switches if tally.objects else None, 0, "<="),
+        ("objects missed", tally.objects - tally.found if tally.objects else None, 0, "<="),
+        ("objects invented", tally.extra if tally.objects else None, 0, "<="),
+        ("color right (%)", percent(tally.right["color"]), 97, ">="),
+        ("shape right (%)", percent(tally.right["shape"]), 97, ">="),
+        ("material right (%)", percent(tally.right["material"]), 90, ">="),
+        ("material right, spheres (%)", percent(tally.mirrored), None, ""),
+        ("material, mean probability of the truth", quantile([float(np.mean(tally.material_odds))], 0.5) if tally.material_odds else None, None, ""),
+        ("first frame in view, worst lag (frames)", max(tally.entry_lags, default=None), 3, "<="),
+        ("rows measured of those in view (%)", round(100 * tally.rows / tally.rows_in_view, 1) if tally.rows_in_view else None, None, ""),
+        ("rows with the centre out of view", tally.invented if tally.objects else None, None, ""),
+        ("normalised squared error, mean (2 is calibrated)", round(float(normalised.mean()), 2) if len(normalised) else None, None, ""),
+        ("errors inside the stated 95 % ellipse (%)", percent((normalised < CHI_SQUARE_95).tolist()), None, ""),
+        ("seconds per video, slowest", round(max(tally.seconds), 1) if tally.seconds else None, 15, "<="),
+    ]
+    return [_check(f"{name}: {label}", value, goal, sense) for label, value, goal, sense in rows]
+
+
+def _check(name: str, value: float | None, goal: float | None, sense: str) -> dict:
+    met = value is not None and (goal is None or (value <= goal if sense == "<=" else value >= goal))
+    return {"name": name, "value": value, "goal": None if goal is None else f"{sense} {goal:g}", "ok": met}
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--json", type=Path, help="write the checks to this file")
+    parser.add_argument("--videos", help="only these, separated by commas")
+    arguments = parser.parse_args()
+    wanted = {int(item) for item in arguments.videos.split(",")} if arguments.videos else {*DEVELOPMENT, *REPORT}
+    groups: dict[str, Tally] = {
+        f"{use} {renderer}": Tally() for use in ("development", "report") for renderer in ("Cycles", "fast")
+    }
+    if DATA.is_dir():
+        camera = Camera.read(DATA / "camera.json")
+        for number in sorted(wanted):
+            annotation = json.loads((DATA / f"annotations/annotation_{number:05d}.json").read_text())
+            start = time.perf_counter()
+            tracks = read_video(DATA / f"videos/video_{number:05d}.mp4", camera)
+            tally = score(tracks, annotation, time.perf_counter() - start)
+            use = "report" if number in REPORT else "development"
+            groups[f"{use} {'Cycles' if number in CYCLES else 'fast'}"].add(tally)
+            print(
+                f"video {number}: {tally.found}/{tally.objects} objects, {tally.seconds[0]:.1f} s, "
+                f"median error {np.median(tally.errors):.4f} m",
+                file=sys.stderr,
+            )
+    rows = [check for name, tally in groups.items() for check in checks(name, tally)]
+    width = max(len(row["name"]) for row in rows)
+    for row in rows:
+        value = "-" if row["value"] is None else f"{row['value']:g}"
+        verdict = "" if row["goal"] is None else "ok" if row["ok"] else "MISSED"
+        print(f"{row['name']:<{width}}  {value:>9}  {row['goal'] or '':>8}  {verdict}")
+    if arguments.json:
+        arguments.json.write_text(json.dumps({"checks": rows}, indent=2) + "\n")
+
+
+if __name__ == "__main__":
+    main()

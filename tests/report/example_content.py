@@ -7,7 +7,7 @@ import numpy as np
 from vrdp_prob.inference.samples import Convergence
 from vrdp_prob.inference.summaries import ObjectSummary, PairSummary, ParameterSummary, Summary
 from vrdp_prob.reasoning.answer import Answer, ChoiceAnswer
-from vrdp_prob.report.content import AnswerContent, Collisions, ReportContent, Still, WorldContent, WorldKind
+from vrdp_prob.report.content import AnswerContent, Collisions, Footage, ReportContent, WorldContent, WorldKind
 from vrdp_prob.scene import Body, Camera, QuestionType, Shape, Tracks
 
 FRAME = 0.04
@@ -133,11 +133,12 @@ def make_tracks(camera: Camera | None, seed: int = 1) -> Tracks:
     return Tracks.from_arrays("video_00000", BODIES, truth.times, positions, camera=camera)
 
 
-def make_still(camera: Camera) -> Still:
-    """A grey floor that gets lighter towards the viewer."""
+def make_footage(camera: Camera) -> Footage:
+    """A grey floor that gets lighter towards the viewer, and a film in which it gets lighter still."""
     shade = np.linspace(90, 190, camera.height)[:, None, None]
-    image = np.broadcast_to(shade, (camera.height, camera.width, 3)).astype(np.uint8)
-    return Still(image, 4.4, image)
+    floor = np.broadcast_to(shade, (camera.height, camera.width, 3)).astype(np.uint8)
+    film = np.stack([floor + np.uint8(brighter) for brighter in range(0, 60, 4)])
+    return Footage(floor, 4.4, floor, film, np.linspace(0, 5, len(film)))
 
 
 def _parameter(draws, status, *partners):
@@ -296,7 +297,7 @@ def make_content(*, camera: Camera | None = None, draws: int = DRAWS) -> ReportC
         effects=("sliding_friction", "rolling_resistance", "air_drag"),
         seed=0,
         version="0.1.0",
-        still=make_still(camera) if camera is not None else None,
+        footage=make_footage(camera) if camera is not None else None,
     )
 
 

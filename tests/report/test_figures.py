@@ -9,7 +9,6 @@ from hypothesis import strategies as st
 
 from vrdp_prob.inference.summaries import Summary
 from vrdp_prob.report.figures import log_axis, path_data, still_figure, unit_axis
-from vrdp_prob.report.floor import clear_floor
 
 
 def test_log_axis_gives_equal_ratios_equal_lengths():
@@ -60,20 +59,3 @@ def test_future_of_the_rollouts_is_drawn(content):
 def test_figure_without_worlds_shows_the_tracks(content):
     figure = still_figure(replace(content, worlds=()))
     assert all(track.dots and not track.seen for track in figure.tracks)
-
-
-def test_floor_is_cleared_of_objects(content):
-    camera, tracks, time = content.tracks.camera, content.tracks, 4.4
-    image = np.full((camera.height, camera.width, 3), 160, dtype=np.uint8)
-    frame = int(np.abs(tracks.times - time).argmin())
-    for position in tracks.positions[frame]:
-        if np.isfinite(position).all():
-            u, v = np.rint(camera.project(np.array([*position, 0.2]))).astype(int)
-            image[max(v - 12, 0) : v + 12, max(u - 12, 0) : u + 12] = 20
-    assert image.min() == 20
-    assert clear_floor(image, tracks, time).min() > 140
-
-
-def test_floor_without_a_camera_stays(plain_content):
-    image = np.zeros((4, 4, 3), dtype=np.uint8)
-    assert clear_floor(image, plain_content.tracks, 0.0) is image

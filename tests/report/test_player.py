@@ -128,6 +128,19 @@ def test_view_from_above_differs(opened):
     assert colors > 20
 
 
+def test_video_shows_under_the_rollouts_where_there_is_one(opened):
+    set_value(opened, "time", 2, "input")
+    opened.wait("new Promise((done) => setTimeout(() => done(true), 200))")
+    with_video = opened.run(PIXELS)
+    opened.run(f"{part('film')}.click()")
+    assert opened.run(PIXELS) != with_video
+    set_value(opened, "world", "removed:1", "change")
+    opened.wait(f"{part('canvas')}.ariaLabel.startsWith('Without')")
+    without_video = opened.run(PIXELS)
+    opened.run(f"{part('film')}.click()")
+    assert opened.run(PIXELS) == without_video
+
+
 def test_collisions_are_listed_and_lead_to_their_time(opened):
     rows = opened.run("[...document.querySelectorAll('.pairs button')].map((row) => row.ariaLabel)")
     assert rows == [

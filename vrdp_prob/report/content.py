@@ -112,22 +112,24 @@ class WorldContent:
 
 
 @dataclass(frozen=True)
-class Still:
-    """One frame of the video.
+class Footage:
+    """What is shown of the video itself; channels are red, green, blue.
 
     Parameters
     ----------
-    image
-        The picture; channels red, green, blue.
-    time
-        Its time in s.
+    still, time
+        One frame and its time in s.
     floor
-        The same view with the objects cleared away, None where it is not known.
+        The same view without the objects.
+    film, film_times
+        Some frames in order and their times in s.
     """
 
-    image: UInt8[np.ndarray, "height width 3"]
+    still: UInt8[np.ndarray, "height width 3"]
     time: float
-    floor: UInt8[np.ndarray, "height width 3"] | None = None
+    floor: UInt8[np.ndarray, "height width 3"]
+    film: UInt8[np.ndarray, "frame height width 3"]
+    film_times: Float[np.ndarray, "frame"]
 
 
 @dataclass(frozen=True)
@@ -154,8 +156,8 @@ class ReportContent:
         Name of the physics model and of its effects.
     seed, version
         Seed of the run and version of the software.
-    still
-        A frame of the video, None where the input was no video.
+    footage
+        Pictures of the video, None where the input was no video.
     """
 
     tracks: Tracks
@@ -170,7 +172,7 @@ class ReportContent:
     effects: tuple[str, ...]
     seed: int
     version: str
-    still: Still | None = None
+    footage: Footage | None = None
 
     def world(self, kind: WorldKind) -> WorldContent | None:
         """The first world of a kind, None where there is none."""

@@ -1,21 +1,18 @@
 """report.html: one page that opens from disk, with all it needs inside it."""
 
-import base64
 import json
 import math
 from importlib import resources
 from typing import Any
 
-import cv2
 import jinja2
-import numpy as np
-from jaxtyping import UInt8
 from markupsafe import Markup
 
 from vrdp_prob.inference.summaries import PairSummary, ParameterSummary, Summary
 from vrdp_prob.reasoning.answer import Answer
 from vrdp_prob.report.content import AnswerContent, ReportContent, WorldKind
 from vrdp_prob.report.figures import FIGURE_DRAWS, log_axis, still_figure, unit_axis
+from vrdp_prob.report.footage import still_uri
 from vrdp_prob.report.payload import player_data
 from vrdp_prob.report.summary import (
     TYPE_WORDS,
@@ -43,8 +40,6 @@ from vrdp_prob.report.wording import (
 SCRIPTS = ("worlds.js", "views.js", "scene.js", "player.js")
 """The player's sources, in the order they go into the page."""
 
-_JPEG_QUALITY = 90
-
 
 def render(content: ReportContent) -> str:
     """The page as HTML text; the same content gives the same text."""
@@ -69,13 +64,6 @@ def _asset(name: str) -> Markup:
     return Markup((resources.files("vrdp_prob.report") / "assets" / name).read_text(encoding="utf-8"))
 
 
-def _picture(image: UInt8[np.ndarray, "height width 3"]) -> str:
-    ok, encoded = cv2.imencode(".jpg", image[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, _JPEG_QUALITY])
-    if not ok:
-        raise ValueError("the still could not be encoded as JPEG")
-    return "data:image/jpeg;base64," + base64.b64encode(encoded.tobytes()).decode("ascii")
-
-
 def _objects(content: ReportContent) -> list[dict[str, Any]]:
     name, tag = names(content.tracks.bodies), tags(content.tracks.bodies)
     return [
@@ -91,10 +79,10 @@ def _objects(content: ReportContent) -> list[dict[str, Any]]:
 
 
 def _opening(content: ReportContent) -> dict[str, Any]:
-    still = content.still
+    footage = content.footage
     draws = max((min(world.draws, FIGURE_DRAWS) for world in content.worlds[:2]), default=0)
     future = content.world(WorldKind.FUTURE)
-    caption = f"The frame at {seconds(still.time)}. " if still is not None else "The plane from above. "
+    caption = f"The frame at {seconds(footage.time)}. " if footage is not None else "The plane from above. "
     caption += "Dots: measured positions."
     if draws:
         caption += f" Lines: {draws} posterior draws"
@@ -107,7 +95,7 @@ def _opening(content: ReportContent) -> dict[str, Any]:
         "converged": content.convergence.converged,
         "objects": _objects(content),
         "still": still_figure(content),
-        "still_image": _picture(still.image) if still is not None else None,
+        "still_image": still_uri(footage.still) if footage is not None else None,
         "still_caption": caption,
         "still_label": "Measured tracks and posterior rollouts of "
         + listed(f"the {name}" for name in names(content.tracks.bodies).values()),
@@ -115,13 +103,12 @@ def _opening(content: ReportContent) -> dict[str, Any]:
 
 
 def _player(content: ReportContent) -> dict[str, Any]:
-    floor = None
-    if content.still is not None and content.tracks.camera is not None:
-        floor = content.still.image if content.still.floor is None else content.still.floor
+    shown = content.footage if content.tracks.camera is not None else None
     return {
         "has_worlds": bool(content.worlds),
+        "has_film": shown is not None,
         "has_camera": content.tracks.camera is not None,
-        "floor_image": None if floor is None else _picture(floor),
+        "floor_image": None if shown is None else still_uri(shown.floor),
         "player_data": _script_json(player_data(content)) if content.worlds else None,
         "javascript": Markup("\n").join(_asset(name) for name in SCRIPTS),
     }

@@ -13,6 +13,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from vrdp_prob.report.content import ReportContent, WorldContent
+from vrdp_prob.report.footage import film_data
 from vrdp_prob.report.wording import color_of, names, tags, world_group, world_label
 from vrdp_prob.scene import Camera
 
@@ -49,6 +50,7 @@ def player_data(content: ReportContent) -> dict[str, Any]:
         "tracks": {"times": _rounded(tracks.times), "positions": _measured(tracks.positions)},
         "view": _view(content),
         "pictureEdge": None if camera is None else _picture_edge(camera),
+        "film": None if content.footage is None or camera is None else film_data(content.footage),
         "worlds": [_world(world, content, reach) for world in content.worlds],
     }
 

@@ -7,7 +7,7 @@ class Player {
     this.root = root;
     this.part = (name) => root.querySelector(`[data-part="${name}"]`);
     this.worlds = data.worlds.map((packed) => new World(packed));
-    this.scene = new Scene(this.part("canvas"), data, floor);
+    this.scene = new Scene(this.part("canvas"), data, floor, () => this.draw());
     this.views = { plane: new PlaneView(data) };
     if (data.camera) this.views.picture = new PictureView(data.camera);
     this.playing = false;
@@ -41,7 +41,7 @@ class Player {
     this.part("world").addEventListener("change", (event) => this.show(event.target.value));
     this.part("play").addEventListener("click", () => (this.playing ? this.pause() : this.play()));
     this.part("time").addEventListener("input", (event) => { this.pause(); this.seek(Number(event.target.value)); });
-    for (const name of ["paths", "measured"]) this.part(name).addEventListener("change", () => this.draw());
+    for (const name of ["paths", "measured", "film"]) this.part(name)?.addEventListener("change", () => this.draw());
     for (const choice of this.root.querySelectorAll("[name=view]")) {
       choice.addEventListener("change", () => { this.scene.look(this.views[choice.value]); this.draw(); });
     }
@@ -119,7 +119,9 @@ class Player {
 
   draw() {
     if (!this.world) return;
-    const shown = { paths: this.part("paths").checked, measured: this.part("measured").checked };
+    const checked = (name) => Boolean(this.part(name)?.checked);
+    const real = ["factual", "future"].includes(this.world.kind) && this.time <= this.data.seenUntil + 1e-6;
+    const shown = { paths: checked("paths"), measured: checked("measured"), film: checked("film") && real };
     this.scene.draw(this.world, this.time, shown);
     const name = `${this.world.label}, ${this.part("label").textContent}, ${this.world.draws} draws`;
     this.part("canvas").setAttribute("aria-label", name);

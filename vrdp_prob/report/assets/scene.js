@@ -4,10 +4,11 @@
 const FLASH_SECONDS = 0.3;
 
 class Scene {
-  constructor(canvas, data, floor) {
+  constructor(canvas, data, floor, redraw) {
     this.canvas = canvas;
     this.data = data;
     this.floor = floor;
+    this.film = data.film && new Film(data.film, redraw);
     this.still = matchMedia("(prefers-reduced-motion: reduce)");
     this.paths = document.createElement("canvas");
     this.restyle();
@@ -47,13 +48,13 @@ class Scene {
     return context;
   }
 
-  draw(world, time, { paths, measured }) {
-    const [width, height] = this.size;
-    if (!width) return; /* not laid out */
+  draw(world, time, { paths, measured, film }) {
+    if (!this.size[0]) return; /* not laid out */
     const context = this.context(this.canvas);
-    this.view.backdrop(context, this.colors, width, height, this.floor);
+    const frame = film && this.film && this.view.showsFilm ? this.film.frame(time) : null;
+    this.view.backdrop(context, this.colors, this.size, this.floor, frame);
     if (paths) this.drawPaths(context, world);
-    const centres = this.drawBodies(context, world, time);
+    const centres = this.drawBodies(context, world, time, frame);
     this.drawFlashes(context, world, time);
     if (measured) this.drawMeasured(context, time);
     this.drawTags(context, centres);
@@ -85,7 +86,8 @@ class Scene {
     layer.stroke();
   }
 
-  drawBodies(context, world, time) {
+  /* Filled bodies; over a frame of the video white outlines, which leave the real objects in sight. */
+  drawBodies(context, world, time, frame) {
     const place = world.place(time);
     const standing = [];
     for (const body of world.bodyIndices()) {
@@ -98,16 +100,19 @@ class Scene {
     const opacity = 1 - 0.04 ** (1 / world.draws);
     for (const { body, state } of standing) {
       const [outline, top] = this.view.outline(this.data.bodies[body], state);
-      context.fillStyle = context.strokeStyle = this.bodyColors[body];
+      context.fillStyle = this.bodyColors[body];
+      context.strokeStyle = frame ? "#fff" : this.bodyColors[body];
       context.lineWidth = 1;
+      tracePolygon(context, outline);
       context.globalAlpha = opacity;
-      fillPolygon(context, outline);
+      if (!frame) context.fill();
       context.globalAlpha = Math.min(1, 1.6 * opacity);
       context.stroke();
-      if (top) {
+      if (top && !frame) {
         context.fillStyle = "#fff";
         context.globalAlpha = 0.35 * opacity;
-        fillPolygon(context, top);
+        tracePolygon(context, top);
+        context.fill();
       }
     }
     context.globalAlpha = 1;
@@ -178,9 +183,31 @@ class Scene {
   }
 }
 
-function fillPolygon(context, points) {
+function tracePolygon(context, points) {
   context.beginPath();
   points.forEach((point, index) => (index ? context.lineTo(...point) : context.moveTo(...point)));
   context.closePath();
-  context.fill();
+}
+
+/* Frames of the video, decoded when they are first needed. */
+class Film {
+  constructor({ times, pictures }, redraw) {
+    this.times = times;
+    this.pictures = pictures;
+    this.images = [];
+    this.redraw = redraw;
+  }
+
+  /* The last frame that is not later than a time, null while it is being decoded. */
+  frame(time) {
+    let index = 0;
+    while (index + 1 < this.times.length && this.times[index + 1] <= time + 1e-6) index++;
+    if (!this.images[index]) {
+      const image = new Image();
+      image.src = `data:image/jpeg;base64,${this.pictures[index]}`;
+      image.decode().then(this.redraw);
+      this.images[index] = image;
+    }
+    return this.images[index].complete ? this.images[index] : null;
+  }
 }

@@ -33,6 +33,7 @@ function hull(points) {
 class PictureView {
   constructor(camera) {
     this.camera = camera;
+    this.showsFilm = true;
     this.aspect = camera.width / camera.height;
   }
 
@@ -83,11 +84,12 @@ class PictureView {
     return Math.sqrt(Math.max(row.reduce((sum, value) => sum + value * value, 0) - along * along, 0));
   }
 
-  backdrop(context, colors, width, height, floor) {
-    if (floor) {
-      context.drawImage(floor, 0, 0, width, height);
-      context.globalAlpha = 0.45;
-    }
+  /* A frame of the video as it is, or the floor made pale, so that what is drawn on it stands out. */
+  backdrop(context, colors, [width, height], floor, frame) {
+    const picture = frame || floor;
+    if (picture) context.drawImage(picture, 0, 0, width, height);
+    if (frame) return;
+    context.globalAlpha = picture ? 0.45 : 1;
     context.fillStyle = colors.paper;
     context.fillRect(0, 0, width, height);
     context.globalAlpha = 1;
@@ -149,7 +151,7 @@ class PlaneView {
   }
 
   /* A grid of round lengths, and its scale. */
-  backdrop(context, colors, width, height) {
+  backdrop(context, colors, [width, height]) {
     context.fillStyle = colors.paper;
     context.fillRect(0, 0, width, height);
     const wished = 70 / this.scale;

@@ -79,7 +79,9 @@ def score(tracks: Tracks, annotation: dict, seconds: float) -> Tally:
     both = np.isfinite(distance)
     mean = np.where(both, np.minimum(np.nan_to_num(distance), 1), 0).sum(axis=0) / np.maximum(both.sum(axis=0), 1)
     mean[~both.any(axis=0)] = 10
-    pairs = [(row, column) for row, column in zip(*linear_sum_assignment(mean), strict=True) if mean[row, column] < MATCHED]
+    pairs = [
+        (row, column) for row, column in zip(*linear_sum_assignment(mean), strict=True) if mean[row, column] < MATCHED
+    ]
     tally = Tally(objects=int(np.isfinite(true[..., 0]).any(axis=0).sum()), found=len(pairs), seconds=[seconds])
     tally.extra = measured.shape[1] - len(pairs)
     for row, column in pairs:
@@ -132,11 +134,26 @@ def checks(name: str, tally: Tally) -> list[dict]:
         ("shape right (%)", percent(tally.right["shape"]), 97, ">="),
         ("material right (%)", percent(tally.right["material"]), 90, ">="),
         ("material right, spheres (%)", percent(tally.mirrored), None, ""),
-        ("material, mean probability of the truth", quantile([float(np.mean(tally.material_odds))], 0.5) if tally.material_odds else None, None, ""),
+        (
+            "material, mean probability of the truth",
+            quantile([float(np.mean(tally.material_odds))], 0.5) if tally.material_odds else None,
+            None,
+            "",
+        ),
         ("first frame in view, worst lag (frames)", max(tally.entry_lags, default=None), 3, "<="),
-        ("rows measured of those in view (%)", round(100 * tally.rows / tally.rows_in_view, 1) if tally.rows_in_view else None, None, ""),
+        (
+            "rows measured of those in view (%)",
+            round(100 * tally.rows / tally.rows_in_view, 1) if tally.rows_in_view else None,
+            None,
+            "",
+        ),
         ("rows with the centre out of view", tally.invented if tally.objects else None, None, ""),
-        ("normalised squared error, mean (2 is calibrated)", round(float(normalised.mean()), 2) if len(normalised) else None, None, ""),
+        (
+            "normalised squared error, mean (2 is calibrated)",
+            round(float(normalised.mean()), 2) if len(normalised) else None,
+            None,
+            "",
+        ),
         ("errors inside the stated 95 % ellipse (%)", percent((normalised < CHI_SQUARE_95).tolist()), None, ""),
         ("seconds per video, slowest", round(max(tally.seconds), 1) if tally.seconds else None, 15, "<="),
     ]

@@ -1,5 +1,6 @@
 """Read a video file into an array, or say in one sentence why it cannot be."""
 
+import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -17,6 +18,8 @@ DEFAULT_FRAME_RATE = 25.0
 
 _TRUNCATION_TOLERANCE = 2
 """Frames by which a container's count may exceed what can be decoded in a file that is whole."""
+
+_FFMPEG_QUIET = "-8"
 
 
 @dataclass(frozen=True)
@@ -122,6 +125,7 @@ def _opened(path: Path) -> Iterator[cv2.VideoCapture]:
 @contextmanager
 def _quiet_decoder() -> Iterator[None]:
     """OpenCV's own complaints on standard error would stand beside our one sentence."""
+    os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", _FFMPEG_QUIET)
     level = cv2.utils.logging.getLogLevel()
     cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
     try:

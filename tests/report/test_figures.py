@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from vrdp_prob.inference.summaries import Summary
 from vrdp_prob.report.figures import log_axis, path_data, still_figure, unit_axis
+from vrdp_prob.scene import Wall
 
 
 def test_log_axis_gives_equal_ratios_equal_lengths():
@@ -59,3 +60,11 @@ def test_future_of_the_rollouts_is_drawn(content):
 def test_figure_without_worlds_shows_the_tracks(content):
     figure = still_figure(replace(content, worlds=()))
     assert all(track.dots and not track.seen for track in figure.tracks)
+
+
+def test_walls_are_drawn(plain_content):
+    walls = (Wall(-6.0, -4.0, 6.0, -4.0), Wall(6.0, -4.0, 6.0, 4.0))
+    figure = still_figure(replace(plain_content, tracks=replace(plain_content.tracks, walls=walls)))
+    ends = np.array([[float(x) for x in pair.split()] for wall in figure.walls for pair in wall[1:].split("L")])
+    assert ends.shape == (4, 2)
+    assert ((ends >= 0) & (ends <= [figure.width, figure.height])).all()

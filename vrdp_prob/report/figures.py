@@ -54,6 +54,7 @@ class StillFigure:
 
     width: int
     height: int
+    walls: list[str]
     tracks: list[TrackFigure]
 
 
@@ -79,7 +80,12 @@ def still_figure(content: ReportContent) -> StillFigure:
                 _points(measured[-1:])[0],
             )
         )
-    return StillFigure(width, height, figures)
+    walls = [path_data(projection(ends)) for ends in _wall_ends(content)]
+    return StillFigure(width, height, walls, figures)
+
+
+def _wall_ends(content: ReportContent) -> list[Float[np.ndarray, "end 2"]]:
+    return [np.array([[wall.x1, wall.y1], [wall.x2, wall.y2]]) for wall in content.tracks.walls]
 
 
 def camera_projection(camera: Camera, height: float) -> Projection:
@@ -94,7 +100,7 @@ def camera_projection(camera: Camera, height: float) -> Projection:
 
 def plane_projection(content: ReportContent) -> Projection:
     """Figure coordinates of points of the plane seen from above, with all measured positions in the figure."""
-    positions = content.tracks.positions.reshape(-1, 2)
+    positions = np.concatenate([content.tracks.positions.reshape(-1, 2), *_wall_ends(content)])
     low, high = np.nanmin(positions, axis=0), np.nanmax(positions, axis=0)
     room = np.array([_PLAIN_WIDTH, _PLAIN_HEIGHT]) * 0.8
     scale = float((room / np.maximum(high - low, 1e-6)).min())

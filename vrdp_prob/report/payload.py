@@ -48,6 +48,7 @@ def player_data(content: ReportContent) -> dict[str, Any]:
         "frameRate": round(tracks.frame_rate, 6),
         "seenUntil": round(float(tracks.times[-1]), 6),
         "tracks": {"times": _rounded(tracks.times), "positions": _measured(tracks.positions)},
+        "walls": [[[wall.x1, wall.y1], [wall.x2, wall.y2]] for wall in tracks.walls],
         "view": _view(content),
         "pictureEdge": None if camera is None else _picture_edge(camera),
         "film": None if content.footage is None or camera is None else film_data(content.footage),
@@ -112,6 +113,8 @@ def _reach(content: ReportContent) -> float:
 def _view(content: ReportContent) -> list[float]:
     """Rectangle (x1, y1, x2, y2) in m that the bird's-eye view shows: what was seen, and nearly all that was drawn."""
     positions = content.tracks.positions.reshape(-1, 2)
+    walls = np.array([(x, y) for wall in content.tracks.walls for x, y in ((wall.x1, wall.y1), (wall.x2, wall.y2))])
+    positions = np.concatenate([positions, walls.reshape(-1, 2)])
     low, high = np.nanmin(positions, axis=0), np.nanmax(positions, axis=0)
     room = 0.2 * (high - low) + 2 * max((body.radius or 0.0 for body in content.tracks.bodies), default=0.0)
     for world in content.worlds[:2]:

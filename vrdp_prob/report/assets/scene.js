@@ -53,11 +53,22 @@ class Scene {
     const context = this.context(this.canvas);
     const frame = film && this.film && this.view.showsFilm ? this.film.frame(time) : null;
     this.view.backdrop(context, this.colors, this.size, this.floor, frame);
+    this.drawWalls(context);
     if (paths) this.drawPaths(context, world);
     const centres = this.drawBodies(context, world, time, frame);
     this.drawFlashes(context, world, time);
     if (measured) this.drawMeasured(context, time);
     this.drawTags(context, centres);
+  }
+
+  drawWalls(context) {
+    context.strokeStyle = this.colors.ink;
+    context.lineWidth = 2;
+    for (const ends of this.data.walls) {
+      context.beginPath();
+      for (const [x, y] of ends) context.lineTo(...this.view.point(x, y, 0));
+      context.stroke();
+    }
   }
 
   /* Whole paths change only with world, view and size: they are kept as a picture. */

@@ -1,0 +1,89 @@
+"""Where bodies lie still: between two contacts a body that stopped stays where it is, until something hits it.
+
+Without this, the speed of a resting body is only known to be small; with it, it is zero.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+from scipy.special import expit, logsumexp
+
+from vrdp_prob.reasoning.smoother import Smoother
+
+SLOW = 0.5
+"""A body may have stopped at a time when its speed in m/s is estimated below this."""
+
+CANDIDATE_SPACING = 0.08
+SHORTEST_REST = 0.12
+"""Spacing in s of the times at which a body may have stopped, and the shortest rest that is looked for."""
+
+PRIOR_LOG_ODDS = -6.0
+"""Log odds of a rest before its evidence, which compares with speeds of metres per second: most doubtful bodies are
+slow, not fast."""
+
+CERTAIN = 7.0
+"""Log odds beyond which a rest is taken for certain."""
+
+
+@dataclass(frozen=True)
+class Rest:
+    """A stretch of time in which a body may lie still.
+
+    Parameters
+    ----------
+    start, stop
+        From when to when, in s.
+    probability
+        That it does.
+    """
+
+    start: float
+    stop: float
+    probability: float
+
+
+def possible_rests(smoother: Smoother, *, until: float) -> tuple[Rest, ...]:
+    """Rests of a body before the end of the video (s), at most one between two contacts."""
+    first, last = float(smoother.track.times[0]), min(float(smoother.track.times[-1]), until)
+    bounds = [first, *(kick for kick in smoother.kicks if first < kick < last), last]
+    rests = [_rest(smoother, start, stop) for start, stop in zip(bounds[:-1], bounds[1:], strict=True)]
+    return tuple(rest for rest in rests if rest is not None)
+
+
+def draw_motion(
+    smoother: Smoother,
+    rests: tuple[Rest, ...],
+    times: Float[np.ndarray, "time"],
+    draws: int,
+    generator: np.random.Generator,
+) -> tuple[Float[np.ndarray, "draw time 2"], Float[np.ndarray, "draw time 2"]]:
+    """Draws of positions (m) and velocities (m/s) of a body, each draw lying still in those rests that it has."""
+    chance = np.array([rest.probability for rest in rests])
+    has_rest = generator.random((draws, len(rests))) < chance
+    positions, velocities = np.empty((draws, len(times), 2)), np.empty((draws, len(times), 2))
+    for pattern in np.unique(has_rest, axis=0):
+        own = np.flatnonzero((has_rest == pattern).all(axis=1))
+        chosen = tuple((rest.start, rest.stop) for rest, taken in zip(rests, pattern, strict=True) if taken)
+        positions[own], velocities[own] = smoother.with_rests(chosen).draw_states(times, len(own), generator)
+    return positions, velocities
+
+
+def _rest(smoother: Smoother, start: float, stop: float) -> Rest | None:
+    margin = 1e-3
+    times = np.arange(start + margin, stop - SHORTEST_REST, CANDIDATE_SPACING)
+    if not len(times):
+        return None
+    speed = np.linalg.norm(smoother.state(times)[1], axis=1)
+    slow = np.append(np.linalg.norm(smoother.state(np.array([stop - margin]))[1], axis=1) < 2 * SLOW, True)
+    if not slow.all():
+        return None
+    candidates = times[speed < SLOW]
+    if not len(candidates):
+        return None
+    evidence = np.array([smoother.rest_evidence(float(time), stop - margin) for time in candidates])
+    log_odds = float(logsumexp(evidence) - np.log(len(candidates))) + PRIOR_LOG_ODDS
+    if log_odds < -CERTAIN:
+        return None
+    best = float(candidates[evidence.argmax()])
+    return Rest(best, stop - margin, 1.0 if log_odds > CERTAIN else float(expit(log_odds)))

@@ -1,0 +1,171 @@
+"""Every parameter once: name, unit, support, transform, prior and default."""
+
+import math
+from dataclasses import dataclass
+from enum import StrEnum
+
+import numpy as np
+import torch
+from jaxtyping import Float
+from torch import Tensor
+
+from vrdp_prob.errors import InputError
+
+GRAVITY = 9.81
+"""Gravitational acceleration in m/s^2."""
+
+
+class Scope(StrEnum):
+    """What has one value of a parameter each."""
+
+    SHARED = "shared"
+    """One value per video."""
+    BODY = "body"
+    """One value per body."""
+
+
+class Transform(StrEnum):
+    """Map from a parameter to the coordinate in which it is inferred."""
+
+    LOG = "log"
+    """The logarithm of the parameter; the parameter is positive."""
+    IDENTITY = "identity"
+    """The parameter itself."""
+
+
+@dataclass(frozen=True)
+class Prior:
+    """A normal distribution of the inferred coordinate, optionally with a soft upper edge.
+
+    Parameters
+    ----------
+    mean, sd
+        Mean and standard deviation of the normal distribution.
+    upper
+        Coordinate above which values become implausible, None where there is no such edge.
+    softness
+        Width of that edge: the density falls by a factor e per `softness` above it.
+    """
+
+    mean: float
+    sd: float
+    upper: float | None = None
+    softness: float = 0.02
+
+    def __post_init__(self) -> None:
+        if not (math.isfinite(self.mean) and math.isfinite(self.sd) and self.sd > 0 and self.softness > 0):
+            raise InputError(f"prior: mean {self.mean:g} and sd {self.sd:g} must be finite numbers and sd positive.")
+
+    def log_density(self, coordinate: Float[Tensor, "..."]) -> Float[Tensor, "..."]:
+        """Log density of the coordinate, up to the constant that the soft edge adds."""
+        standard = (coordinate - self.mean) / self.sd
+        density = -0.5 * standard**2 - math.log(self.sd) - 0.5 * math.log(2 * math.pi)
+        if self.upper is None:
+            return density
+        return density + torch.nn.functional.logsigmoid((self.upper - coordinate) / self.softness)
+
+    def sample(self, generator: np.random.Generator, shape: tuple[int, ...]) -> Float[np.ndarray, "..."]:
+        """Draws of the coordinate (by rejection where there is an edge)."""
+        draws = generator.normal(self.mean, self.sd, shape)
+        if self.upper is None:
+            return np.asarray(draws)
+        while True:
+            keep = 1 / (1 + np.exp(np.clip((draws - self.upper) / self.softness, -700, 700)))
+            rejected = generator.random(shape) > keep
+            if not rejected.any():
+                return np.asarray(draws)
+            accepted = generator.normal(self.mean, self.sd, shape)
+            draws = np.where(rejected, accepted, draws)
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One number that the model needs.
+
+    Parameters
+    ----------
+    name
+        Name in words, unique in the model.
+    unit
+        Unit, `1` where it has none.
+    description
+        One sentence that a person can read.
+    transform
+        Map to the coordinate in which the parameter is inferred.
+    prior
+        Distribution of that coordinate.
+    default
+        Value where nothing is known of the parameter.
+    scope
+        Whether there is one value per video or per body.
+    """
+
+    name: str
+    unit: str
+    description: str
+    transform: Transform
+    prior: Prior
+    default: float
+    scope: Scope = Scope.SHARED
+
+    def __post_init__(self) -> None:
+        if not math.isfinite(self.default) or (self.transform is Transform.LOG and self.default <= 0):
+            raise InputError(f"parameter {self.name}: the default {self.default:g} is outside its support.")
+
+    @property
+    def support(self) -> tuple[float, float]:
+        """Open interval of values the parameter can take."""
+        return (0.0 if self.transform is Transform.LOG else -math.inf, math.inf)
+
+    def to_coordinate(self, value: Float[Tensor, "..."]) -> Float[Tensor, "..."]:
+        """Coordinate in which a value is inferred."""
+        return torch.log(value) if self.transform is Transform.LOG else value
+
+    def from_coordinate(self, coordinate: Float[Tensor, "..."]) -> Float[Tensor, "..."]:
+        """Value that belongs to a coordinate."""
+        return torch.exp(coordinate) if self.transform is Transform.LOG else coordinate
+
+    @property
+    def default_coordinate(self) -> float:
+        """Coordinate of the default value."""
+        return math.log(self.default) if self.transform is Transform.LOG else self.default
+
+
+def _log_parameter(
+    name: str, unit: str, description: str, *, median: float, log_sd: float, scope: Scope = Scope.SHARED
+) -> Parameter:
+    prior = Prior(math.log(median), log_sd)
+    return Parameter(name, unit, description, Transform.LOG, prior, default=median, scope=scope)
+
+
+MASS = _log_parameter("mass", "kg", "mass of a body", median=1.0, log_sd=0.7, scope=Scope.BODY)
+RESTITUTION = Parameter(
+    "restitution",
+    "1",
+    "restitution factor of a body; the coefficient of a pair is the product of both factors",
+    Transform.LOG,
+    # The soft edge replaces a wall at 1: the posterior stays smooth in the log, where the ridges are straight.
+    Prior(math.log(0.8), 0.35, upper=0.0),
+    default=0.8,
+    scope=Scope.BODY,
+)
+WALL_RESTITUTION = Parameter(
+    "wall_restitution",
+    "1",
+    "restitution factor of a wall",
+    Transform.LOG,
+    Prior(math.log(0.8), 0.35, upper=0.0),
+    default=0.8,
+)
+SLIDING_FRICTION = _log_parameter(
+    "sliding_friction", "1", "friction coefficient of sliding cubes and cylinders", median=0.1, log_sd=1.0
+)
+ROLLING_RESISTANCE = _log_parameter(
+    "rolling_resistance", "1", "resistance coefficient of rolling spheres", median=0.03, log_sd=1.0
+)
+AIR_DRAG = _log_parameter("air_drag", "1/m", "deceleration by the air per squared speed", median=0.02, log_sd=1.0)
+ANGULAR_DRAG = _log_parameter(
+    "angular_drag", "rad/s^2", "rate at which a body's spin about the vertical decays", median=1.0, log_sd=1.0
+)
+BODY_PARAMETERS = (MASS, RESTITUTION)
+"""Parameters that every model has per body."""

@@ -1,0 +1,106 @@
+"""From worlds to the arrays of the compiled kernel, by tensor operations that carry gradients."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+from jaxtyping import Bool, Float, Int
+from torch import Tensor
+
+from vrdp_prob.errors import InputError
+from vrdp_prob.models.simulator.laws import CONSTANTS, Layout
+from vrdp_prob.models.simulator.worlds import Worlds
+from vrdp_prob.scene import Shape
+
+DISC, SQUARE, WALL = 0, 1, 2
+
+
+@dataclass(frozen=True)
+class KernelArrays:
+    """Arrays of the kernel; walls are bodies that cannot move, after all others.
+
+    Parameters
+    ----------
+    shape, fixed
+        Outline of each body (0 disc, 1 square, 2 wall) and whether it cannot move.
+    present
+        Whether a body is there at all.
+    bodies, shared, start, release
+        Constants of the bodies, parameters of the worlds, states at release, and release times in s.
+    """
+
+    shape: Int[np.ndarray, "all"]
+    fixed: Bool[np.ndarray, "all"]
+    present: Bool[np.ndarray, "world all"]
+    bodies: Float[Tensor, "world all constant"]
+    shared: Float[Tensor, "world parameter"]
+    start: Float[Tensor, "world all 6"]
+    release: Float[Tensor, "world all"]
+
+
+def kernel_arrays(worlds: Worlds, layout: Layout, first_time: float) -> KernelArrays:
+    """Arrays of a batch.
+
+    Raises
+    ------
+    InputError
+        If a parameter of the model is missing.
+    """
+    missing = [name for name in (*layout.shared, *layout.constants[len(CONSTANTS) :]) if name not in worlds.parameters]
+    if missing:
+        raise InputError(f"worlds: the model needs the parameter {missing[0]}; add it to 'parameters'.")
+    walls = worlds.walls.to(torch.float64)
+    shape = np.array([DISC if s.is_disc else SQUARE for s in worlds.shapes] + [WALL] * len(walls), dtype=np.int64)
+    count = len(worlds.shapes)
+    wall_present = np.ones((len(worlds), len(walls)), dtype=bool)
+    earliest = worlds.release_time.detach().min(dim=1, keepdim=True).values.clamp(max=first_time)
+    shared = [worlds.parameters[name].to(torch.float64) for name in layout.shared]
+    return KernelArrays(
+        shape=shape,
+        fixed=np.arange(len(shape)) >= count,
+        present=np.concatenate([worlds.present.cpu().numpy(), wall_present], axis=1),
+        bodies=torch.cat([_body_constants(worlds, layout), _wall_constants(worlds, walls, layout)], dim=1),
+        shared=torch.stack(shared, dim=-1) if shared else torch.zeros(len(worlds), 0, dtype=torch.float64),
+        start=torch.cat([_body_states(worlds), _wall_states(walls, len(worlds))], dim=1),
+        release=torch.cat([worlds.release_time.to(torch.float64), earliest.expand(-1, len(walls))], dim=1),
+    )
+
+
+def _body_constants(worlds: Worlds, layout: Layout) -> Float[Tensor, "world body constant"]:
+    mass = worlds.mass.to(torch.float64)
+    sphere = torch.tensor([shape is Shape.SPHERE for shape in worlds.shapes], dtype=torch.float64)
+    columns = [
+        mass,
+        1 / mass,
+        1 / worlds.moment_of_inertia.to(torch.float64),
+        worlds.restitution.to(torch.float64),
+        worlds.radius.to(torch.float64),
+        sphere.expand_as(mass),
+        *(worlds.parameters[name].to(torch.float64) for name in layout.constants[len(CONSTANTS) :]),
+    ]
+    return torch.stack(columns, dim=-1)
+
+
+def _body_states(worlds: Worlds) -> Float[Tensor, "world body 6"]:
+    parts = [worlds.position, worlds.angle[..., None], worlds.velocity, worlds.spin[..., None]]
+    return torch.cat([part.to(torch.float64) for part in parts], dim=-1)
+
+
+def _wall_constants(
+    worlds: Worlds, walls: Float[Tensor, "wall 4"], layout: Layout
+) -> Float[Tensor, "world wall constant"]:
+    half_length = (walls[:, 2:] - walls[:, :2]).norm(dim=-1) / 2
+    constants = torch.zeros(len(worlds), len(walls), len(layout.constants), dtype=torch.float64)
+    constants[..., CONSTANTS.index("mass")] = 1.0
+    columns = list(constants.unbind(-1))
+    columns[CONSTANTS.index("restitution")] = worlds.restitution_of_walls.to(torch.float64)
+    columns[CONSTANTS.index("radius")] = half_length.expand(len(worlds), -1)
+    return torch.stack(columns, dim=-1)
+
+
+def _wall_states(walls: Float[Tensor, "wall 4"], count: int) -> Float[Tensor, "world wall 6"]:
+    middle = (walls[:, 2:] + walls[:, :2]) / 2
+    along = walls[:, 2:] - walls[:, :2]
+    angle = torch.atan2(along[:, 1], along[:, 0])
+    still = torch.zeros(len(walls), 3, dtype=torch.float64)
+    return torch.cat([middle, angle[:, None], still], dim=-1).expand(count, -1, -1)

@@ -1,0 +1,171 @@
+"""Contact geometry and impulse as laws: how far two features are apart, and what happens when they meet.
+
+Every meeting is between a point of one body and a point or a line of another. A disc is its centre with a radius around
+it, a corner is a point without radius, a side of a square and a wall are lines. `a` is the owner of the line.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import TYPE_CHECKING
+
+from vrdp_prob.models.effects.effect import BodyView, ContactView
+from vrdp_prob.models.simulator.formula import Scalar
+from vrdp_prob.models.simulator.mathematics import cos, length, sin
+
+if TYPE_CHECKING:
+    from vrdp_prob.models.effects.effect import Effect
+
+
+class ContactKind(IntEnum):
+    """What meets what."""
+
+    POINT_POINT = 0
+    LINE_POINT = 1
+
+
+@dataclass(frozen=True)
+class Feature:
+    """A feature of a body, in the body's frame and in units of its radius.
+
+    Parameters
+    ----------
+    x, y
+        Offset of the point from the centre; for a line its outward unit normal.
+    extent
+        Radius around the point; for a line its distance from the centre.
+    """
+
+    x: Scalar
+    y: Scalar
+    extent: Scalar
+
+
+@dataclass(frozen=True)
+class ContactGeometry:
+    """Signed distance in m, unit normal from a to b, and the touching point in m."""
+
+    gap: Scalar
+    normal: tuple[Scalar, Scalar]
+    point: tuple[Scalar, Scalar]
+
+
+def _rotated(angle: Scalar, x: Scalar, y: Scalar) -> tuple[Scalar, Scalar]:
+    return cos(angle) * x - sin(angle) * y, sin(angle) * x + cos(angle) * y
+
+
+def contact_geometry(kind: ContactKind, a: BodyView, b: BodyView, of_a: Feature, of_b: Feature) -> ContactGeometry:
+    """Distance, normal and touching point of two features."""
+    offset_b = _rotated(b.angle, of_b.x * b.radius, of_b.y * b.radius)
+    point_b = (b.x + offset_b[0], b.y + offset_b[1])
+    if kind is ContactKind.LINE_POINT:
+        normal = _rotated(a.angle, of_a.x, of_a.y)
+        distance = normal[0] * (point_b[0] - a.x) + normal[1] * (point_b[1] - a.y)
+    else:
+        offset_a = _rotated(a.angle, of_a.x * a.radius, of_a.y * a.radius)
+        between = (point_b[0] - a.x - offset_a[0], point_b[1] - a.y - offset_a[1])
+        distance = length(*between)
+        normal = (between[0] / distance, between[1] / distance)
+    round_b = of_b.extent * b.radius
+    point = (point_b[0] - round_b * normal[0], point_b[1] - round_b * normal[1])
+    return ContactGeometry(distance - of_a.extent * a.radius - round_b, normal, point)
+
+
+@dataclass(frozen=True)
+class ContactResult:
+    """Velocities (vx, vy, spin) of both bodies after a contact, the impulse along the normal and the closing speed."""
+
+    a: tuple[Scalar, Scalar, Scalar]
+    b: tuple[Scalar, Scalar, Scalar]
+    normal_impulse: Scalar
+    closing_speed: Scalar
+    geometry: ContactGeometry
+
+
+class _Arms:
+    """Velocity differences and effective inverse masses at the touching point of two bodies."""
+
+    def __init__(self, a: BodyView, b: BodyView, point: tuple[Scalar, Scalar]) -> None:
+        self.a, self.b = a, b
+        self.arm_a = (point[0] - a.x, point[1] - a.y)
+        self.arm_b = (point[0] - b.x, point[1] - b.y)
+
+    def lever(self, direction: tuple[Scalar, Scalar]) -> tuple[Scalar, Scalar]:
+        """Moment arms of a unit force at the touching point on both bodies."""
+        ax, ay = self.arm_a
+        bx, by = self.arm_b
+        return ax * direction[1] - ay * direction[0], bx * direction[1] - by * direction[0]
+
+    def relative_speed(self, direction: tuple[Scalar, Scalar]) -> Scalar:
+        """Speed of b's touching point relative to a's along a direction."""
+        a, b = self.a, self.b
+        lever_a, lever_b = self.lever(direction)
+        return direction[0] * (b.vx - a.vx) + direction[1] * (b.vy - a.vy) + lever_b * b.spin - lever_a * a.spin
+
+    def inverse_mass(self, along: tuple[Scalar, Scalar], across: tuple[Scalar, Scalar] | None = None) -> Scalar:
+        """Change of the relative speed along one direction per impulse along another (or the same)."""
+        a, b = self.a, self.b
+        lever_a, lever_b = self.lever(along)
+        other_a, other_b = self.lever(across) if across else (lever_a, lever_b)
+        turning = lever_a * other_a * a.inverse_inertia + lever_b * other_b * b.inverse_inertia
+        return turning if across else a.inverse_mass + b.inverse_mass + turning
+
+    def after(
+        self, direction: tuple[Scalar, Scalar], impulse: Scalar
+    ) -> tuple[tuple[Scalar, Scalar, Scalar], tuple[Scalar, Scalar, Scalar]]:
+        """Changes of (vx, vy, spin) of both bodies by an impulse on b (and its opposite on a)."""
+        a, b = self.a, self.b
+        lever_a, lever_b = self.lever(direction)
+        x, y = direction
+        change_a = (
+            -a.inverse_mass * impulse * x,
+            -a.inverse_mass * impulse * y,
+            -a.inverse_inertia * lever_a * impulse,
+        )
+        change_b = (b.inverse_mass * impulse * x, b.inverse_mass * impulse * y, b.inverse_inertia * lever_b * impulse)
+        return change_a, change_b
+
+
+def contact(
+    kind: ContactKind,
+    effects: "Sequence[Effect]",
+    a: BodyView,
+    b: BodyView,
+    of_a: Feature,
+    of_b: Feature,
+    parameters: Mapping[str, Scalar],
+) -> ContactResult:
+    """What a contact does: a normal impulse with restitution, then the tangential impulses that effects add.
+
+    Momentum and angular momentum are kept, because one impulse acts on both bodies at one point. Source: J. K. Hahn,
+    Realistic animation of rigid bodies, SIGGRAPH 1988 (impact with the effective mass at the touching point).
+    """
+    geometry = contact_geometry(kind, a, b, of_a, of_b)
+    normal = geometry.normal
+    tangent = (-normal[1], normal[0])
+    arms = _Arms(a, b, geometry.point)
+    closing = -arms.relative_speed(normal)
+    restitution: Scalar = 0.0
+    for effect in effects:
+        restitution = effect.restitution(closing, restitution, a, b, parameters)
+    impulse = (1 + restitution) * closing / arms.inverse_mass(normal)
+    change_a, change_b = arms.after(normal, impulse)
+    sliding = arms.relative_speed(tangent)
+    view = ContactView(
+        closing_speed=closing,
+        normal_impulse=impulse,
+        tangential_speed=sliding,
+        tangential_speed_after_normal=sliding + impulse * arms.inverse_mass(normal, tangent),
+        tangential_inverse_mass=arms.inverse_mass(tangent),
+    )
+    across: Scalar = 0.0
+    for effect in effects:
+        across = across + effect.tangential_impulse(view, a, b, parameters)
+    more_a, more_b = arms.after(tangent, across)
+    return ContactResult(
+        a=(a.vx + change_a[0] + more_a[0], a.vy + change_a[1] + more_a[1], a.spin + change_a[2] + more_a[2]),
+        b=(b.vx + change_b[0] + more_b[0], b.vy + change_b[1] + more_b[1], b.spin + change_b[2] + more_b[2]),
+        normal_impulse=impulse,
+        closing_speed=closing,
+        geometry=geometry,
+    )

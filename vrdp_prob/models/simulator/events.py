@@ -1,0 +1,107 @@
+"""The events of simulated worlds as a table."""
+
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import NamedTuple
+
+import numpy as np
+from jaxtyping import Float, Int
+
+
+class RolloutEventKind(IntEnum):
+    """What happened."""
+
+    COLLISION = 0
+    WALL = 1
+    STOP = 2
+    SPIN_STOP = 3
+
+
+class Tapes(NamedTuple):
+    """Joined records of a batch, as the kernel writes them (see `tape_kernel.py`)."""
+
+    integers: Int[np.ndarray, "row integer"]
+    numbers: Float[np.ndarray, "row number"]
+    first_row: Int[np.ndarray, "world_and_one"]
+
+
+_STOP, _SPIN_STOP, _CONTACT = 3, 4, 5
+
+
+@dataclass(frozen=True)
+class EventTable:
+    """Events in the order of worlds and, within a world, of time.
+
+    Parameters
+    ----------
+    world
+        World of each event.
+    time
+        Time in s.
+    kind
+        A `RolloutEventKind`.
+    first, second
+        Bodies that take part (`first` < `second`); for a wall `second` is the wall's number, for a stop it is -1.
+    point
+        Touching point in m (0 for a stop).
+    normal
+        Unit vector from the first to the second (0 for a stop).
+    impulse
+        Impulse along the normal in kg m/s (0 for a stop).
+    closing_speed
+        Speed in m/s at which the touching points approached each other (0 for a stop).
+    """
+
+    world: Int[np.ndarray, "event"]
+    time: Float[np.ndarray, "event"]
+    kind: Int[np.ndarray, "event"]
+    first: Int[np.ndarray, "event"]
+    second: Int[np.ndarray, "event"]
+    point: Float[np.ndarray, "event 2"]
+    normal: Float[np.ndarray, "event 2"]
+    impulse: Float[np.ndarray, "event"]
+    closing_speed: Float[np.ndarray, "event"]
+
+    def __len__(self) -> int:
+        return len(self.time)
+
+    def of_world(self, world: int) -> "EventTable":
+        """The events of one world."""
+        return self.where(self.world == world)
+
+    def of_kind(self, kind: RolloutEventKind) -> "EventTable":
+        """The events of one kind."""
+        return self.where(self.kind == kind)
+
+    def where(self, keep: np.ndarray) -> "EventTable":
+        """Some of the events, by a boolean or index array with the axis `event`."""
+        return EventTable(*(getattr(self, name)[keep] for name in self.__dataclass_fields__))
+
+    @classmethod
+    def of(cls, tapes: Tapes, body_count: int) -> "EventTable":
+        """The events that the kernel recorded; bodies from `body_count` on are walls."""
+        kinds = tapes.integers[:, 0]
+        rows = np.flatnonzero(np.isin(kinds, (_STOP, _SPIN_STOP, _CONTACT)))
+        kinds, numbers = kinds[rows], tapes.numbers[rows]
+        contact = kinds == _CONTACT
+        first, second = tapes.integers[rows, 1], tapes.integers[rows, 2]
+        swap = contact & (first > second)
+        first, second = np.where(swap, second, first), np.where(swap, first, second)
+        wall = contact & (second >= body_count)
+        kind = np.select(
+            [wall, contact, kinds == _STOP],
+            [RolloutEventKind.WALL, RolloutEventKind.COLLISION, RolloutEventKind.STOP],
+            RolloutEventKind.SPIN_STOP,
+        )
+        numbers = np.where(contact[:, None], numbers, np.eye(1, numbers.shape[1]) * numbers)
+        return cls(
+            world=np.searchsorted(tapes.first_row, rows, side="right") - 1,
+            time=numbers[:, 0],
+            kind=kind.astype(np.int64),
+            first=first,
+            second=np.where(wall, second - body_count, second),
+            point=numbers[:, 9:11],
+            normal=np.where(swap[:, None], -1.0, 1.0) * numbers[:, 11:13],
+            impulse=numbers[:, 8],
+            closing_speed=numbers[:, 7],
+        )

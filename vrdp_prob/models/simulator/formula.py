@@ -1,0 +1,253 @@
+"""A physical law is written once, as a plain function of numbers; this module turns it into compiled source.
+
+A law calls the mathematics of `vrdp_prob.models.simulator.mathematics` and the ordinary operators. Called with numbers
+or tensors it computes. Called with the symbols of this module it is recorded, and `value_source` and `vjp_source` write
+the recorded steps down as straight-line Python (common steps once): the law's value, and its vector-Jacobian product
+(reverse-mode derivative; A. Griewank and A. Walther, Evaluating Derivatives, 2nd ed. 2008, section 3.2).
+"""
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+Scalar = Any
+"""A number in a law: float, tensor or `Symbol`."""
+
+_COMPARISONS = frozenset({"<", "<=", ">", ">="})
+_INFIX = frozenset({"+", "-", "*", "/"}) | _COMPARISONS
+_TINY = "1e-300"
+
+
+class Symbol:
+    """A recorded step of a law (or an input, or a constant); made by a `Recorder`."""
+
+    __slots__ = ("arguments", "number", "operation", "recorder", "value")
+
+    def __init__(
+        self, recorder: "Recorder", number: int, operation: str, arguments: tuple["Symbol", ...], value: object
+    ) -> None:
+        self.recorder, self.number = recorder, number
+        self.operation, self.arguments, self.value = operation, arguments, value
+
+    @property
+    def constant(self) -> float | None:
+        """The number where the symbol is a constant, else None."""
+        return self.value if isinstance(self.value, float) else None
+
+    def __add__(self, other: Scalar) -> "Symbol":
+        return self.recorder.step("+", self, other)
+
+    def __radd__(self, other: Scalar) -> "Symbol":
+        return self.recorder.step("+", other, self)
+
+    def __sub__(self, other: Scalar) -> "Symbol":
+        return self.recorder.step("-", self, other)
+
+    def __rsub__(self, other: Scalar) -> "Symbol":
+        return self.recorder.step("-", other, self)
+
+    def __mul__(self, other: Scalar) -> "Symbol":
+        return self.recorder.step("*", self, other)
+
+    def __rmul__(self, other: Scalar) -> "Symbol":
+        return self.recorder.step("*", other, self)
+
+    def __truediv__(self, other: Scalar) -> "Symbol":
+        return self.recorder.step("/", self, other)
+
+    def __rtruediv__(self, other: Scalar) -> "Symbol":
+        return self.recorder.step("/", other, self)
+
+    def __pow__(self, exponent: Scalar) -> "Symbol":
+        return self.recorder.step("pow", self, exponent)
+
+    def __neg__(self) -> "Symbol":
+        return self.recorder.step("neg", self)
+
+    def __lt__(self, other: Scalar) -> "Symbol":
+        return self.recorder.step("<", self, other)
+
+    def __le__(self, other: Scalar) -> "Symbol":
+        return self.recorder.step("<=", self, other)
+
+    def __gt__(self, other: Scalar) -> "Symbol":
+        return self.recorder.step(">", self, other)
+
+    def __ge__(self, other: Scalar) -> "Symbol":
+        return self.recorder.step(">=", self, other)
+
+    def __bool__(self) -> bool:
+        raise TypeError("a law cannot branch on its inputs with 'if'; use mathematics.where instead.")
+
+
+class Recorder:
+    """Records the steps of a law, equal steps once."""
+
+    def __init__(self) -> None:
+        self._steps: dict[tuple[object, ...], Symbol] = {}
+
+    def input(self, text: str) -> Symbol:
+        """An input whose value the compiled source reads from the expression `text`."""
+        return self._intern("input", (), text)
+
+    def constant(self, value: float) -> Symbol:
+        """A constant."""
+        return self._intern("constant", (), float(value))
+
+    def step(self, operation: str, *operands: Scalar) -> Symbol:
+        """The result of an operation, simplified where a constant makes that possible."""
+        arguments = tuple(item if isinstance(item, Symbol) else self.constant(item) for item in operands)
+        simple = self._simplified(operation, arguments)
+        if simple is not None:
+            return simple
+        if operation in "+*" and arguments[0].number > arguments[1].number:
+            arguments = (arguments[1], arguments[0])
+        return self._intern(operation, arguments, None)
+
+    def _intern(self, operation: str, arguments: tuple[Symbol, ...], value: object) -> Symbol:
+        key = (operation, value, *(argument.number for argument in arguments))
+        if key not in self._steps:
+            self._steps[key] = Symbol(self, len(self._steps), operation, arguments, value)
+        return self._steps[key]
+
+    def _simplified(self, operation: str, arguments: tuple[Symbol, ...]) -> Symbol | None:
+        if operation == "neg":
+            inner = arguments[0]
+            if inner.operation == "neg":
+                return inner.arguments[0]
+            return None if inner.constant is None else self.constant(-inner.constant)
+        if operation == "where":
+            return arguments[1] if arguments[1] is arguments[2] else None
+        if operation not in _INFIX - _COMPARISONS:
+            return None
+        left, right = arguments
+        a, b = left.constant, right.constant
+        if a is not None and b is not None and not (operation == "/" and b == 0):
+            return self.constant({"+": a + b, "-": a - b, "*": a * b, "/": a / b if b else 0.0}[operation])
+        if operation == "+":
+            return right if a == 0 else left if b == 0 else None
+        if operation == "-":
+            return -right if a == 0 else left if b == 0 else self.constant(0) if left is right else None
+        if operation == "*":
+            if 0 in (a, b):
+                return self.constant(0)
+            return right if a == 1 else left if b == 1 else -right if a == -1 else -left if b == -1 else None
+        return left if b == 1 else self.constant(0) if a == 0 else None
+
+
+def _ordered(outputs: Iterable[Symbol]) -> list[Symbol]:
+    """Steps that the outputs need, arguments first."""
+    order: list[Symbol] = []
+    seen: set[int] = set()
+    stack = [(output, False) for output in reversed(list(outputs))]
+    while stack:
+        symbol, expanded = stack.pop()
+        if expanded:
+            order.append(symbol)
+        elif symbol.number not in seen:
+            seen.add(symbol.number)
+            stack.append((symbol, True))
+            stack.extend((argument, False) for argument in reversed(symbol.arguments))
+    return order
+
+
+def _partials(symbol: Symbol, bar: Symbol) -> tuple[Scalar, ...]:
+    """Adjoints of the arguments of one step from the adjoint of its result."""
+    operation, arguments = symbol.operation, symbol.arguments
+    first = arguments[0]
+    second = arguments[1] if len(arguments) > 1 else first
+    step = symbol.recorder.step
+    match operation:
+        case "+":
+            return bar, bar
+        case "-":
+            return bar, -bar
+        case "*":
+            return bar * second, bar * first
+        case "/":
+            return bar / second, -(bar * symbol) / second
+        case "neg":
+            return (-bar,)
+        case "sqrt":
+            return (bar * 0.5 / step("max", symbol, float(_TINY)),)
+        case "sin":
+            return (bar * step("cos", first),)
+        case "cos":
+            return (-(bar * step("sin", first)),)
+        case "exp":
+            return (bar * symbol,)
+        case "log":
+            return (bar / first,)
+        case "tanh":
+            return (bar * (1 - symbol * symbol),)
+        case "abs":
+            return (step("where", first < 0, -bar, bar),)
+        case "atan2":
+            square = first * first + second * second
+            return bar * second / square, -(bar * first) / square
+        case "pow":
+            exponent = bar * symbol * step("log", step("max", first, float(_TINY)))
+            return bar * second * first ** (second - 1), exponent
+        case "max":
+            return step("where", first < second, 0.0, bar), step("where", first < second, bar, 0.0)
+        case "min":
+            return step("where", second < first, 0.0, bar), step("where", second < first, bar, 0.0)
+        case "where":
+            return 0.0, step("where", first, bar, 0.0), step("where", first, 0.0, bar)
+    raise NotImplementedError(f"no derivative is known for the operation '{operation}'")
+
+
+def vector_jacobian(outputs: Sequence[Scalar], bars: Sequence[Symbol], inputs: Sequence[Symbol]) -> list[Symbol]:
+    """Adjoints of the inputs of a recorded law from adjoints (`bars`) of its outputs."""
+    recorder = inputs[0].recorder
+    adjoint: dict[int, Symbol] = {}
+    symbols = [output if isinstance(output, Symbol) else recorder.constant(output) for output in outputs]
+    for output, bar in zip(symbols, bars, strict=True):
+        adjoint[output.number] = adjoint.get(output.number, recorder.constant(0)) + bar
+    for symbol in reversed(_ordered(symbols)):
+        bar = adjoint.get(symbol.number, recorder.constant(0))
+        if bar.constant == 0 or not symbol.arguments or symbol.operation in _COMPARISONS:
+            continue
+        for argument, part in zip(symbol.arguments, _partials(symbol, bar), strict=True):
+            adjoint[argument.number] = adjoint.get(argument.number, recorder.constant(0)) + part
+    return [adjoint.get(symbol.number, recorder.constant(0)) for symbol in inputs]
+
+
+def assignments(outputs: Mapping[str, Scalar], *, add: bool = False) -> list[str]:
+    """Source lines that compute the outputs and assign them (or add them) to the given targets.
+
+    Outputs that are the constant 0 are left out where they would be added.
+    """
+    wanted = {target: value for target, value in outputs.items() if not (add and _is_zero(value))}
+    names: dict[int, str] = {}
+    lines = []
+    for symbol in _ordered(value for value in wanted.values() if isinstance(value, Symbol)):
+        if symbol.operation == "constant":
+            names[symbol.number] = repr(symbol.value)
+        else:
+            names[symbol.number] = f"v{len(names)}"
+            lines.append(f"{names[symbol.number]} = {_expression(symbol, names)}")
+    sign = "+=" if add else "="
+    for target, value in wanted.items():
+        text = names[value.number] if isinstance(value, Symbol) else repr(float(value))
+        lines.append(f"{target} {sign} {text}")
+    return lines
+
+
+def _is_zero(value: Scalar) -> bool:
+    return (value.constant if isinstance(value, Symbol) else value) == 0
+
+
+def _expression(symbol: Symbol, names: Mapping[int, str]) -> str:
+    parts = [names[argument.number] for argument in symbol.arguments]
+    operation = symbol.operation
+    if operation == "input":
+        return str(symbol.value)
+    if operation in _INFIX:
+        return f"({parts[0]}) {operation} ({parts[1]})"
+    if operation == "neg":
+        return f"-({parts[0]})"
+    if operation == "where":
+        return f"({parts[1]}) if ({parts[0]}) else ({parts[2]})"
+    if operation in ("min", "max", "abs"):
+        return f"{operation}({', '.join(parts)})"
+    return f"math.{operation}({', '.join(parts)})"

@@ -1,0 +1,171 @@
+"""The laws of a model as compiled source: every hook is recorded once and written down with its derivative."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+from vrdp_prob.models.effects.effect import BodyView, Effect
+from vrdp_prob.models.parameters import Parameter, Scope
+from vrdp_prob.models.simulator.contact import ContactKind, Feature, contact
+from vrdp_prob.models.simulator.formula import Recorder, Scalar, Symbol, assignments, vector_jacobian
+from vrdp_prob.models.simulator.mathematics import length, where
+from vrdp_prob.models.simulator.motion import (
+    Phase,
+    derivative,
+    external_acceleration,
+    friction_limit,
+    spin_deceleration,
+)
+
+STATE = ("x", "y", "angle", "vx", "vy", "spin")
+CONSTANTS = ("mass", "inverse_mass", "inverse_inertia", "restitution", "radius", "is_sphere")
+"""Constants of a body that every model has, in the order of the kernel's array."""
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Order of the numbers in the kernel's arrays.
+
+    Parameters
+    ----------
+    constants
+        Constants of a body.
+    shared
+        Parameters of a video.
+    """
+
+    constants: tuple[str, ...]
+    shared: tuple[str, ...]
+
+    @classmethod
+    def of(cls, parameters: Sequence[Parameter]) -> "Layout":
+        """Layout for the parameters of a model."""
+        own = tuple(parameter.name for parameter in parameters if parameter.scope is Scope.BODY)
+        shared = tuple(parameter.name for parameter in parameters if parameter.scope is Scope.SHARED)
+        return cls(CONSTANTS + own, shared)
+
+
+class _Inputs:
+    """Symbols for the arrays of a compiled law."""
+
+    def __init__(self, layout: Layout) -> None:
+        self.layout = layout
+        self.recorder = Recorder()
+        self.shared = {name: self.recorder.input(f"shared[{i}]") for i, name in enumerate(layout.shared)}
+
+    def array(self, text: str, size: int) -> list[Symbol]:
+        return [self.recorder.input(f"{text}[{index}]") for index in range(size)]
+
+    def view(
+        self, state: Sequence[Symbol], constants: Sequence[Symbol], reference: tuple[Scalar, Scalar] | None = None
+    ) -> BodyView:
+        values = dict(zip(STATE, state, strict=True))
+        speed = length(values["vx"], values["vy"])
+        if reference is not None:
+            along = values["vx"] * reference[0] + values["vy"] * reference[1]
+            speed = where(along < 0, -1.0, 1.0) * speed
+        named = dict(zip(self.layout.constants, constants, strict=True))
+        own = {name: named.pop(name) for name in self.layout.constants[len(CONSTANTS) :]}
+        return BodyView(**values, speed=speed, **named, parameters=own)
+
+
+def _function(name: str, arguments: str, lines: Sequence[str], ending: str = "") -> str:
+    body = [*lines, ending] if ending else [*lines]
+    return "\n".join(["@compiled", f"def {name}({arguments}):", *(f"    {line}" for line in body), "\n"])
+
+
+def _targets(name: str, values: Sequence[Scalar]) -> dict[str, Scalar]:
+    return {f"{name}[{index}]": value for index, value in enumerate(values)}
+
+
+def _motion_source(effects: Sequence[Effect], layout: Layout) -> str:
+    inputs = _Inputs(layout)
+    time = inputs.recorder.input("t")
+    state, constants = inputs.array("y", len(STATE)), inputs.array("body", len(layout.constants))
+    phase = inputs.array("phase", 4)
+    body = inputs.view(state, constants, (phase[1], phase[2]))
+    outputs = derivative(effects, time, body, Phase(phase[0], phase[3]), inputs.shared)
+    arguments = "t, y, phase, body, shared"
+    value = _function("motion", f"{arguments}, out", assignments(_targets("out", outputs)))
+    shared = list(inputs.shared.values())
+    adjoints = vector_jacobian(outputs, inputs.array("bar", len(STATE)), [*state, *constants, *shared, time])
+    split = len(state), len(state) + len(constants)
+    lines = assignments(
+        {
+            **_targets("y_bar", adjoints[: split[0]]),
+            **_targets("body_bar", adjoints[split[0] : split[1]]),
+            **_targets("shared_bar", adjoints[split[1] : -1]),
+            "t_bar[0]": adjoints[-1],
+        },
+        add=True,
+    )
+    return value + _function("motion_vjp", f"{arguments}, bar, y_bar, body_bar, shared_bar, t_bar", lines or ["pass"])
+
+
+def _external_source(effects: Sequence[Effect], layout: Layout) -> str:
+    inputs = _Inputs(layout)
+    time = inputs.recorder.input("t")
+    body = inputs.view(inputs.array("y", len(STATE)), inputs.array("body", len(layout.constants)))
+    push = external_acceleration(effects, time, body, inputs.shared)
+    limit = friction_limit(effects, time, body, inputs.shared)
+    braking = spin_deceleration(effects, time, body, inputs.shared)
+    lines = assignments(_targets("out", [*push, limit, braking]))
+    return _function("external", "t, y, phase, body, shared, out", lines)
+
+
+def _contact_source(kind: ContactKind, effects: Sequence[Effect], layout: Layout) -> str:
+    inputs = _Inputs(layout)
+    state_a, state_b = inputs.array("ya", len(STATE)), inputs.array("yb", len(STATE))
+    constants_a = inputs.array("body_a", len(layout.constants))
+    constants_b = inputs.array("body_b", len(layout.constants))
+    feature = inputs.array("feature", 6)
+    a, b = inputs.view(state_a, constants_a), inputs.view(state_b, constants_b)
+    result = contact(kind, effects, a, b, Feature(*feature[:3]), Feature(*feature[3:]), inputs.shared)
+    geometry = result.geometry
+    more = [result.closing_speed, result.normal_impulse, *geometry.point, *geometry.normal, geometry.gap]
+    arguments = "ya, yb, body_a, body_b, feature, shared"
+    name = kind.name.lower()
+    value = _function(name, f"{arguments}, out", assignments(_targets("out", [*result.a, *result.b, *more])))
+    bars = inputs.array("bar", 7)
+    wanted = [*state_a, *state_b, *constants_a, *constants_b, *inputs.shared.values()]
+    adjoints = vector_jacobian([*result.a, *result.b, geometry.gap], bars, wanted)
+    targets: dict[str, Scalar] = {}
+    at = 0
+    for target, size in (
+        ("ya_bar", len(STATE)),
+        ("yb_bar", len(STATE)),
+        ("body_a_bar", len(layout.constants)),
+        ("body_b_bar", len(layout.constants)),
+        ("shared_bar", len(layout.shared)),
+    ):
+        targets |= _targets(target, adjoints[at : at + size])
+        at += size
+    bar_arguments = "bar, ya_bar, yb_bar, body_a_bar, body_b_bar, shared_bar"
+    return value + _function(f"{name}_vjp", f"{arguments}, {bar_arguments}", assignments(targets, add=True))
+
+
+def _choice_source(suffix: str, arguments: str) -> str:
+    kinds = [kind.name.lower() for kind in ContactKind]
+    lines = [
+        f"if kind == {int(ContactKind.LINE_POINT)}:",
+        f"    {kinds[1]}{suffix}({arguments})",
+        "else:",
+        f"    {kinds[0]}{suffix}({arguments})",
+    ]
+    return _function(f"contact_law{suffix}", f"kind, {arguments}", lines)
+
+
+def law_sources(effects: Sequence[Effect], layout: Layout) -> Mapping[str, str]:
+    """Source of the compiled laws by name of a part: `forward` is needed to simulate, all for the derivative."""
+    makers: dict[str, Callable[[], str]] = {
+        "motion": lambda: _motion_source(effects, layout),
+        "external": lambda: _external_source(effects, layout),
+        "contact": lambda: "".join(_contact_source(kind, effects, layout) for kind in ContactKind),
+        "choice": lambda: (
+            _choice_source("", "ya, yb, body_a, body_b, feature, shared, out")
+            + _choice_source(
+                "_vjp",
+                "ya, yb, body_a, body_b, feature, shared, bar, ya_bar, yb_bar, body_a_bar, body_b_bar, shared_bar",
+            )
+        ),
+    }
+    return {name: maker() for name, maker in makers.items()}

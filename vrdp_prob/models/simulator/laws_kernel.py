@@ -1,0 +1,53 @@
+"""Signatures of the compiled laws of a model; the generated functions take their place when the kernel is assembled.
+
+Arrays: `y` is a body's state (x, y, angle, vx, vy, spin), `phase` is (moving, reference x, reference y, spin sense),
+`body` holds its constants and `shared` the parameters of the video. A function ending in `_vjp` adds the vector-Jacobian
+product with `bar` to the arrays ending in `_bar`.
+"""
+
+from typing import Any
+
+from numba import njit
+
+compiled = njit(nogil=True, error_model="numpy")
+"""How kernels are compiled: without the interpreter's lock; a division by zero gives inf or NaN, as in numpy."""
+STATE_SIZE = 6
+"""Numbers in a body's state."""
+GROUP_SIZE = 1
+"""Bodies that move together: 1, or all of them where an effect couples their motion."""
+
+
+def motion(t: Any, y: Any, phase: Any, body: Any, shared: Any, out: Any) -> None:
+    """Time derivative of a body's state."""
+
+
+def motion_vjp(
+    t: Any, y: Any, phase: Any, body: Any, shared: Any, bar: Any, y_bar: Any, body_bar: Any, shared_bar: Any, t_bar: Any
+) -> None:
+    """Derivative of `motion`."""
+
+
+def external(t: Any, y: Any, phase: Any, body: Any, shared: Any, out: Any) -> None:
+    """Acceleration without dry friction (2 numbers), what dry friction can hold, and the deceleration of the spin."""
+
+
+def contact_law(kind: Any, ya: Any, yb: Any, body_a: Any, body_b: Any, feature: Any, shared: Any, out: Any) -> None:
+    """(vx, vy, spin) of both after a contact, closing speed, impulse, point (2), normal (2) and gap."""
+
+
+def contact_law_vjp(
+    kind: Any,
+    ya: Any,
+    yb: Any,
+    body_a: Any,
+    body_b: Any,
+    feature: Any,
+    shared: Any,
+    bar: Any,
+    ya_bar: Any,
+    yb_bar: Any,
+    body_a_bar: Any,
+    body_b_bar: Any,
+    shared_bar: Any,
+) -> None:
+    """Derivative of the velocities after a contact (6) and of the gap."""

@@ -1,0 +1,85 @@
+"""From a model to compiled code: assemble generated laws and kernels into one module and import it from a cache."""
+
+import hashlib
+import importlib.util
+import os
+import re
+import sys
+import tempfile
+from collections.abc import Sequence
+from functools import cache
+from importlib import resources
+from pathlib import Path
+from types import ModuleType
+
+import numba
+from platformdirs import user_cache_dir
+
+from vrdp_prob.files import write_atomically
+from vrdp_prob.models.effects.effect import Effect
+from vrdp_prob.models.simulator import tableau
+from vrdp_prob.models.simulator.laws import STATE, Layout, law_sources
+
+CACHE_VARIABLE = "VRDP_PROB_CACHE"
+"""Environment variable that names another folder for compiled kernels."""
+
+_KERNELS = ("motion", "detection", "search", "tape", "rollout", "adjoint", "batch")
+_HEADER = '"""Assembled by vrdp_prob.models.simulator.source; do not edit."""\n\n'
+
+
+def _without_imports(source: str) -> str:
+    """Kernel source without the imports of other kernels, whose text stands before it."""
+    return re.sub(r"^from vrdp_prob\.[\w.]+ import (\([^)]*\)|[^\n]*)\n", "", source, flags=re.MULTILINE)
+
+
+def assemble(effects: Sequence[Effect], layout: Layout) -> str:
+    """Source of the module that simulates a model."""
+    folder = resources.files("vrdp_prob.models.simulator")
+    parts = [
+        _HEADER,
+        "import math\nfrom typing import NamedTuple\n\nimport numpy as np\nfrom numba import njit\n\n",
+        'compiled = njit(nogil=True, error_model="numpy")\n',
+        f"STATE_SIZE, GROUP_SIZE = {len(STATE)}, 1\n",
+        f"CONSTANTS_SIZE, SHARED_SIZE = {len(layout.constants)}, {len(layout.shared)}\n",
+        *(
+            f"{name} = np.array({getattr(tableau, name).tolist()!r})\n"
+            for name in ("DENSE", "ERRORS", "NODES", "WEIGHTS")
+        ),
+        *law_sources(effects, layout).values(),
+    ]
+    for name in _KERNELS:
+        file = folder / f"{name}_kernel.py"
+        if file.is_file():
+            parts.append(_without_imports(file.read_text(encoding="utf-8")))
+    return "\n".join(parts)
+
+
+def cache_folder() -> Path:
+    """Folder of the compiled kernels: the user's cache, or a temporary one where that cannot be written."""
+    chosen = os.environ.get(CACHE_VARIABLE)
+    folder = Path(chosen) if chosen else Path(user_cache_dir("vrdp-prob")) / "kernels"
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=folder):
+            return folder
+    except OSError:
+        return Path(tempfile.mkdtemp(prefix="vrdp-prob-"))
+
+
+@cache
+def load(effects: tuple[Effect, ...], layout: Layout) -> ModuleType:
+    """Import the kernel of a model, compiled once per machine, version of numba and set of effects."""
+    text = assemble(effects, layout)
+    digest = hashlib.sha256((text + numba.__version__).encode()).hexdigest()[:16]
+    name = f"vrdp_prob_kernel_{digest}"
+    path = cache_folder() / f"{name}.py"
+    if not path.is_file():
+        with write_atomically(path) as temporary:
+            temporary.write_text(text, encoding="utf-8")
+    specification = importlib.util.spec_from_file_location(name, path)
+    if specification is None or specification.loader is None:
+        raise ImportError(f"{path}: the kernel cannot be imported.")
+    module = importlib.util.module_from_spec(specification)
+    sys.modules[name] = module
+    specification.loader.exec_module(module)
+    return module

@@ -29,7 +29,7 @@ _LEAST_VISIBLE = 0.1
 """Share of an object's picture that must show for it to count as seen."""
 _LEAST_ODDS = 1.0
 """Mean log odds per visible pixel below which the object is not there."""
-_FAINT_ODDS = 0.3
+_FAINT_ODDS = 0.0
 _FAINT_SUPPORT = 0.7
 """Where the colours say little (a gray object in its own shadow's colour), so much of the outline must lie on edges."""
 _LEARN_VISIBLE = 0.5
@@ -191,10 +191,20 @@ class Placer:
         self, evidence: Evidence, solid: Solid, pose: Pose, covered: UInt8[np.ndarray, "height width"]
     ) -> ContourFit | None:
         """Fit the outline where nothing nearer hides it."""
+        return self.refine_picture(evidence.picture, solid, pose, covered)
+
+    def refine_picture(
+        self,
+        picture: UInt8[np.ndarray, "height width 3"],
+        solid: Solid,
+        pose: Pose,
+        covered: UInt8[np.ndarray, "height width"],
+    ) -> ContourFit | None:
+        """Fit the outline in a bare picture where nothing nearer hides it."""
         size = apparent_radius(self.camera, solid, pose)
         halves = tuple(max(_SHORTEST_PROFILE, share * size) for share in _PROFILES)
         blocked = cv2.dilate(covered, np.ones((2 * _COVER_MARGIN + 1,) * 2, np.uint8)) if covered.any() else None
-        return fit_contour(evidence.picture, self.camera, solid, pose, halves=halves, covered=blocked)
+        return fit_contour(picture, self.camera, solid, pose, halves=halves, covered=blocked)
 
     def visibility(self, solid: Solid, pose: Pose, covered: UInt8[np.ndarray, "height width"]) -> tuple[float, float]:
         """Shares of the solid's picture that show, and that lie in the frame behind something nearer."""

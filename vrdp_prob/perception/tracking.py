@@ -21,6 +21,8 @@ _SHAPE_EVERY = 8
 """Frames between looks at a track's shape after the first few."""
 _SHAPE_FIRST = 4
 _SHAPE_VISIBLE = 0.9
+"""Share of an object's picture that must show for its shape to be judged; for the very first look less will do."""
+_SHAPE_FIRST_VISIBLE = 0.5
 _YAWS = tuple(np.radians((0.0, 30.0, 60.0)))
 _SHAPE_STEPS = (0.2, 0.1, 0.05)
 _REUNION_DISTANCE = 1.0
@@ -100,8 +102,10 @@ class Tracker:
         sightings = self.placer.place(evidence, live, starts)
         for track in live:
             track.sightings.pop(frame, None)
-            if sightings[track.number].seen:
-                track.sightings[frame] = sightings[track.number]
+            sighting = sightings[track.number]
+            if sighting.seen:
+                track.sightings[frame] = sighting
+                self.placer.learn(evidence, track, sighting, self.covered(track, live, sightings))
 
     def _starts(self, track: Track, frame: int, direction: int) -> list[Pose]:
         predicted = track.predict(frame, direction)
@@ -145,7 +149,8 @@ class Tracker:
         """Compare the shapes in a frame that shows the object whole; take the best so far."""
         due = track.shape_frames < _SHAPE_FIRST or len(track.sightings) % _SHAPE_EVERY == 0
         sighting = sightings[track.number]
-        if not due or sighting.visible < _SHAPE_VISIBLE:
+        enough = _SHAPE_VISIBLE if track.shape_frames > 0 else _SHAPE_FIRST_VISIBLE
+        if not due or sighting.visible < enough:
             return
         covered = self.covered(track, live, sightings)
         behind = [

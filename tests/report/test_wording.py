@@ -71,7 +71,7 @@ def test_percent_errors():
         (Summary(1.0234, 0.1, 0.8765, 1.1912), ("1.02", "0.88 to 1.19")),
         (Summary(3.2, 2.0, 0.4, 9.87), ("3.2", "0.4 to 9.9")),
         (Summary(0.031, 0.0004, 0.0302, 0.0318), ("0.031", "0.030 to 0.032")),
-        (Summary(1.0, 0.0, 1.0, 1.0), ("1.00", "1.00 to 1.00")),
+        (Summary(1.0, 0.0, 1.0, 1.0), ("1.00", "held fixed")),
     ],
 )
 def test_numbers_are_rounded_to_what_the_interval_supports(interval, words):

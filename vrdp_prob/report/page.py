@@ -10,7 +10,7 @@ from markupsafe import Markup
 
 from vrdp_prob.inference.summaries import PairSummary, ParameterSummary, Summary
 from vrdp_prob.reasoning.answer import Answer
-from vrdp_prob.report.content import AnswerContent, ReportContent, WorldKind
+from vrdp_prob.report.content import AnswerContent, Footage, ReportContent, WorldKind
 from vrdp_prob.report.figures import FIGURE_DRAWS, log_axis, still_figure, unit_axis
 from vrdp_prob.report.footage import still_uri
 from vrdp_prob.report.payload import player_data
@@ -79,7 +79,7 @@ def _objects(content: ReportContent) -> list[dict[str, Any]]:
 
 
 def _opening(content: ReportContent) -> dict[str, Any]:
-    footage = content.footage
+    footage = _seen_by_camera(content)
     draws = max((min(world.draws, FIGURE_DRAWS) for world in content.worlds[:2]), default=0)
     future = content.world(WorldKind.FUTURE)
     caption = f"The frame at {seconds(footage.time)}. " if footage is not None else "The plane from above. "
@@ -102,8 +102,13 @@ def _opening(content: ReportContent) -> dict[str, Any]:
     }
 
 
+def _seen_by_camera(content: ReportContent) -> Footage | None:
+    """The footage where the camera says what is where in it."""
+    return content.footage if content.tracks.camera is not None else None
+
+
 def _player(content: ReportContent) -> dict[str, Any]:
-    shown = content.footage if content.tracks.camera is not None else None
+    shown = _seen_by_camera(content)
     return {
         "has_worlds": bool(content.worlds),
         "has_film": shown is not None,
@@ -229,7 +234,7 @@ def _pair_row(pair: PairSummary, objects: dict[str, dict[str, Any]], between: st
 
 def _row(objects: list[dict[str, Any]], interval: Summary) -> dict[str, Any]:
     mean, span = interval_words(interval)
-    label = f"{listed(item['name'] for item in objects)}: {mean}, 90 % interval {span}"
+    label = f"{listed(item['name'] for item in objects)}: {mean}, 90 % interval: {span}"
     return {"objects": objects, "interval": interval, "mean": mean, "range": span, "label": label}
 
 

@@ -122,8 +122,10 @@ def decimals(interval: Summary) -> int:
 
 
 def interval_words(interval: Summary) -> tuple[str, str]:
-    """The mean, and the 90 % interval, rounded to what the interval supports."""
+    """The mean, and the 90 % interval, rounded to what the interval supports; a value without spread was held fixed."""
     places = min(decimals(interval), 2) if interval.mean >= 0.1 else decimals(interval)
+    if interval.q05 == interval.q95:
+        return f"{interval.mean:.{places}f}", "held fixed"
     return f"{interval.mean:.{places}f}", f"{interval.q05:.{places}f} to {interval.q95:.{places}f}"
 
 

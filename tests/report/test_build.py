@@ -1,0 +1,139 @@
+"""From a posterior to a report."""
+
+import json
+
+import jsonschema
+import numpy as np
+import pytest
+import torch
+import xarray as xr
+from example_content import RADIUS, make_tracks
+
+from vrdp_prob.inference.identifiability import BodyStatus, ParameterStatus, Status
+from vrdp_prob.inference.infer import infer
+from vrdp_prob.inference.posterior import Posterior
+from vrdp_prob.inference.samples import Convergence
+from vrdp_prob.models.parameters import MASS, RESTITUTION
+from vrdp_prob.models.physics import PhysicsModel
+from vrdp_prob.models.simulator.worlds import Worlds
+from vrdp_prob.reasoning.answer import Answer
+from vrdp_prob.report import build, schema, write_report
+from vrdp_prob.scene import Camera, QuestionType, Tracks
+
+CYLINDER, SPHERE = 2, 3
+FRAMES = slice(27, 100)
+
+
+def make_pair() -> Tracks:
+    """The cylinder and the sphere of the example, which collide, for three seconds."""
+    whole = make_tracks(Camera.clevrer())
+    bodies = [CYLINDER, SPHERE]
+    return Tracks.from_arrays(
+        whole.video,
+        tuple(whole.bodies[index] for index in bodies),
+        whole.times[FRAMES],
+        whole.positions[FRAMES][:, bodies],
+        camera=whole.camera,
+    )
+
+
+class HandMade(Posterior):
+    """A posterior whose worlds are written down: the sphere rolls into the cylinder."""
+
+    def worlds(self, count=None, *, generator=None) -> Worlds:
+        draws = count or 4
+        spread = torch.linspace(-0.1, 0.1, draws, dtype=torch.float64)
+        both = torch.ones(draws, 2, dtype=torch.float64)
+        velocity = torch.tensor([[0.0, 0.0], [-2.09, 0.54]]).double().expand(draws, 2, 2).clone()
+        velocity[:, 1] *= 1 + 0.1 * spread[:, None]
+        shared = {p.name: p.default * both[:, 0] for p in self.model.parameters}
+        return Worlds(
+            shapes=tuple(body.shape for body in self.tracks.bodies),
+            position=torch.tensor([[-0.15, -0.30], [2.94, -1.02]]).double().expand(draws, 2, 2),
+            velocity=velocity,
+            angle=0 * both,
+            spin=0 * both,
+            release_time=1.08 * both,
+            mass=both * (1 + spread[:, None]),
+            restitution=0.8 * both,
+            radius=RADIUS * both,
+            present=both > 0,
+            parameters=shared,
+        )
+
+
+def hand_made() -> Posterior:
+    random = np.random.default_rng(0)
+    axes = ("chain", "draw", "body")
+    draws = {name: (axes, 1 + 0.1 * random.random((2, 20, 2))) for name in (MASS.name, RESTITUTION.name)}
+    ratio, product = ParameterStatus(Status.RATIO_ONLY, ("3",)), ParameterStatus(Status.PRODUCT_ONLY, ("3",))
+    return HandMade(
+        tracks=make_pair(),
+        model=PhysicsModel.base(),
+        seed=7,
+        data=xr.DataTree.from_dict({"posterior": xr.Dataset(draws)}),
+        status={body: BodyStatus(ratio, product) for body in ("2", "3")},
+        convergence=Convergence("emcee", True, 1.004, 900.0, None, None, 0.0),
+        warnings=("A limit.",),
+        pairs=(("2", "3"),),
+    )
+
+
+QUESTION = Answer(
+    0, "Which of the following will happen without the sphere?", QuestionType.COUNTERFACTUAL, (), 1.0, 0.0, 0.0, {}
+)
+
+
+@pytest.fixture(scope="module")
+def content():
+    frames = np.full((128, 320, 480, 3), 120, dtype=np.uint8)
+    return build(hand_made(), [QUESTION], frames=frames, draws=12)
+
+
+def test_worlds_of_the_player(content):
+    keys = [world.key for world in content.worlds]
+    assert keys == ["factual", "future", "removed:2", "removed:3", "heavier:2", "heavier:3", "lighter:2", "lighter:3"]
+    factual, future, without = content.worlds[:3]
+    assert factual.draws == 12
+    assert future.times[-1] == pytest.approx(factual.times[-1] + 2.32)
+    assert not without.exists[:, :, 0].any()
+    assert len(without.collisions.time) == 0
+
+
+def test_heavier_bodies_are_moved_less(content):
+    worlds = {world.key: world for world in content.worlds}
+    moved = {
+        key: np.abs(worlds[key].trajectory[:, -1, 0, 0] + 0.15).mean() for key in ("heavier:2", "factual", "lighter:2")
+    }
+    assert moved["heavier:2"] < moved["factual"] < moved["lighter:2"]
+
+
+def test_collision_of_the_pair_is_found(content):
+    shown = content.worlds[0].collisions
+    assert sorted(shown.draw) == list(range(12))
+    assert (shown.bodies == [0, 1]).all()
+    assert ((shown.time > 2.0) & (shown.time < 2.8)).all()
+
+
+def test_question_is_about_its_world(content):
+    assert [item.world for item in content.answers] == ["removed:3"]
+
+
+def test_report_is_written(content, tmp_path):
+    files = write_report(content, tmp_path)
+    document = json.loads(files.document.read_text(encoding="utf-8"))
+    jsonschema.validate(document, schema("report"))
+    assert document["seed"] == 7
+    assert document["objects"][0]["mass"]["status"] == "ratio_only"
+    assert document["objects"][0]["mass"]["with"] == ["3"]
+    assert "the gray cylinder with the cyan sphere" in files.page.read_text(encoding="utf-8")
+
+
+@pytest.mark.slow
+def test_report_of_an_inference(tmp_path):
+    posterior = infer(make_pair(), sampler="laplace", draws=60)
+    content = build(posterior, [QUESTION], draws=12)
+    error = content.worlds[0].trajectory[..., :2] - content.tracks.positions
+    assert np.nanmedian(np.abs(error)) < 0.05
+    document = json.loads(write_report(content, tmp_path).document.read_text(encoding="utf-8"))
+    jsonschema.validate(document, schema("report"))

@@ -14,6 +14,7 @@ FRAME = 0.04
 RADIUS = 0.2
 DRAWS = 30
 IDS = ("0", "1", "2", "3", "4")
+PAIRS = np.array([(a, b) for a in range(len(IDS)) for b in range(a + 1, len(IDS))])
 BODIES = (
     Body("0", Shape.CUBE, RADIUS, color="cyan", material="metal"),
     Body("1", Shape.CUBE, RADIUS, color="purple", material="rubber"),
@@ -97,21 +98,25 @@ def roll(draws: Draws, frames: int, kind: WorldKind, body: str | None = None) ->
 
 def _bounce(draws: Draws, now: Moment, events: dict) -> None:
     position, velocity, mass, spin, out = now.position, now.velocity, now.mass, now.spin, now.out
-    for a in range(len(IDS)):
-        for b in range(a + 1, len(IDS)):
-            apart = position[:, b] - position[:, a]
-            distance = np.linalg.norm(apart, axis=-1, keepdims=True)
-            normal = apart / np.maximum(distance, 1e-9)
-            closing = ((velocity[:, a] - velocity[:, b]) * normal).sum(axis=-1)
-            hit = (distance[:, 0] < 2 * RADIUS) & (closing > 0) & out[:, a] & out[:, b]
-            factor = 1 + draws.bounce[:, a] * draws.bounce[:, b]
-            impulse = np.where(hit, factor * closing / (1 / mass[:, a] + 1 / mass[:, b]), 0.0)[:, None] * normal
-            velocity[:, a] -= impulse / mass[:, a, None]
-            velocity[:, b] += impulse / mass[:, b, None]
-            for draw in np.flatnonzero(hit):
-                spin[draw, [a, b]] += [0.8, -0.8]
-                point = (position[draw, a] + position[draw, b]) / 2
-                events.setdefault((int(draw), a, b), (now.time, point))
+    for a, b in PAIRS[_touching(position)]:
+        apart = position[:, b] - position[:, a]
+        distance = np.linalg.norm(apart, axis=-1, keepdims=True)
+        normal = apart / np.maximum(distance, 1e-9)
+        closing = ((velocity[:, a] - velocity[:, b]) * normal).sum(axis=-1)
+        hit = (distance[:, 0] < 2 * RADIUS) & (closing > 0) & out[:, a] & out[:, b]
+        factor = 1 + draws.bounce[:, a] * draws.bounce[:, b]
+        impulse = np.where(hit, factor * closing / (1 / mass[:, a] + 1 / mass[:, b]), 0.0)[:, None] * normal
+        velocity[:, a] -= impulse / mass[:, a, None]
+        velocity[:, b] += impulse / mass[:, b, None]
+        for draw in np.flatnonzero(hit):
+            spin[draw, [a, b]] += [0.8, -0.8]
+            point = (position[draw, a] + position[draw, b]) / 2
+            events.setdefault((int(draw), int(a), int(b)), (now.time, point))
+
+
+def _touching(position: np.ndarray) -> np.ndarray:
+    apart = position[:, PAIRS[:, 0]] - position[:, PAIRS[:, 1]]
+    return ((apart**2).sum(axis=-1) < (2 * RADIUS) ** 2).any(axis=0)
 
 
 def _table(events) -> Collisions:

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 import torch
-from jaxtyping import UInt8
+from jaxtyping import Float, UInt8
 
 from vrdp_prob import __version__
 from vrdp_prob.inference.posterior import Posterior
@@ -19,6 +19,9 @@ from vrdp_prob.report.rollouts import world_content
 
 PLAYER_DRAWS = 30
 """Posterior draws that the player shows."""
+
+MOST_FRAMES = 500
+"""Most moments of a world that travel inside the page; longer recordings are thinned."""
 
 FUTURE_SECONDS = 58 / 25
 """How long after the last frame the future is shown: the 58 frames that CLEVRER's predictive questions ask about."""
@@ -65,8 +68,8 @@ def build(
 def player_worlds(posterior: Posterior, draws: int = PLAYER_DRAWS) -> tuple[WorldContent, ...]:
     """The video, its future, and the video with each body removed, heavier and lighter, for some posterior draws."""
     worlds = posterior.worlds(draws)
-    frame = 1 / posterior.tracks.frame_rate
-    seen = posterior.tracks.times
+    seen = _thinned(posterior.tracks.times)
+    frame = float(np.median(np.diff(seen)))
     after = seen[-1] + frame * np.arange(1, round(FUTURE_SECONDS / frame) + 1)
     shown = [
         _shown(posterior, worlds, seen, WorldKind.FACTUAL),
@@ -76,6 +79,12 @@ def player_worlds(posterior: Posterior, draws: int = PLAYER_DRAWS) -> tuple[Worl
         for index, body in enumerate(posterior.tracks.bodies):
             shown.append(_shown(posterior, _changed(worlds, kind, index), seen, kind, body.id))
     return tuple(world for world in shown if world is not None)
+
+
+def _thinned(times: Float[np.ndarray, "time"]) -> Float[np.ndarray, "kept"]:
+    """Evenly chosen times, the first and the last among them."""
+    count = min(len(times), MOST_FRAMES)
+    return times[np.linspace(0, len(times) - 1, count).round().astype(int)]
 
 
 def _changed(worlds: Worlds, kind: WorldKind, body: int) -> Worlds:

@@ -1,1 +1,21 @@
 """How we learn: MAP, Laplace draws, emcee, NUTS, identifiability, the posterior."""
+
+from vrdp_prob.inference.identifiability import BodyStatus, ParameterStatus, Status
+from vrdp_prob.inference.infer import SamplerName, infer
+from vrdp_prob.inference.posterior import Posterior
+from vrdp_prob.inference.samples import Convergence
+from vrdp_prob.inference.summaries import ObjectSummary, PairSummary, ParameterSummary, Summary
+
+__all__ = [
+    "BodyStatus",
+    "Convergence",
+    "ObjectSummary",
+    "PairSummary",
+    "ParameterStatus",
+    "ParameterSummary",
+    "Posterior",
+    "SamplerName",
+    "Status",
+    "Summary",
+    "infer",
+]

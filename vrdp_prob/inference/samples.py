@@ -1,8 +1,7 @@
 """What a sampler is given and what it hands back, and how far the result can be trusted."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Protocol
 
 import numpy as np
 import torch
@@ -16,10 +15,8 @@ PARETO_K_GOAL = 0.7
 """Above it importance weights have no usable variance (Vehtari et al., Pareto smoothed importance sampling, 2024)."""
 
 
-class LogDensity(Protocol):
-    """Log density (nats, up to a constant) of a batch of points; differentiable, -inf where there is no support."""
-
-    def __call__(self, points: Float[Tensor, "point dimension"]) -> Float[Tensor, "point"]: ...
+LogDensity = Callable[[Float[Tensor, "point dimension"]], Float[Tensor, "point"]]
+"""Log density (nats, up to a constant) of a batch of points; differentiable, -inf where there is no support."""
 
 
 @dataclass(frozen=True)

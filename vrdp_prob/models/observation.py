@@ -90,11 +90,16 @@ class Observations:
         return residuals
 
 
+def prior_noise(tracks: Tracks) -> float:
+    """Prior median of the position noise in m, from the size of the bodies."""
+    radii = [body.radius for body in tracks.bodies if body.radius is not None]
+    return NOISE_SHARE_OF_RADIUS * float(np.median(radii)) if radii else NOISE_WITHOUT_RADIUS
+
+
 def _whitening(
     tracks: Tracks, frame: Int[np.ndarray, "observation"], body: Int[np.ndarray, "observation"]
 ) -> tuple[Float[np.ndarray, "observation 2 2"], float]:
-    radii = [candidate.radius for candidate in tracks.bodies if candidate.radius is not None]
-    reference = NOISE_SHARE_OF_RADIUS * float(np.median(radii)) if radii else NOISE_WITHOUT_RADIUS
+    reference = prior_noise(tracks)
     covariance = tracks.position_covariance
     whitening = np.tile(np.eye(2) / reference, (len(frame), 1, 1))
     if covariance is None:
@@ -106,7 +111,7 @@ def _whitening(
     variance = np.trace(seen[known], axis1=-2, axis2=-1) / 2
     reference = float(np.sqrt(np.median(variance)))
     if not reference > 0:
-        return whitening, NOISE_WITHOUT_RADIUS
+        return whitening, prior_noise(tracks)
     floor = (SMALLEST_SHARE * reference) ** 2
     values, vectors = np.linalg.eigh(seen[known])
     scale = 1 / np.sqrt(np.maximum(values, floor))

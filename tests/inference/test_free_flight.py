@@ -1,0 +1,39 @@
+import numpy as np
+import pytest
+
+from tests.inference.generator import Scene, observe
+from vrdp_prob.inference.free_flight import noise_scale, release_fit, seen_contacts
+from vrdp_prob.scene import Shape
+
+
+def head_on(noise: float = 0.005, dropout: float = 0.0) -> tuple[Scene, object]:
+    scene = Scene(
+        (Shape.CYLINDER, Shape.CYLINDER),
+        np.array([[-1.5, 0.0], [0.5, 0.05]]),
+        np.array([[1.8, 0.0], [0.0, 0.0]]),
+        np.array([1.6, 0.8]),
+        np.array([0.9, 0.8]),
+        np.full(2, 0.2),
+        np.full(2, 0.4),
+    )
+    return scene, observe(scene, noise=noise, dropout=dropout, frames=70, seed=1)
+
+
+@pytest.mark.parametrize("noise", [0.001, 0.01, 0.03])
+def test_noise_is_found_without_a_model(noise: float) -> None:
+    _, tracks = head_on(noise)
+    assert noise_scale(tracks) == pytest.approx(noise, rel=0.2)
+
+
+def test_a_contact_gives_mass_ratio_and_restitution() -> None:
+    scene, tracks = head_on(noise=0.002, dropout=0.05)
+    (contact,) = seen_contacts(tracks, noise_scale(tracks))
+    assert contact.time == pytest.approx(scene.contacts[0][0], abs=0.03)
+    assert contact.mass_ratio == pytest.approx(2.0, rel=0.15)
+    assert contact.restitution == pytest.approx(0.72, abs=0.12)
+
+
+def test_release_velocity_comes_from_before_the_contact() -> None:
+    scene, tracks = head_on()
+    fit = release_fit(tracks, 0, 0.005, until=scene.contacts[0][0])
+    assert np.abs(fit.velocity - [1.8, 0.0]).max() < 4 * fit.velocity_sd

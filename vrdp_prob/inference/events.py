@@ -1,0 +1,26 @@
+"""Which pairs meet in a rollout, and in which order."""
+
+from vrdp_prob.models.simulator.events import RolloutEventKind
+from vrdp_prob.models.simulator.rollout import Rollout
+
+Pairs = tuple[tuple[int, int], ...]
+
+
+def first_contacts(rollout: Rollout, world: int) -> Pairs:
+    """Pairs of bodies that collide in a world, in the order of their first contact."""
+    return collision_sequences(rollout)[world]
+
+
+def collision_sequences(rollout: Rollout) -> list[Pairs]:
+    """For every world its colliding pairs in the order of their first contact."""
+    found: list[dict[tuple[int, int], None]] = [{} for _ in range(len(rollout.outcome))]
+    events = rollout.events.of_kind(RolloutEventKind.COLLISION)
+    for world, first, second in zip(events.world.tolist(), events.first.tolist(), events.second.tolist(), strict=True):
+        found[world][first, second] = None
+    return [tuple(pairs) for pairs in found]
+
+
+def wall_contacts(rollout: Rollout, world: int) -> Pairs:
+    """Pairs of a body and a wall that meet in a world."""
+    events = rollout.events.of_world(world).of_kind(RolloutEventKind.WALL)
+    return tuple(sorted(set(zip(events.first.tolist(), events.second.tolist(), strict=True))))

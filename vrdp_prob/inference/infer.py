@@ -1,0 +1,166 @@
+"""From tracks to posterior: the most probable values first, then a sampler that sets out from them."""
+
+from typing import Literal, get_args
+
+import numpy as np
+import torch
+import xarray as xr
+from jaxtyping import Float
+
+from vrdp_prob.errors import InputError
+from vrdp_prob.inference.draws import named_draws
+from vrdp_prob.inference.emcee_sampler import sample_emcee
+from vrdp_prob.inference.events import collision_sequences, first_contacts, wall_contacts
+from vrdp_prob.inference.identifiability import BodyStatus, Status, identifiability
+from vrdp_prob.inference.laplace import sample_laplace
+from vrdp_prob.inference.map_fit import MapFit, fit_map
+from vrdp_prob.inference.nuts_sampler import sample_nuts
+from vrdp_prob.inference.posterior import Posterior
+from vrdp_prob.inference.samples import Convergence, Samples, assess
+from vrdp_prob.models.physics import PhysicsModel
+from vrdp_prob.progress import ProgressDisplay
+from vrdp_prob.scene import Tracks
+
+SamplerName = Literal["nuts", "emcee", "laplace"]
+PRIOR_DRAWS = 500
+BATCH = 500
+"""Worlds simulated at once when the draws are looked at again."""
+
+
+def infer(
+    tracks: Tracks,
+    *,
+    sampler: SamplerName = "emcee",
+    model: PhysicsModel | None = None,
+    seed: int = 0,
+    draws: int = 1000,
+    progress: ProgressDisplay | None = None,
+) -> Posterior:
+    """Infer masses, restitutions and motion from the tracks of one video.
+
+    Parameters
+    ----------
+    tracks
+        What was seen.
+    sampler
+        `emcee` (ensembles of walkers), `nuts` (Hamiltonian, with gradients) or `laplace` (fast: a Gaussian around the
+        MAP, corrected by importance sampling).
+    model
+        The physics; the base model where None.
+    seed
+        Seed of all randomness: the same seed gives the same posterior.
+    draws
+        Number of draws to keep.
+    progress
+        Told how far the work is.
+
+    Returns
+    -------
+    The posterior; its warnings say what limits it.
+
+    Raises
+    ------
+    InputError
+        If the sampler is unknown or fewer than 4 draws are asked for.
+    """
+    if sampler not in get_args(SamplerName):
+        raise InputError(f"sampler '{sampler}' is not known; use one of {', '.join(get_args(SamplerName))}.")
+    if draws < 4:  # noqa: PLR2004 (one draw for each of four chains)
+        raise InputError(f"draws is {draws}; ask for at least 4.")
+    physics = PhysicsModel.base() if model is None else model
+    generator = np.random.default_rng(seed)
+    fit = fit_map(tracks, physics, generator, progress)
+    sample = {"nuts": sample_nuts, "emcee": sample_emcee, "laplace": sample_laplace}[sampler]
+    samples = sample(fit.likelihood.log_density, fit.gaussian, draws=draws, generator=generator, progress=progress)
+    return _posterior(fit, samples, sampler, seed, draws, generator)
+
+
+def _posterior(
+    fit: MapFit, samples: Samples, sampler: str, seed: int, draws: int, generator: np.random.Generator
+) -> Posterior:
+    tracks = fit.likelihood.tracks
+    with torch.no_grad():
+        rollout = fit.likelihood.rollout(torch.from_numpy(fit.point[None]))
+    contacts = first_contacts(rollout, 0)
+    status = identifiability(tracks, contacts, wall_contacts(rollout, 0))
+    kept = samples.thinned(draws)
+    changed = _changed_order(fit, kept.points, contacts)
+    convergence = assess(sampler, samples, order_changes=float(changed.mean()))
+    names = [body.id for body in tracks.bodies]
+    return Posterior(
+        tracks=tracks,
+        model=fit.likelihood.model,
+        seed=seed,
+        data=_tree(fit, kept, changed, generator),
+        status=status,
+        convergence=convergence,
+        warnings=tuple(_warnings(fit, convergence, status, contacts)),
+        pairs=tuple((names[i], names[j]) for i, j in contacts),
+    )
+
+
+def _changed_order(
+    fit: MapFit, points: Float[np.ndarray, "chain draw dimension"], contacts: tuple[tuple[int, int], ...]
+) -> Float[np.ndarray, "chain draw"]:
+    """1 for a draw in which other pairs collide, or in another order, than in the MAP; else 0."""
+    flat = torch.from_numpy(np.ascontiguousarray(points.reshape(-1, points.shape[-1])))
+    changed: list[bool] = []
+    with torch.no_grad():
+        for begin in range(0, len(flat), BATCH):
+            rollout = fit.likelihood.rollout(flat[begin : begin + BATCH])
+            changed += [sequence != contacts for sequence in collision_sequences(rollout)]
+    return np.array(changed, dtype=float).reshape(points.shape[:2])
+
+
+def _tree(
+    fit: MapFit, samples: Samples, changed: Float[np.ndarray, "chain draw"], generator: np.random.Generator
+) -> xr.DataTree:
+    likelihood, points = fit.likelihood, samples.points
+    flat = torch.from_numpy(np.ascontiguousarray(points.reshape(-1, points.shape[-1])))
+    pointwise = np.concatenate([likelihood.pointwise(flat[k : k + BATCH]) for k in range(0, len(flat), BATCH)])
+    observed = likelihood.tracks.data
+    posterior = named_draws(likelihood, points)
+    axes = ("chain", "draw", "time", "body")
+    shaped = pointwise.reshape(*points.shape[:2], *pointwise.shape[1:])
+    coordinates = {**{name: posterior[name] for name in ("chain", "draw", "body")}, "time": observed["time"]}
+    statistics = {"lp": samples.log_density, "collision_order_changed": changed, **samples.statistics}
+    prior = likelihood.coordinates.prior_draws(PRIOR_DRAWS, generator)[None]
+    return xr.DataTree.from_dict(
+        {
+            "posterior": posterior,
+            "map_estimate": named_draws(likelihood, fit.point[None, None]).isel(chain=0, draw=0, drop=True),
+            "prior": named_draws(likelihood, prior),
+            "sample_stats": xr.Dataset(
+                {name: (("chain", "draw"), values) for name, values in statistics.items()},
+                {name: posterior[name] for name in ("chain", "draw")},
+            ),
+            "log_likelihood": xr.Dataset({"position": (axes, shaped)}, coordinates),
+            "observed_data": observed,
+        }
+    )
+
+
+def _warnings(
+    fit: MapFit, convergence: Convergence, status: dict[str, BodyStatus], contacts: tuple[tuple[int, int], ...]
+) -> list[str]:
+    """What limits the result, the model's misfit first."""
+    names = [body.id for body in fit.likelihood.tracks.bodies]
+    sentences = [fit.misfit.sentence] if not fit.misfit.fits else []
+    if not fit.converged:
+        sentences.append("The search for the most probable values ended before it had converged.")
+    found = {frozenset(pair) for pair in contacts}
+    missed = {(seen.first, seen.second) for seen in fit.contacts if frozenset((seen.first, seen.second)) not in found}
+    for first, second in sorted(missed):
+        sentences.append(
+            f"The tracks look as if objects {names[first]} and {names[second]} collided, but the best fit does without."
+        )
+    if not convergence.converged:
+        sentences.append(convergence.sentence)
+    default = [name for name, one in status.items() if one.mass.status is Status.DEFAULT]
+    if default:
+        plural = len(default) > 1
+        sentences.append(
+            f"Object{'s' if plural else ''} {', '.join(default)} never collide{'' if plural else 's'} in view: mass and "
+            "restitution are default values, not measured."
+        )
+    return sentences

@@ -1,0 +1,292 @@
+"""The most probable values (MAP) of a video: local fits, a growing window, then everything that matters at once.
+
+L-BFGS on the exact gradient and Levenberg-Marquardt on the residuals climb the same density; see
+`docs/decisions/0020-map-by-growing-windows.md` for which is faster.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+from jaxtyping import Float
+from scipy.optimize import minimize as scipy_minimize
+
+from vrdp_prob.inference.events import first_contacts
+from vrdp_prob.inference.free_flight import SeenContact, noise_scale, release_fit, seen_contacts
+from vrdp_prob.inference.growing_fit import GrowingFit
+from vrdp_prob.inference.least_squares import jacobian
+from vrdp_prob.inference.misfit import Misfit, judge
+from vrdp_prob.inference.samples import Gaussian, evaluate
+from vrdp_prob.models.likelihood import Likelihood
+from vrdp_prob.models.physics import PhysicsModel
+from vrdp_prob.models.observation import prior_noise
+from vrdp_prob.models.unknowns import ANGLE_NOISE, NOISE, Structure, unknowns
+from vrdp_prob.progress import ProgressDisplay, SilentProgress
+from vrdp_prob.scene import Tracks
+
+WINDOW = 8
+"""Frames by which the window grows."""
+REST_TEST = 3.0
+"""A body rests until its first contact if its scatter about one place exceeds the noise by less than so many sd."""
+LBFGS_ITERATIONS = 30
+
+
+@dataclass(frozen=True)
+class MapFit:
+    """The most probable values and the Gaussian around them.
+
+    Parameters
+    ----------
+    likelihood
+        The density, reduced to the unknowns that the motion says something about.
+    point
+        The MAP.
+    precision
+        Gauss-Newton curvature of the negative log posterior there.
+    log_density
+        Log posterior there.
+    converged
+        Whether the last refinement ended by itself.
+    contacts
+        Contacts seen in the tracks by local fits.
+    noise
+        Measurement noise (m) from the tracks alone.
+    misfit
+        How the residuals compare with it.
+    evaluations
+        Number of worlds simulated.
+    """
+
+    likelihood: Likelihood
+    point: Float[np.ndarray, "dimension"]
+    precision: Float[np.ndarray, "dimension dimension"]
+    log_density: float
+    converged: bool
+    contacts: tuple[SeenContact, ...]
+    noise: float
+    misfit: Misfit
+    evaluations: int
+
+    @property
+    def gaussian(self) -> Gaussian:
+        """Gaussian with the MAP as its mean and the Gauss-Newton covariance."""
+        return Gaussian.from_precision(self.point, self.precision)
+
+
+
+def fit_map(
+    tracks: Tracks,
+    model: PhysicsModel,
+    generator: np.random.Generator,
+    progress: ProgressDisplay | None = None,
+    *,
+    climb: bool = False,
+) -> MapFit:
+    """Find the most probable values of a video.
+
+    Parameters
+    ----------
+    tracks
+        What was seen.
+    model
+        The physics.
+    generator
+        Source of the candidate worlds.
+    progress
+        Told how many windows are done.
+    climb
+        Whether L-BFGS on the exact log posterior follows the least squares.
+    """
+    noise = _noise(tracks)
+    contacts = seen_contacts(tracks, noise)
+    growing = _grow(tracks, model, noise, contacts, generator, progress)
+    everything = growing.likelihood
+    pairs = _pairs(everything, growing.point)
+    structure = Structure(
+        moving=_moving(tracks, noise, contacts), colliding=frozenset(body for pair in pairs for body in pair)
+    )
+    reduced = Likelihood(tracks, model, unknowns(tracks, model, structure))
+    start = _carry(everything, growing.point, reduced)
+    final = GrowingFit(reduced, start, contacts, generator)
+    final.finish()
+    misfit = _misfit(reduced, final.point, noise)
+    if not misfit.fits:
+        final.likelihood = reduced.informed(1 / misfit.memory)
+        final.finish()
+    point, log_density, converged = _climb(final.likelihood, final.point, LBFGS_ITERATIONS if climb else 0)
+    _, derivative = jacobian(final.likelihood.residuals, point, final.likelihood.coordinates.scale, central=True)
+    precision = _with_noise(final.likelihood, derivative)
+    evaluations = growing.evaluations + final.evaluations
+    return MapFit(
+        final.likelihood,
+        point,
+        precision,
+        log_density,
+        final.converged or converged,
+        contacts,
+        noise,
+        misfit,
+        evaluations,
+    )
+
+
+def _noise(tracks: Tracks) -> float:
+    """Measurement noise (m) from the tracks alone; the prior's where they are too short to tell."""
+    noise = noise_scale(tracks)
+    return noise if np.isfinite(noise) and noise > 0 else prior_noise(tracks)
+
+
+def _moving(tracks: Tracks, noise: float, contacts: tuple[SeenContact, ...]) -> frozenset[int]:
+    """Bodies that are not at rest when they are released."""
+    moving = set()
+    for body in range(len(tracks.bodies)):
+        until = _first_contact(tracks, body, contacts)
+        chosen = tracks.seen[:, body] & (tracks.times < until)
+        places = tracks.positions[chosen, body]
+        freedom = 2 * (len(places) - 1)
+        scatter = float(((places - places.mean(axis=0)) ** 2).sum()) if len(places) else 0.0
+        if freedom < 6 or scatter > noise**2 * (freedom + REST_TEST * np.sqrt(2 * freedom)):
+            moving.add(body)
+    return frozenset(moving)
+
+
+def _first_contact(tracks: Tracks, body: int, contacts: tuple[SeenContact, ...]) -> float:
+    """Time (s) shortly before the first contact of a body that shows in the tracks."""
+    step = float(np.median(np.diff(tracks.times)))
+    times = [contact.time - step / 2 for contact in contacts if body in (contact.first, contact.second)]
+    return min(times, default=float(tracks.times[-1]) + step)
+
+
+def _grow(
+    tracks: Tracks,
+    model: PhysicsModel,
+    noise: float,
+    contacts: tuple[SeenContact, ...],
+    generator: np.random.Generator,
+    progress: ProgressDisplay | None,
+) -> GrowingFit:
+    """Fit windows that grow to the whole video, with everything that might matter among the unknowns."""
+    everything = frozenset(body for body, one in enumerate(tracks.bodies) if one.radius is not None)
+    structure = Structure(moving=_moving(tracks, noise, contacts), colliding=everything)
+    likelihood = Likelihood(tracks, model, unknowns(tracks, model, structure))
+    growing = GrowingFit(likelihood, _start(likelihood, noise, contacts), contacts, generator)
+    growing.trust_release_fits({body: _release_sd(tracks, body, noise, contacts) for body in range(len(tracks.bodies))})
+    ends = _windows(tracks)
+    with (progress or SilentProgress()).stage("Fitting the motion (MAP)", total=len(ends)) as advance:
+        previous = 0
+        for end in ends:
+            growing.grow(end, previous)
+            previous = end
+            advance(1)
+    return growing
+
+
+def _windows(tracks: Tracks) -> list[int]:
+    """Frame counts of the growing windows, the whole video last."""
+    count = len(tracks.times)
+    first = int(np.argmax(tracks.seen.any(axis=1)))
+    ends = list(range(first + WINDOW, count, WINDOW))
+    return [*ends, count]
+
+
+def _release_sd(
+    tracks: Tracks, body: int, noise: float, contacts: tuple[SeenContact, ...]
+) -> tuple[float, float]:
+    """Standard deviations of release position (m) and velocity (m/s) of a body as its local fit knows them."""
+    return noise, release_fit(tracks, body, noise, _first_contact(tracks, body, contacts)).velocity_sd
+
+
+def _start(
+    likelihood: Likelihood, noise: float, contacts: tuple[SeenContact, ...]
+) -> Float[np.ndarray, "dimension"]:
+    """Release states of local fits, everything else at the mean of its prior."""
+    tracks, coordinates = likelihood.tracks, likelihood.coordinates
+    start = coordinates.prior_mean.copy()
+    for body in range(len(tracks.bodies)):
+        fit = release_fit(tracks, body, noise, _first_contact(tracks, body, contacts))
+        values = dict(zip(("x", "y", "velocity_x", "velocity_y"), (*fit.position, *fit.velocity), strict=True))
+        values["spin"] = _first_spin(tracks, body, _first_contact(tracks, body, contacts))
+        for field, value in values.items():
+            place = coordinates.places.get((field, body))
+            if place is not None:
+                start[place] = value
+    start[coordinates.places[NOISE, None]] = np.log(noise / likelihood.observations.position_reference)
+    return start
+
+
+def _first_spin(tracks: Tracks, body: int, until: float) -> float:
+    """Spin in rad/s from the first measured angles; 0 where there are none."""
+    if tracks.angles is None:
+        return 0.0
+    angles = tracks.angles[:, body]
+    chosen = np.flatnonzero(np.isfinite(angles) & (tracks.times < until))[:12]
+    if len(chosen) < 2:
+        return 0.0
+    return float(np.polyfit(tracks.times[chosen], angles[chosen], 1)[0])
+
+
+def _pairs(likelihood: Likelihood, point: Float[np.ndarray, "dimension"]) -> set[tuple[int, int]]:
+    """Pairs that collide at a point."""
+    with torch.no_grad():
+        return set(first_contacts(likelihood.rollout(torch.from_numpy(point[None])), 0))
+
+
+def _carry(
+    source: Likelihood, point: Float[np.ndarray, "dimension"], target: Likelihood
+) -> Float[np.ndarray, "dimension"]:
+    """The same values in the vector of another structure."""
+    places = source.coordinates.places
+    entries = target.coordinates.entries
+    return np.array([point[places[entry.field, entry.owner]] for entry in entries])
+
+
+def _misfit(likelihood: Likelihood, point: Float[np.ndarray, "dimension"], noise: float) -> Misfit:
+    with torch.no_grad():
+        trajectory = likelihood.rollout(torch.from_numpy(point[None])).trajectory
+    return judge(likelihood.tracks, trajectory[0, :, :, :2].numpy(), noise)
+
+
+def _climb(
+    likelihood: Likelihood, start: Float[np.ndarray, "dimension"], iterations: int
+) -> tuple[Float[np.ndarray, "dimension"], float, bool]:
+    """Climb the log posterior by L-BFGS in whitened coordinates; never ends lower than it began."""
+    if not iterations:
+        return start, float(evaluate(likelihood.log_density, start[None])[0]), False
+    _, derivative = jacobian(likelihood.residuals, start, likelihood.coordinates.scale)
+    gaussian = Gaussian.from_precision(start, _with_noise(likelihood, derivative))
+    mean, root = torch.from_numpy(gaussian.mean), torch.from_numpy(gaussian.root)
+
+    def descend(whitened: Float[np.ndarray, "dimension"]) -> tuple[float, Float[np.ndarray, "dimension"]]:
+        position = torch.from_numpy(whitened).requires_grad_()
+        value = -likelihood.log_density((mean + root @ position)[None])[0]
+        if not bool(torch.isfinite(value)):
+            return 1e30, np.zeros_like(whitened)
+        (gradient,) = torch.autograd.grad(value, position)
+        return float(value.detach()), np.nan_to_num(gradient.numpy())
+
+    before, _ = descend(np.zeros(len(start)))
+    result = scipy_minimize(
+        descend,
+        np.zeros(len(start)),
+        jac=True,
+        method="L-BFGS-B",
+        options={"maxiter": iterations, "maxcor": 20, "ftol": 1e-10},
+    )
+    if result.fun < before:
+        return gaussian.points(result.x), -float(result.fun), bool(result.success)
+    return start, -before, before < 1e30
+
+
+def _with_noise(
+    likelihood: Likelihood, derivative: Float[np.ndarray, "residual dimension"]
+) -> Float[np.ndarray, "dimension dimension"]:
+    """Gauss-Newton curvature, with that of the noise scales in place of what the residuals say of them."""
+    precision = derivative.T @ derivative
+    observations = likelihood.observations
+    for field, count in ((NOISE, 2 * len(observations.frame)), (ANGLE_NOISE, len(observations.angle))):
+        place = likelihood.coordinates.places.get((field, None))
+        if place is not None:
+            precision[place, :] = precision[:, place] = 0.0
+            curvature = 2 * likelihood.information * count
+            precision[place, place] = curvature + likelihood.coordinates.prior_sd[place] ** -2
+    return precision

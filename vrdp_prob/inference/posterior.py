@@ -1,0 +1,169 @@
+"""The posterior of one video: draws with names and units, what they can be trusted for, and worlds made of them."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import torch
+import xarray as xr
+from jaxtyping import Float
+from torch import Tensor
+
+from vrdp_prob.inference.identifiability import BodyStatus
+from vrdp_prob.inference.samples import Convergence
+from vrdp_prob.inference.summaries import ObjectSummary, PairSummary, ParameterSummary, Summary
+from vrdp_prob.models.likelihood import worlds_of
+from vrdp_prob.models.parameters import WALL_RESTITUTION
+from vrdp_prob.models.physics import PhysicsModel
+from vrdp_prob.models.simulator.worlds import Worlds
+from vrdp_prob.scene import Tracks
+
+
+PairFunction = Callable[[np.ndarray, np.ndarray], np.ndarray]
+
+
+@dataclass(frozen=True)
+class Posterior:
+    """Everything that was learned from the tracks of one video.
+
+    Parameters
+    ----------
+    tracks
+        What was seen.
+    model
+        The physics that was believed.
+    seed
+        Seed of all randomness.
+    data
+        Groups `posterior`, `map_estimate`, `prior`, `sample_stats`, `log_likelihood` and `observed_data`; the draws have
+        the axes `chain` and `draw`, then `body` where there is one value per body. SI units, as attributes.
+    status
+        What the data say about each body's mass and restitution, by id.
+    convergence
+        Whether the draws can be trusted.
+    warnings
+        Plain sentences: first a misfit of the model, then what else limits the result.
+    pairs
+        Ids of the pairs that collide in the most probable world, in order of time.
+    """
+
+    tracks: Tracks
+    model: PhysicsModel
+    seed: int
+    data: xr.DataTree
+    status: Mapping[str, BodyStatus]
+    convergence: Convergence
+    warnings: tuple[str, ...]
+    pairs: tuple[tuple[str, str], ...]
+
+    @property
+    def draw_count(self) -> int:
+        """Number of draws over all chains."""
+        sizes = self.data["posterior"].sizes
+        return int(sizes["chain"] * sizes["draw"])
+
+    def worlds(self, count: int | None = None, *, generator: np.random.Generator | None = None) -> Worlds:
+        """Draws as a batch of worlds, ready to be simulated.
+
+        Parameters
+        ----------
+        count
+            Number of worlds; all draws where None or where there are not so many.
+        generator
+            Chooses the draws at random; evenly spaced ones where None.
+        """
+        total = self.draw_count
+        if count is None or count >= total:
+            chosen = np.arange(total)
+        elif generator is None:
+            chosen = np.linspace(0, total - 1, count).round().astype(int)
+        else:
+            chosen = np.sort(generator.choice(total, size=count, replace=False))
+        draws = self.data["posterior"].to_dataset().stack(world=("chain", "draw")).isel(world=chosen)
+        return self._worlds(draws.transpose("world", ...))
+
+    def map_worlds(self) -> Worlds:
+        """The most probable world, as a batch of one."""
+        return self._worlds(self.data["map_estimate"].to_dataset().expand_dims("world"))
+
+    def object_summary(self, body: str) -> ObjectSummary:
+        """Mass and restitution of a body with their intervals and status.
+
+        Raises
+        ------
+        InputError
+            If no object has that id.
+        """
+        index, status = self.tracks.index(body), self.status[body]
+        mass, restitution = (Summary.of(self._draws(name)[..., index]) for name in ("mass", "restitution"))
+        return ObjectSummary(
+            body,
+            ParameterSummary(mass, str(status.mass.status), status.mass.partners),
+            ParameterSummary(restitution, str(status.restitution.status), status.restitution.partners),
+        )
+
+    def mass_ratios(self) -> tuple[PairSummary, ...]:
+        """Mass of the first over mass of the second body of every pair that collides."""
+        mass = self._draws("mass")
+        return tuple(self._pair_summary(pair, mass, np.divide) for pair in self.pairs)
+
+    def restitution_pairs(self) -> tuple[PairSummary, ...]:
+        """Restitution (product of both factors, at most 1) of every pair that collides."""
+        restitution = self._draws("restitution")
+        return tuple(
+            self._pair_summary(pair, restitution, lambda a, b: np.minimum(a * b, 1.0)) for pair in self.pairs
+        )
+
+    def write(self, path: Path) -> None:
+        """Save as one netCDF file that needs nothing else to be read again; an interruption leaves no half file.
+
+        Raises
+        ------
+        InputError
+            If the file cannot be written.
+        """
+        from vrdp_prob.inference.storage import write_posterior  # noqa: PLC0415 (storage knows this class)
+
+        write_posterior(self, path)
+
+    @classmethod
+    def read(cls, path: Path, tracks: Tracks | None = None) -> "Posterior":
+        """Open what `write` saved.
+
+        Raises
+        ------
+        InputError
+            If the file cannot be read or is not a posterior.
+        """
+        from vrdp_prob.inference.storage import read_posterior  # noqa: PLC0415 (storage knows this class)
+
+        return read_posterior(path, tracks)
+
+    def _draws(self, name: str) -> Float[np.ndarray, "chain draw *axes"]:
+        values: np.ndarray = self.data["posterior"][name].transpose("chain", "draw", ...).values
+        return values
+
+    def _pair_summary(self, pair: tuple[str, str], draws: np.ndarray, combine: PairFunction) -> PairSummary:
+        first, second = (draws[..., self.tracks.index(body)] for body in pair)
+        return PairSummary(pair, Summary.of(combine(first, second)))
+
+    def _worlds(self, draws: xr.Dataset) -> Worlds:
+        return worlds_of(self.tracks, self.model, quantities(draws))
+
+
+def quantities(draws: xr.Dataset) -> dict[str, Float[Tensor, "world owner"]]:
+    """Values of the likelihood's quantities from draws by name; every variable begins with the axis `world`."""
+    split = {
+        "x": draws["position"].isel(axis=0),
+        "y": draws["position"].isel(axis=1),
+        "velocity_x": draws["velocity"].isel(axis=0),
+        "velocity_y": draws["velocity"].isel(axis=1),
+    }
+    # netCDF knows no axis of length 0, so a video without walls has no such variable
+    nothing = {WALL_RESTITUTION.name: torch.zeros(draws.sizes["world"], 0, dtype=torch.float64)}
+    plain = {str(name): values for name, values in draws.data_vars.items() if name not in ("position", "velocity")}
+    return nothing | {
+        name: torch.from_numpy(np.array(values.values, dtype=float).reshape(draws.sizes["world"], -1))
+        for name, values in {**split, **plain}.items()
+    }

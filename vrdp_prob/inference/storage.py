@@ -1,0 +1,129 @@
+"""A posterior as one netCDF file, written to a temporary name first, and read back without anything else."""
+
+import json
+import os
+import warnings
+from dataclasses import asdict
+from pathlib import Path
+from tempfile import NamedTemporaryFile
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from vrdp_prob.errors import InputError
+from vrdp_prob.inference.identifiability import BodyStatus, ParameterStatus, Status
+from vrdp_prob.inference.posterior import Posterior
+from vrdp_prob.inference.samples import Convergence
+from vrdp_prob.models.physics import PhysicsModel
+from vrdp_prob.scene import Body, Camera, Shape, Tracks, Wall
+
+FORMAT = 1
+"""Version of the layout of the file."""
+
+
+def write_posterior(posterior: Posterior, path: Path) -> None:
+    """Save a posterior; an interruption leaves no half file.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be written.
+    """
+    tree = posterior.data.copy()
+    tree.attrs = {"vrdp_prob": json.dumps(_document(posterior)), "format": FORMAT}
+    temporary: Path | None = None
+    try:
+        with NamedTemporaryFile(dir=path.parent, prefix=f".{path.name}.", suffix=".part", delete=False) as file:
+            temporary = Path(file.name)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            tree.to_netcdf(temporary, engine="h5netcdf")
+        os.replace(temporary, path)
+        temporary = None
+    except OSError as error:
+        reason = error.strerror or error
+        raise InputError(f"{path}: the posterior cannot be written ({reason}); choose another folder.") from error
+    finally:
+        if temporary is not None:
+            temporary.unlink(missing_ok=True)
+
+
+def read_posterior(path: Path, tracks: Tracks | None = None) -> Posterior:
+    """Open a saved posterior; the tracks come from the file unless given.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read or is not a posterior.
+    """
+    try:
+        with xr.open_datatree(path, engine="h5netcdf") as opened:
+            tree = opened.load().copy()
+        document = json.loads(tree.attrs["vrdp_prob"])
+        return _posterior(document, tree, tracks)
+    except OSError as error:
+        reason = error.strerror or error
+        raise InputError(f"{path}: the posterior cannot be read ({reason}); check the path.") from error
+    except (KeyError, ValueError, TypeError) as error:
+        raise InputError(f"{path}: not a posterior of this tool ({error}); run the inference again.") from error
+
+
+def _document(posterior: Posterior) -> dict[str, Any]:
+    """What the file holds beside the arrays."""
+    tracks = posterior.tracks
+    return {
+        "video": tracks.video,
+        "bodies": [asdict(body) for body in tracks.bodies],
+        "walls": [asdict(wall) for wall in tracks.walls],
+        "camera": None if tracks.camera is None else tracks.camera.to_document(),
+        "model": posterior.model.to_toml(),
+        "seed": posterior.seed,
+        "status": {name: asdict(status) for name, status in posterior.status.items()},
+        "convergence": asdict(posterior.convergence),
+        "warnings": list(posterior.warnings),
+        "pairs": [list(pair) for pair in posterior.pairs],
+    }
+
+
+def _posterior(document: dict[str, Any], tree: xr.DataTree, tracks: Tracks | None) -> Posterior:
+    status = {
+        name: BodyStatus(_parameter_status(value["mass"]), _parameter_status(value["restitution"]))
+        for name, value in document["status"].items()
+    }
+    return Posterior(
+        tracks=_tracks(document, tree) if tracks is None else tracks,
+        model=PhysicsModel.from_toml(document["model"]),
+        seed=document["seed"],
+        data=tree,
+        status=status,
+        convergence=Convergence(**document["convergence"]),
+        warnings=tuple(document["warnings"]),
+        pairs=tuple((first, second) for first, second in document["pairs"]),
+    )
+
+
+def _parameter_status(document: dict[str, Any]) -> ParameterStatus:
+    return ParameterStatus(Status(document["status"]), tuple(document["partners"]))
+
+
+def _tracks(document: dict[str, Any], tree: xr.DataTree) -> Tracks:
+    """The tracks that the posterior was inferred from."""
+    camera = document["camera"]
+    return Tracks(
+        document["video"],
+        tuple(Body(**{**body, "shape": Shape(body["shape"])}) for body in document["bodies"]),
+        tree["observed_data"].to_dataset(),
+        tuple(Wall(**wall) for wall in document["walls"]),
+        None if camera is None else _camera(camera),
+    )
+
+
+def _camera(document: dict[str, Any]) -> Camera:
+    return Camera(
+        np.array(document["projection"]),
+        document["width"],
+        document["height"],
+        document["fps"],
+        document["pixel_sd"],
+    )

@@ -1,0 +1,140 @@
+"""The unknowns of one video as one unconstrained vector, and back.
+
+Positive quantities go in as logarithms: a collision identifies a difference of log masses and a sum of log
+restitutions, so the ridges of the posterior are straight lines here. With a logit instead, every sampler failed.
+"""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import torch
+from jaxtyping import Bool, Float, Int
+from torch import Tensor
+
+from vrdp_prob.models.parameters import Parameter, Prior, Transform
+
+
+@dataclass(frozen=True)
+class Coordinate:
+    """One number of the vector.
+
+    Parameters
+    ----------
+    field
+        Name of the quantity, for example `mass` or `velocity_x`.
+    owner
+        Body (or wall) that it belongs to; None where it is shared by the video.
+    transform
+        What the vector holds: the quantity or its logarithm.
+    prior
+        Prior in the vector's units.
+    scale
+        Typical size of a change, for finite differences and damping.
+    """
+
+    field: str
+    owner: int | None
+    transform: Transform
+    prior: Prior
+    scale: float = 1.0
+
+    @classmethod
+    def of(cls, parameter: Parameter, owner: int | None = None, *, scale: float = 0.1) -> "Coordinate":
+        """The number that stands for a parameter of the model."""
+        return cls(parameter.name, owner, parameter.transform, parameter.prior, scale)
+
+
+@dataclass(frozen=True)
+class Coordinates:
+    """All numbers of the vector, in order, with the values of what is not sampled.
+
+    Parameters
+    ----------
+    entries
+        The sampled numbers.
+    defaults
+        Value of every quantity where it is not sampled: one per owner, or a single one (axis of length 1) if shared.
+    """
+
+    entries: tuple[Coordinate, ...]
+    defaults: Mapping[str, Float[np.ndarray, "owner"]]
+
+    def __len__(self) -> int:
+        return len(self.entries)
+
+    @cached_property
+    def places(self) -> dict[tuple[str, int | None], int]:
+        """Place in the vector of a quantity and its owner."""
+        return {(entry.field, entry.owner): place for place, entry in enumerate(self.entries)}
+
+    @cached_property
+    def prior_mean(self) -> Float[np.ndarray, "dimension"]:
+        """Mean of the Gaussian prior."""
+        return np.array([entry.prior.mean for entry in self.entries])
+
+    @cached_property
+    def prior_sd(self) -> Float[np.ndarray, "dimension"]:
+        """Standard deviation of the Gaussian prior."""
+        return np.array([entry.prior.sd for entry in self.entries])
+
+    @cached_property
+    def scale(self) -> Float[np.ndarray, "dimension"]:
+        """Typical size of a change of each number."""
+        return np.array([entry.scale for entry in self.entries])
+
+    @cached_property
+    def names(self) -> tuple[str, ...]:
+        """A name for each number, for example `mass[2]`."""
+        return tuple(e.field if e.owner is None else f"{e.field}[{e.owner}]" for e in self.entries)
+
+    def mask(self, fields: Iterable[str], owners: Iterable[int] | None = None) -> Bool[np.ndarray, "dimension"]:
+        """Which numbers belong to some quantities (and owners)."""
+        chosen_fields = set(fields)
+        chosen_owners = None if owners is None else set(owners)
+        return np.array(
+            [
+                entry.field in chosen_fields and (chosen_owners is None or entry.owner in chosen_owners)
+                for entry in self.entries
+            ],
+            dtype=bool,
+        )
+
+    def quantity(self, field: str, points: Float[Tensor, "point dimension"]) -> Float[Tensor, "point owner"]:
+        """Values of a quantity for all its owners (one column if it is shared)."""
+        default = torch.from_numpy(np.asarray(self.defaults[field], dtype=float))
+        values = default.expand(len(points), -1)
+        columns = [(entry.owner or 0, place) for place, entry in enumerate(self.entries) if entry.field == field]
+        if not columns:
+            return values
+        owners, places = (torch.tensor(column) for column in zip(*columns, strict=True))
+        sampled = points[:, places]
+        logarithmic = self.entries[int(places[0])].transform is Transform.LOG
+        return values.index_copy(1, owners, sampled.exp() if logarithmic else sampled)
+
+    def prior_residuals(self, points: Float[Tensor, "point dimension"]) -> Float[Tensor, "point residual"]:
+        """Numbers whose half sum of squares is the negative log prior (up to a constant): normal terms, then edges."""
+        gaussian = (points - torch.from_numpy(self.prior_mean)) / torch.from_numpy(self.prior_sd)
+        places, edges, softness = self._edges
+        if not len(places):
+            return gaussian
+        beyond = (points[:, places] - edges) / softness
+        return torch.cat([gaussian, (2 * torch.nn.functional.softplus(beyond) + TINY).sqrt()], dim=1)
+
+    def prior_draws(self, count: int, generator: np.random.Generator) -> Float[np.ndarray, "draw dimension"]:
+        """Draws of the prior."""
+        columns = [entry.prior.sample(generator, (count,)) for entry in self.entries]
+        return np.stack(columns, axis=1) if columns else np.zeros((count, 0))
+
+    @cached_property
+    def _edges(self) -> tuple[Int[Tensor, "edge"], Float[Tensor, "edge"], Float[Tensor, "edge"]]:
+        limited = [(place, e.prior) for place, e in enumerate(self.entries) if e.prior.upper is not None]
+        places = torch.tensor([place for place, _ in limited], dtype=torch.int64)
+        edges = torch.tensor([prior.upper or 0.0 for _, prior in limited], dtype=torch.float64)
+        softness = torch.tensor([prior.softness for _, prior in limited], dtype=torch.float64)
+        return places, edges, softness
+
+
+TINY = 1e-30
+"""Keeps the slope of a square root finite far below an edge."""

@@ -1,0 +1,163 @@
+"""Which numbers of a video are unknown, and what is believed of them before its motion is looked at."""
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+
+from vrdp_prob.models.coordinates import Coordinate, Coordinates
+from vrdp_prob.models.observation import NOISE_LOG_SD, Observations
+from vrdp_prob.models.parameters import (
+    ANGULAR_DRAG,
+    MASS,
+    RESTITUTION,
+    ROLLING_RESISTANCE,
+    SLIDING_FRICTION,
+    WALL_RESTITUTION,
+    Prior,
+    Scope,
+    Transform,
+)
+from vrdp_prob.models.physics import PhysicsModel
+from vrdp_prob.scene import Shape, Tracks
+
+NOISE = "noise_scale"
+ANGLE_NOISE = "angle_noise_scale"
+SPEED_SD = 3.0
+"""Prior standard deviation in m/s of a release velocity."""
+SPIN_SD = 2.0
+"""Prior standard deviation in rad/s of a release spin."""
+YAW_SD = 1.5
+"""Prior standard deviation in rad of a cube's yaw: flat over the quarter turn after which a square looks the same."""
+ANGLE_ZERO_SD = 3.0
+"""Prior standard deviation in rad of the arbitrary zero of measured angles."""
+
+
+@dataclass(frozen=True)
+class Structure:
+    """Which bodies have which unknowns.
+
+    Parameters
+    ----------
+    moving
+        Bodies whose release velocity is unknown; the others are at rest when they are released.
+    colliding
+        Bodies whose mass and restitution (and, of a cube, yaw) the motion can say something about.
+    """
+
+    moving: frozenset[int]
+    colliding: frozenset[int]
+
+
+def unknowns(tracks: Tracks, model: PhysicsModel, structure: Structure) -> Coordinates:
+    """The vector of unknowns of a video under a model, with the defaults of what is not sampled."""
+    entries = [
+        *_motion(tracks, structure),
+        *_turning(tracks, structure),
+        *_matter(tracks, structure),
+        *_physics(tracks, model, structure),
+        *_measurement(tracks),
+    ]
+    return Coordinates(tuple(entries), _defaults(tracks, model))
+
+
+def _motion(tracks: Tracks, structure: Structure) -> Iterator[Coordinate]:
+    """Where each body is released, and how fast."""
+    first = first_positions(tracks)
+    spread = np.nanmax(tracks.positions, axis=(0, 1)) - np.nanmin(tracks.positions, axis=(0, 1))
+    extent = max(float(spread.max()), 1e-3)
+    for body in range(len(tracks.bodies)):
+        for axis, name in enumerate(("x", "y")):
+            prior = Prior(float(first[body, axis]), extent)
+            yield Coordinate(name, body, Transform.IDENTITY, prior, scale=0.01 * extent)
+    for body in sorted(structure.moving):
+        for name in ("velocity_x", "velocity_y"):
+            yield Coordinate(name, body, Transform.IDENTITY, Prior(0.0, SPEED_SD), scale=0.1)
+
+
+def _turning(tracks: Tracks, structure: Structure) -> Iterator[Coordinate]:
+    """Yaw of cubes that meet something, spin of all that are seen to turn or may turn a square's corner forward."""
+    measured = set(Observations.of(tracks).angle_bodies)
+    angles = tracks.angles
+    for body, description in enumerate(tracks.bodies):
+        meets = description.shape is Shape.CUBE and body in structure.colliding
+        if meets:
+            yield Coordinate("angle", body, Transform.IDENTITY, Prior(0.0, YAW_SD), scale=0.1)
+        if (meets and body in structure.moving) or body in measured:
+            yield Coordinate("spin", body, Transform.IDENTITY, Prior(0.0, SPIN_SD), scale=0.1)
+        if body in measured and angles is not None:
+            seen = angles[:, body]
+            first = float(seen[np.isfinite(seen)][0])
+            yield Coordinate("angle_zero", body, Transform.IDENTITY, Prior(first, ANGLE_ZERO_SD), scale=0.1)
+
+
+def _matter(tracks: Tracks, structure: Structure) -> Iterator[Coordinate]:
+    """Mass, where nobody weighed it (expected near the weighed ones, if any), and restitution of bodies and walls."""
+    prior = Prior(math.log(_mass_default(tracks)), MASS.prior.sd)
+    for body in sorted(structure.colliding):
+        if tracks.bodies[body].mass is None:
+            yield Coordinate(MASS.name, body, MASS.transform, prior, scale=0.1)
+    for body in sorted(structure.colliding):
+        yield Coordinate.of(RESTITUTION, body)
+    for index, wall in enumerate(tracks.walls):
+        if wall.restitution is None:
+            yield Coordinate.of(WALL_RESTITUTION, index)
+
+
+def _physics(tracks: Tracks, model: PhysicsModel, structure: Structure) -> Iterator[Coordinate]:
+    """Parameters of the model that can have an effect on these bodies."""
+    shapes = {body.shape for body in tracks.bodies}
+    turning = any(tracks.bodies[body].shape is Shape.CUBE for body in structure.colliding)
+    idle = {
+        SLIDING_FRICTION.name: shapes == {Shape.SPHERE},
+        ROLLING_RESISTANCE.name: Shape.SPHERE not in shapes,
+        ANGULAR_DRAG.name: not turning and not Observations.of(tracks).angle_bodies,
+    }
+    for parameter in model.parameters:
+        if parameter.scope is Scope.SHARED and not idle.get(parameter.name, False):
+            yield Coordinate.of(parameter)
+        if parameter.scope is Scope.BODY and parameter.name not in (MASS.name, RESTITUTION.name):
+            for body in sorted(structure.moving | structure.colliding):
+                yield Coordinate.of(parameter, body)
+
+
+def _measurement(tracks: Tracks) -> Iterator[Coordinate]:
+    yield Coordinate(NOISE, None, Transform.LOG, Prior(0.0, NOISE_LOG_SD), scale=0.1)
+    if Observations.of(tracks).angle_bodies:
+        yield Coordinate(ANGLE_NOISE, None, Transform.LOG, Prior(0.0, NOISE_LOG_SD), scale=0.1)
+
+
+def _defaults(tracks: Tracks, model: PhysicsModel) -> dict[str, Float[np.ndarray, "owner"]]:
+    """Every quantity where it is not sampled."""
+    count = len(tracks.bodies)
+    first = first_positions(tracks)
+    known = [wall.restitution for wall in tracks.walls]
+    defaults = {
+        "x": first[:, 0],
+        "y": first[:, 1],
+        **{name: np.zeros(count) for name in ("velocity_x", "velocity_y", "angle", "spin", "angle_zero")},
+        MASS.name: np.array([_mass_default(tracks) if body.mass is None else body.mass for body in tracks.bodies]),
+        RESTITUTION.name: np.full(count, RESTITUTION.default),
+        WALL_RESTITUTION.name: np.array([WALL_RESTITUTION.default if value is None else value for value in known]),
+        NOISE: np.ones(1),
+        ANGLE_NOISE: np.ones(1),
+    }
+    for parameter in model.parameters:
+        if parameter.name not in defaults:
+            owners = count if parameter.scope is Scope.BODY else 1
+            defaults[parameter.name] = np.full(owners, parameter.default)
+    return defaults
+
+
+def _mass_default(tracks: Tracks) -> float:
+    """Mass in kg of a body that nobody weighed: that of the weighed ones of the video, if any."""
+    weighed = [body.mass for body in tracks.bodies if body.mass is not None]
+    return float(np.exp(np.median(np.log(weighed)))) if weighed else MASS.default
+
+
+def first_positions(tracks: Tracks) -> Float[np.ndarray, "body 2"]:
+    """Position in m of each body where it was first seen."""
+    frames = tracks.seen.argmax(axis=0)
+    return tracks.positions[frames, np.arange(len(tracks.bodies))]

@@ -1,7 +1,7 @@
 """What a report says, as plain data: everything the page and report.json show, and nothing that computes it.
 
-The adapter (`vrdp_prob.report.build`) fills a `ReportContent` from a posterior, its worlds and its answers; the page,
-the document and the player's data are renderings of it. So each rendering is tested with content made by hand.
+`vrdp_prob.report.build` fills a `ReportContent` from a posterior and its answers; the page, the document and the player's
+data are renderings of it. So each rendering is tested with content made by hand.
 """
 
 from dataclasses import dataclass

@@ -18,7 +18,7 @@ from vrdp_prob.models.physics import PhysicsModel
 from vrdp_prob.models.simulator.worlds import Worlds
 from vrdp_prob.reasoning.answer import Answer
 from vrdp_prob.report import build, schema, write_report
-from vrdp_prob.report.build import player_worlds
+from vrdp_prob.report.from_posterior import player_worlds
 from vrdp_prob.scene import Camera, QuestionType, Tracks
 
 CYLINDER, SPHERE = 2, 3
@@ -102,7 +102,7 @@ def test_worlds_of_the_player(content):
 
 
 def test_long_recordings_are_thinned(monkeypatch):
-    monkeypatch.setattr("vrdp_prob.report.build.MOST_FRAMES", 20)
+    monkeypatch.setattr("vrdp_prob.report.from_posterior.MOST_FRAMES", 20)
     times = player_worlds(hand_made(), draws=2)[0].times
     assert len(times) == 20
     assert (times[0], times[-1]) == pytest.approx((1.08, 3.96))

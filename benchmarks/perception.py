@@ -1,6 +1,6 @@
 """Measure perception against the annotations of the practice videos.
 
-    python benchmarks/perception.py [--json FILE] [--videos 1,2,4]
+    python benchmarks/perception.py [--json FILE] [--videos 1,2,4:9]
 
 Development videos (1, 2, 4-9) and report videos (0, 3, 10-15) are told apart, and so are the two renderers (Cycles:
 0-3, the fast renderer: the others). The data lie in ../shared/data/clevrer_bullet; without them nothing is measured.
@@ -174,12 +174,21 @@ def _check(name: str, value: float | None, goal: float | None, sense: str) -> di
     return {"name": name, "value": value, "goal": None if goal is None else f"{sense} {goal:g}", "ok": met}
 
 
+def numbers(text: str) -> set[int]:
+    """Numbers and ranges `first:last` (both counted), separated by commas."""
+    found: set[int] = set()
+    for part in text.split(","):
+        first, _, last = part.partition(":")
+        found |= set(range(int(first), int(last or first) + 1))
+    return found
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--json", type=Path, help="write the checks to this file")
-    parser.add_argument("--videos", help="only these, separated by commas")
+    parser.add_argument("--videos", help="only these, for example 1,2,4:9; any of the 60 may be named")
     arguments = parser.parse_args()
-    wanted = {int(item) for item in arguments.videos.split(",")} if arguments.videos else {*DEVELOPMENT, *REPORT}
+    wanted = numbers(arguments.videos) if arguments.videos else {*DEVELOPMENT, *REPORT}
     groups: dict[str, Tally] = {
         f"{use} {renderer}": Tally() for use in ("development", "report") for renderer in ("Cycles", "fast")
     }
@@ -190,8 +199,8 @@ def main() -> None:
             start = time.perf_counter()
             tracks = read_video(DATA / f"videos/video_{number:05d}.mp4", camera)
             tally = score(tracks, annotation, time.perf_counter() - start)
-            use = "report" if number in REPORT else "development"
-            groups[f"{use} {'Cycles' if number in CYCLES else 'fast'}"].add(tally)
+            use = "report" if number in REPORT else "development" if number in DEVELOPMENT else "other"
+            groups.setdefault(f"{use} {'Cycles' if number in CYCLES else 'fast'}", Tally()).add(tally)
             print(
                 f"video {number}: {tally.found}/{tally.objects} objects, {tally.seconds[0]:.1f} s, "
                 f"median error {np.median(tally.errors):.4f} m",

@@ -25,7 +25,7 @@ _STEEP_WIDTH = 1.25
 _REACH = 0.7
 """Share of the half length within which an edge counts."""
 _BISQUARE = 4.7
-_LEAST_SCALE = 0.15
+_LEAST_SCALE = 0.08
 """Pixels; edges are never trusted more than this."""
 _ROUNDS = 3
 _FEWEST_EDGES = 12

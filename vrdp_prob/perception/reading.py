@@ -122,9 +122,11 @@ def check_size(path: Path, video: Video, camera: Camera) -> None:
 def _arrays(track: Track, camera: Camera, count: int) -> Float[np.ndarray, "frame 7"]:
     """Rows of x, y, yaw and the covariance; NaN where there is no measurement."""
     rows = np.full((count, 7), np.nan)
+    scatters = [sighting.contour.scale for sighting in track.sightings.values() if sighting.contour is not None]
+    typical = float(np.median(scatters)) if scatters else 0.0
     for frame, sighting in track.sightings.items():
         place = np.array([sighting.pose.x, sighting.pose.y])
-        covariance = position_covariance(camera, track.solid, sighting)
+        covariance = position_covariance(camera, track.solid, sighting, typical)
         if covariance is None or float(np.linalg.eigvalsh(covariance)[-1]) > _LARGEST_SD**2:
             continue
         if bool(camera.in_view(place, track.radius)):

@@ -21,13 +21,14 @@ _SHAPE_EVERY = 8
 """Frames between looks at a track's shape after the first few."""
 _SHAPE_FIRST = 4
 _SHAPE_VISIBLE = 0.9
-"""Share of an object's picture that must show for its shape to be judged; for the very first look less will do."""
-_SHAPE_FIRST_VISIBLE = 0.5
+"""Share of an object's picture that must show for its shape to be judged."""
 _YAWS = tuple(np.radians((0.0, 30.0, 60.0)))
 _SHAPE_STEPS = (0.2, 0.1, 0.05)
 _REUNION_DISTANCE = 1.0
 """Metres from the expected place within which a lost object may be found again."""
 _REUNION_LIKENESS = 0.5
+_SOLID_SUPPORT = 0.6
+_FEWEST_OUTLINES = 3
 _NO_PAIR = 1e3
 _FEWEST_FRAMES = 4
 """Sightings below which a track is taken for a passing disturbance."""
@@ -65,11 +66,13 @@ class Tracker:
         self.tracks = [track for track in self.tracks if len(track.sightings) >= _FEWEST_FRAMES]
         for track in self.tracks:
             track.gone = False
+            if track.shape_frames == 0:
+                self._weigh_shapes_late(track)
         with display.stage("Measuring positions", count) as advance:
             for frame in reversed(range(count)):
                 self._backward(frame)
                 advance(1)
-        return self.tracks
+        return [track for track in self.tracks if _is_solid(track)]
 
     def evidence(self, frame: int) -> Evidence:
         """What a frame says at each pixel."""
@@ -121,7 +124,7 @@ class Tracker:
                 track.sightings[frame] = sighting
                 track.expected = sighting.pose
                 self.placer.learn(evidence, track, sighting, self.covered(track, live, sightings))
-                self._weigh_shapes(evidence, track, live, sightings)
+                self._look_at_shape(evidence, track, live, sightings)
             else:
                 track.expected = track.predict(frame, 1) or track.expected
                 track.gone = self.placer.window(track.solid, track.expected).area == 0
@@ -139,19 +142,28 @@ class Tracker:
                 covered[window.place] |= window.mask
         return covered
 
-    def _weigh_shapes(
-        self,
-        evidence: Evidence,
-        track: Track,
-        live: Sequence[Track],
-        sightings: Mapping[int, Sighting],
+    def _look_at_shape(
+        self, evidence: Evidence, track: Track, live: Sequence[Track], sightings: Mapping[int, Sighting]
     ) -> None:
-        """Compare the shapes in a frame that shows the object whole; take the best so far."""
+        """Weigh the shapes where it is time to and the object shows whole."""
         due = track.shape_frames < _SHAPE_FIRST or len(track.sightings) % _SHAPE_EVERY == 0
         sighting = sightings[track.number]
-        enough = _SHAPE_VISIBLE if track.shape_frames > 0 else _SHAPE_FIRST_VISIBLE
-        if not due or sighting.visible < enough:
-            return
+        if due and sighting.visible >= _SHAPE_VISIBLE:
+            self._weigh_shapes(evidence, track, live, sightings)
+
+    def _weigh_shapes_late(self, track: Track) -> None:
+        """Judge the shape of a track that was never seen whole by the frames that show most of it."""
+        ranked = sorted(track.sightings, key=lambda frame: -track.sightings[frame].visible)
+        for frame in ranked[:_SHAPE_FIRST]:
+            live = [other for other in self.tracks if frame in other.sightings]
+            sightings = {other.number: other.sightings[frame] for other in live}
+            self._weigh_shapes(self.evidence(frame), track, live, sightings)
+
+    def _weigh_shapes(
+        self, evidence: Evidence, track: Track, live: Sequence[Track], sightings: Mapping[int, Sighting]
+    ) -> None:
+        """Compare how well the shapes fit in one frame; take the best so far."""
+        sighting = sightings[track.number]
         covered = self.covered(track, live, sightings)
         behind = [
             (self.placer.window(other.solid, sightings[other.number].pose), other.appearance)
@@ -222,3 +234,9 @@ class Tracker:
             gain = Gain.of(evidence, track.appearance, nothing, [])
             sighting = self.placer.sight(evidence, gain, track.solid, [proposal.pose], nothing)
             track.sightings[frame] = sighting
+
+
+def _is_solid(track: Track) -> bool:
+    """Whether a track was seen often enough with an outline that fits; a glint or a stray patch has none."""
+    fits = [sighting.contour for sighting in track.sightings.values() if sighting.contour is not None]
+    return sum(fit.support >= _SOLID_SUPPORT for fit in fits) >= _FEWEST_OUTLINES

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import torch
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Float, Int
 from torch import Tensor
 
 from vrdp_prob.errors import InputError
@@ -21,21 +21,16 @@ class KernelArrays:
 
     Parameters
     ----------
-    shape, fixed
-        Outline of each body (0 disc, 1 square, 2 wall) and whether it cannot move.
-    present
-        Whether a body is there at all.
-    bodies, shared, start, release
-        Constants of the bodies, parameters of the worlds, states at release, and release times in s.
+    kinds
+        Outline of each body (0 disc, 1 square, 2 wall), whether it cannot move, and whether it is there at all.
+    bodies, shared, start
+        Constants of the bodies, parameters of the worlds, states at release with the release times in s.
     """
 
-    shape: Int[np.ndarray, "all"]
-    fixed: Bool[np.ndarray, "all"]
-    present: Bool[np.ndarray, "world all"]
+    kinds: Int[np.ndarray, "world all 3"]
     bodies: Float[Tensor, "world all constant"]
     shared: Float[Tensor, "world parameter"]
-    start: Float[Tensor, "world all 6"]
-    release: Float[Tensor, "world all"]
+    start: Float[Tensor, "world all state_and_time"]
 
 
 def kernel_arrays(worlds: Worlds, layout: Layout, first_time: float) -> KernelArrays:
@@ -50,20 +45,25 @@ def kernel_arrays(worlds: Worlds, layout: Layout, first_time: float) -> KernelAr
     if missing:
         raise InputError(f"worlds: the model needs the parameter {missing[0]}; add it to 'parameters'.")
     walls = worlds.walls.to(torch.float64)
-    shape = np.array([DISC if s.is_disc else SQUARE for s in worlds.shapes] + [WALL] * len(walls), dtype=np.int64)
-    count = len(worlds.shapes)
-    wall_present = np.ones((len(worlds), len(walls)), dtype=bool)
-    earliest = worlds.release_time.detach().min(dim=1, keepdim=True).values.clamp(max=first_time)
     shared = [worlds.parameters[name].to(torch.float64) for name in layout.shared]
+    earliest = worlds.release_time.detach().min(dim=1, keepdim=True).values.clamp(max=first_time)
+    release = torch.cat([worlds.release_time, earliest.expand(-1, len(walls))], dim=1).to(torch.float64)
+    states = torch.cat([_body_states(worlds), _wall_states(walls, len(worlds))], dim=1)
     return KernelArrays(
-        shape=shape,
-        fixed=np.arange(len(shape)) >= count,
-        present=np.concatenate([worlds.present.cpu().numpy(), wall_present], axis=1),
+        kinds=_kinds(worlds),
         bodies=torch.cat([_body_constants(worlds, layout), _wall_constants(worlds, walls, layout)], dim=1),
         shared=torch.stack(shared, dim=-1) if shared else torch.zeros(len(worlds), 0, dtype=torch.float64),
-        start=torch.cat([_body_states(worlds), _wall_states(walls, len(worlds))], dim=1),
-        release=torch.cat([worlds.release_time.to(torch.float64), earliest.expand(-1, len(walls))], dim=1),
+        start=torch.cat([states, release[..., None]], dim=-1),
     )
+
+
+def _kinds(worlds: Worlds) -> Int[np.ndarray, "world all 3"]:
+    count = len(worlds.shapes)
+    kinds = np.zeros((len(worlds), count + len(worlds.walls), 3), dtype=np.int64)
+    kinds[:, :count, 0] = [DISC if shape.is_disc else SQUARE for shape in worlds.shapes]
+    kinds[:, :count, 2] = worlds.present.cpu().numpy()
+    kinds[:, count:] = (WALL, 1, 1)
+    return kinds
 
 
 def _body_constants(worlds: Worlds, layout: Layout) -> Float[Tensor, "world body constant"]:

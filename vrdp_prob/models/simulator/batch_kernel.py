@@ -1,101 +1,125 @@
-"""Compiled entry: a batch of worlds, one after the other."""
+"""Compiled entries: a batch of worlds, one after the other, forward and backward."""
 
 import numpy as np
 from numba import njit
 
-from vrdp_prob.models.simulator.detection_kernel import Pairs
+from vrdp_prob.models.simulator.adjoint_kernel import Adjoint, reverse_world
+from vrdp_prob.models.simulator.detection_kernel import new_pairs
 from vrdp_prob.models.simulator.laws_kernel import GROUP_SIZE, STATE_SIZE, compiled
-from vrdp_prob.models.simulator.motion_kernel import Motion, Scene
-from vrdp_prob.models.simulator.rollout_kernel import NOT_FINITE, RESULT_SIZE, TAPE_FULL, Track, rollout_world
+from vrdp_prob.models.simulator.motion_kernel import STAGES
+from vrdp_prob.models.simulator.rollout_kernel import NOT_FINITE, TAPE_FULL, rollout_world
 from vrdp_prob.models.simulator.tableau import DENSE
-from vrdp_prob.models.simulator.tape_kernel import INTEGERS, NUMBERS, PHASE_SIZE, Tape
+from vrdp_prob.models.simulator.tape_kernel import INTEGERS, NUMBERS, ROWS, Tape
+from vrdp_prob.models.simulator.world_kernel import new_world
 
 
 @compiled
-def new_motion(count):
-    """Room for the motion of `count` bodies."""
-    groups = count // GROUP_SIZE
-    return Motion(
-        np.zeros((count, PHASE_SIZE)),
-        np.zeros(count, np.int64),
-        np.zeros(groups),
-        np.ones(groups),
-        np.zeros(groups),
-        np.zeros(groups, np.int64),
-        np.zeros(groups, np.int64),
-        np.zeros(groups),
-        np.zeros((groups, DENSE.shape[0], GROUP_SIZE, STATE_SIZE)),
-        np.zeros((DENSE.shape[1], GROUP_SIZE, STATE_SIZE)),
-        np.zeros((GROUP_SIZE, STATE_SIZE)),
-    )
+def is_finite(values):
+    """Whether all numbers of an array are finite."""
+    for value in values.flat:
+        if not np.isfinite(value):
+            return False
+    return True
 
 
 @compiled
-def new_pairs(count):
-    """Room for the contacts of `count` bodies."""
-    return Pairs(
-        np.zeros((count, count)),
-        np.zeros((count, count), np.int64),
-        np.zeros((count, count), np.int64),
-        np.zeros((count, count, 6)),
-        np.zeros((count, count), np.int64),
-        np.zeros((4, 8)),
-        np.zeros(3),
-        np.zeros(6),
-    )
+def joined(integers, numbers, first_row, world, tape):
+    """Append the tape of a world to the tapes of the batch, which grow where they must."""
+    begin, rows = first_row[world], tape.counts[ROWS]
+    first_row[world + 1] = begin + rows
+    if begin + rows > integers.shape[0]:
+        more = begin + rows + integers.shape[0]
+        longer_integers, longer_numbers = np.zeros((more, INTEGERS), np.int64), np.zeros((more, NUMBERS))
+        copy_rows(longer_integers, longer_numbers, 0, integers, numbers, begin)
+        integers, numbers = longer_integers, longer_numbers
+    copy_rows(integers, numbers, begin, tape.integers, tape.numbers, rows)
+    return integers, numbers
 
 
 @compiled
-def new_tape(rows):
-    """Room for a record."""
-    return Tape(np.zeros((rows, INTEGERS), np.int64), np.zeros((rows, NUMBERS)), np.zeros(2, np.int64))
-
-
-@compiled
-def is_finite(scene):
-    """Whether all numbers of a world are finite."""
-    return (
-        np.isfinite(scene.body).all()
-        and np.isfinite(scene.shared).all()
-        and np.isfinite(scene.start).all()
-        and np.isfinite(scene.release).all()
-    )
+def copy_rows(integers, numbers, begin, from_integers, from_numbers, rows):
+    """Copy the first rows of a tape to a place in another."""
+    for row in range(rows):
+        for c in range(INTEGERS):
+            integers[begin + row, c] = from_integers[row, c]
+        for c in range(NUMBERS):
+            numbers[begin + row, c] = from_numbers[row, c]
 
 
 @njit(nogil=True, error_model="numpy", cache=True)
-def rollout_batch(shape, fixed, bodies, shared, start, release, present, times, event_limit, states, outcomes):
+def rollout_batch(kinds, bodies, shared, start, times, event_limit, states, outcomes):  # noqa: PLR0917 - compiled
     """Simulate worlds into `states` and `outcomes`; returns the joined tapes and the first row of each world.
 
-    Arrays: `shape`, `fixed` [body], `bodies` [world, body, constant], `shared` [world, parameter], `start` [world,
-    body, state], `release` [world, body] in s, `present` [world, body], `times` [time] in s, `states` [world, time,
-    body, state], `outcomes` [world].
+    Arrays: `kinds` [world, body, (shape, fixed, present)], `bodies` [world, body, constant], `shared` [world,
+    parameter], `start` [world, body, (state, release time)], `times` [time] in s, `states` [world, time, body, state],
+    `outcomes` [world].
     """
-    worlds, count = release.shape
-    motion_state, pairs, tape = new_motion(count), new_pairs(count), new_tape(64 + 16 * count)
-    frame, row = np.zeros(count, np.int64), np.zeros(count // GROUP_SIZE, np.int64)
-    result, ya, yb = np.zeros(RESULT_SIZE), np.zeros(STATE_SIZE), np.zeros(STATE_SIZE)
-    first_row = np.zeros(worlds + 1, np.int64)
+    worlds, count = kinds.shape[0], kinds.shape[1]
+    capacity = 64 + 16 * count
     integers, numbers = np.zeros((64 * worlds, INTEGERS), np.int64), np.zeros((64 * worlds, NUMBERS))
-    for world in range(worlds):
-        scene = Scene(shape, fixed, bodies[world], shared[world], start[world], release[world], present[world])
-        track = Track(times, states[world], frame, row, result, ya, yb)
-        if is_finite(scene):
-            outcomes[world] = rollout_world(scene, motion_state, pairs, tape, track, event_limit)
-            while outcomes[world] == TAPE_FULL:
-                tape = new_tape(2 * tape.integers.shape[0])
-                outcomes[world] = rollout_world(scene, motion_state, pairs, tape, track, event_limit)
-            rows = tape.count[0]
+    first_row = np.zeros(worlds + 1, np.int64)
+    pairs = new_pairs(count)
+    row_integers, row_numbers = np.zeros((capacity, INTEGERS), np.int64), np.zeros((capacity, NUMBERS))
+    counts, place, local = np.zeros(2, np.int64), np.zeros((count, 2), np.int64), np.zeros((3, 16))
+    for index in range(worlds):
+        world = new_world(kinds[index], bodies[index], shared[index], start[index])
+        tape = Tape(row_integers, row_numbers, counts, place, times, states[index], local)
+        if is_finite(bodies[index]) and is_finite(shared[index]) and is_finite(start[index]):
+            outcomes[index] = rollout_world(world, pairs, tape, event_limit)
+            while outcomes[index] == TAPE_FULL:
+                capacity = 2 * capacity
+                row_integers, row_numbers = np.zeros((capacity, INTEGERS), np.int64), np.zeros((capacity, NUMBERS))
+                tape = Tape(row_integers, row_numbers, counts, place, times, states[index], local)
+                outcomes[index] = rollout_world(world, pairs, tape, event_limit)
         else:
-            states[world] = 0.0
-            outcomes[world] = NOT_FINITE
-            rows = 0
-        begin = first_row[world]
-        first_row[world + 1] = begin + rows
-        if begin + rows > integers.shape[0]:
-            more = begin + rows + integers.shape[0]
-            longer_integers, longer_numbers = np.zeros((more, INTEGERS), np.int64), np.zeros((more, NUMBERS))
-            longer_integers[:begin], longer_numbers[:begin] = integers[:begin], numbers[:begin]
-            integers, numbers = longer_integers, longer_numbers
-        integers[begin : begin + rows] = tape.integers[:rows]
-        numbers[begin : begin + rows] = tape.numbers[:rows]
+            outcomes[index] = NOT_FINITE
+            counts[ROWS] = 0
+            for frame in range(times.shape[0]):
+                for body in range(count):
+                    for c in range(STATE_SIZE):
+                        states[index, frame, body, c] = 0.0
+        integers, numbers = joined(integers, numbers, first_row, index, tape)
     return integers[: first_row[-1]], numbers[: first_row[-1]], first_row
+
+
+@njit(nogil=True, error_model="numpy", cache=True)
+def reverse_batch(  # noqa: PLR0917 - compiled
+    kinds,
+    bodies,
+    shared,
+    start,
+    times,
+    outcomes,
+    integers,
+    numbers,
+    first_row,
+    states_bar,
+    bodies_bar,
+    shared_bar,
+    start_bar,
+    times_bar,
+):
+    """Add the derivative of `states` times `states_bar` to the arrays ending in `_bar` (axes as in `rollout_batch`)."""
+    count = kinds.shape[1]
+    groups = count // GROUP_SIZE
+    polynomial = np.zeros((groups, DENSE.shape[0], GROUP_SIZE, STATE_SIZE))
+    state, leg, loaded = np.zeros((groups, GROUP_SIZE, STATE_SIZE)), np.zeros(groups), np.zeros(groups, np.int64)
+    stages, local = np.zeros((STAGES, GROUP_SIZE, STATE_SIZE)), np.zeros((8, 16))
+    for index in range(kinds.shape[0]):
+        if outcomes[index] == NOT_FINITE:
+            continue
+        world = new_world(kinds[index], bodies[index], shared[index], start[index])
+        adjoint = Adjoint(
+            bodies_bar[index],
+            shared_bar[index],
+            start_bar[index],
+            times_bar,
+            polynomial,
+            state,
+            leg,
+            loaded,
+            stages,
+            local,
+        )
+        rows = slice(first_row[index], first_row[index + 1])
+        reverse_world(world, adjoint, integers[rows], numbers[rows], times, states_bar[index])

@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vrdp_prob.models.simulator.laws_kernel import GROUP_SIZE, compiled
+from vrdp_prob.models.simulator.world_kernel import LENGTH, share_of
 
 TOUCHING = 1e-12
 """Gap in m below which two bodies touch."""
@@ -23,20 +24,38 @@ SLACK = 1e-7
 """Depth in m of that, and of an overlap that is not yet an error."""
 CRAWL = 1e-6
 """Shortest walk in s while two bodies touch."""
-DISC, SQUARE, WALL = 0, 1, 2
+# Columns of `table`; the contact's features (x, y, extent of the owner; x, y, extent of the other) follow.
+CONTACT_TIME, PAIR_KIND, OWNER, OVERLAPPING, PAIR_FEATURE = 0, 1, 2, 3, 4
+# Rows of `local`: the difference of the positions and both angles as polynomials; a look; its features.
+ANGLE_FIRST, LOOK, LOOK_FEATURE = 2, 4, 5
+GAP, RATE, CURVATURE = 0, 1, 2
 
 
 class Pairs(NamedTuple):
-    """Next contact of each pair."""
+    """Next contact of each pair, and room for a search."""
 
-    time: np.ndarray  # [body, body], s, of the first and second body with first < second
-    kind: np.ndarray  # [body, body], 0 point and point, 1 line and point
-    owner: np.ndarray  # [body, body], body whose feature comes first
-    feature: np.ndarray  # [body, body, (x, y, extent of the owner; x, y, extent of the other)]
-    overlapping: np.ndarray  # [body, body]
-    path: np.ndarray  # [(difference x, difference y, angle of first, angle of second), power]
-    found: np.ndarray  # [(gap, rate, step)], of the last evaluation
-    candidate: np.ndarray  # [6], feature of the last evaluation
+    table: np.ndarray  # [first, second, (time, kind, owner, overlapping, features)] with first < second
+    local: np.ndarray  # [6, 8]
+
+
+@compiled
+def new_pairs(count):
+    """Room for the contacts of `count` bodies."""
+    return Pairs(np.zeros((count, count, 10)), np.zeros((6, 8)))
+
+
+@compiled
+def set_feature(pairs, at, x, y, extent):
+    """Note one of the two features of a look."""
+    pairs.local[LOOK_FEATURE, at] = x
+    pairs.local[LOOK_FEATURE, at + 1] = y
+    pairs.local[LOOK_FEATURE, at + 2] = extent
+
+
+@compiled
+def set_look(pairs, gap, rate, curvature):
+    """Note a look."""
+    pairs.local[LOOK, GAP], pairs.local[LOOK, RATE], pairs.local[LOOK, CURVATURE] = gap, rate, curvature
 
 
 @compiled
@@ -57,12 +76,12 @@ def restrict(polynomial, slot, c, offset, scale, sign, out):
 
 
 @compiled
-def add_path(motion_state, body, t, duration, sign, c, out):
+def add_path(world, body, t, duration, sign, c, out):
     """Add a coordinate of a body on [t, t + duration], as a polynomial of the share of `duration`, to `out`."""
     group = body // GROUP_SIZE
     slot = body - group * GROUP_SIZE
-    h = motion_state.length[group]
-    restrict(motion_state.polynomial[group], slot, c, (t - motion_state.origin[group]) / h, duration / h, sign, out)
+    scale = duration / world.clock[group, LENGTH]
+    restrict(world.polynomial[group], slot, c, share_of(world, group, t), scale, sign, out)
 
 
 @compiled
@@ -112,12 +131,12 @@ def walk(gap, rate, curvature):
 @compiled
 def disc_disc(pairs, s, reach, curvature):
     """Gap of two discs."""
-    dx, dy = value(pairs.path[0], s), value(pairs.path[1], s)
+    dx, dy = value(pairs.local[0], s), value(pairs.local[1], s)
     distance = math.hypot(dx, dy)
-    rate = (dx * slope(pairs.path[0], s) + dy * slope(pairs.path[1], s)) / max(distance, 1e-300)
-    pairs.found[0], pairs.found[1], pairs.found[2] = distance - reach, rate, curvature
-    pairs.candidate[0], pairs.candidate[1], pairs.candidate[2] = 0.0, 0.0, 1.0
-    pairs.candidate[3], pairs.candidate[4], pairs.candidate[5] = 0.0, 0.0, 1.0
+    rate = (dx * slope(pairs.local[0], s) + dy * slope(pairs.local[1], s)) / max(distance, 1e-300)
+    set_look(pairs, distance - reach, rate, curvature)
+    set_feature(pairs, 0, 0.0, 0.0, 1.0)
+    set_feature(pairs, 3, 0.0, 0.0, 1.0)
     return 0
 
 
@@ -125,10 +144,10 @@ def disc_disc(pairs, s, reach, curvature):
 def box_disc(pairs, s, half, flat, radius, box_is_second, curvature):
     """Gap of a square (or a straight wall, `flat`) and a disc."""
     sign = -1.0 if box_is_second else 1.0
-    angle_row = 3 if box_is_second else 2
-    dx, dy = sign * value(pairs.path[0], s), sign * value(pairs.path[1], s)
-    vx, vy = sign * slope(pairs.path[0], s), sign * slope(pairs.path[1], s)
-    angle, spin = value(pairs.path[angle_row], s), slope(pairs.path[angle_row], s)
+    angle_row = ANGLE_FIRST + 1 if box_is_second else ANGLE_FIRST
+    dx, dy = sign * value(pairs.local[0], s), sign * value(pairs.local[1], s)
+    vx, vy = sign * slope(pairs.local[0], s), sign * slope(pairs.local[1], s)
+    angle, spin = value(pairs.local[angle_row], s), slope(pairs.local[angle_row], s)
     cosine, sine = math.cos(angle), math.sin(angle)
     x, y = cosine * dx + sine * dy, -sine * dx + cosine * dy
     half_y = 0.0 if flat else half
@@ -139,24 +158,23 @@ def box_disc(pairs, s, half, flat, radius, box_is_second, curvature):
         px, py = math.copysign(half, x), math.copysign(half_y, y)
         distance = math.hypot(x - px, y - py)
         nx, ny = (x - px) / distance, (y - py) / distance
-        pairs.candidate[0], pairs.candidate[1] = math.copysign(1.0, x), 0.0 if flat else math.copysign(1.0, y)
-        pairs.candidate[2] = 0.0
-    elif outside_x > outside_y and not (flat and outside_x <= 0.0):
+        set_feature(pairs, 0, math.copysign(1.0, x), 0.0 if flat else math.copysign(1.0, y), 0.0)
+    elif flat and outside_x > 0.0:
+        kind = 0
         distance = outside_x
         nx, ny = math.copysign(1.0, x), 0.0
-        pairs.candidate[0], pairs.candidate[1], pairs.candidate[2] = nx, ny, 1.0
-        if flat:
-            kind = 0
-            pairs.candidate[2] = 0.0
+        set_feature(pairs, 0, nx, 0.0, 0.0)
+    elif outside_x > outside_y and not flat:
+        distance = outside_x
+        nx, ny = math.copysign(1.0, x), 0.0
+        set_feature(pairs, 0, nx, 0.0, 1.0)
     else:
         distance = outside_y
         nx, ny = 0.0, math.copysign(1.0, y)
-        pairs.candidate[0], pairs.candidate[1], pairs.candidate[2] = nx, ny, 0.0 if flat else 1.0
-    pairs.candidate[3], pairs.candidate[4], pairs.candidate[5] = 0.0, 0.0, 1.0
+        set_feature(pairs, 0, 0.0, ny, 0.0 if flat else 1.0)
+    set_feature(pairs, 3, 0.0, 0.0, 1.0)
     wx, wy = cosine * nx - sine * ny, sine * nx + cosine * ny
-    pairs.found[0] = distance - radius
-    pairs.found[1] = wx * (vx + spin * dy) + wy * (vy - spin * dx)
-    pairs.found[2] = curvature
+    set_look(pairs, distance - radius, wx * (vx + spin * dy) + wy * (vy - spin * dx), curvature)
     return kind
 
 
@@ -167,11 +185,12 @@ def box_side(pairs, s, swapped, half_a, half_b, flat_b, face, curvature, corner)
     Writes gap, rate and the chosen corner; returns the certain step over all corners.
     """
     sign = -1.0 if swapped else 1.0
-    row_a, row_b = (3, 2) if swapped else (2, 3)
-    dx, dy = sign * value(pairs.path[0], s), sign * value(pairs.path[1], s)
-    vx, vy = sign * slope(pairs.path[0], s), sign * slope(pairs.path[1], s)
-    angle_a, spin_a = value(pairs.path[row_a], s), slope(pairs.path[row_a], s)
-    angle_b, spin_b = value(pairs.path[row_b], s), slope(pairs.path[row_b], s)
+    row_a = ANGLE_FIRST + 1 if swapped else ANGLE_FIRST
+    row_b = ANGLE_FIRST if swapped else ANGLE_FIRST + 1
+    dx, dy = sign * value(pairs.local[0], s), sign * value(pairs.local[1], s)
+    vx, vy = sign * slope(pairs.local[0], s), sign * slope(pairs.local[1], s)
+    angle_a, spin_a = value(pairs.local[row_a], s), slope(pairs.local[row_a], s)
+    angle_b, spin_b = value(pairs.local[row_b], s), slope(pairs.local[row_b], s)
     nx, ny = math.cos(angle_a + face), math.sin(angle_a + face)
     cosine, sine = math.cos(angle_b), math.sin(angle_b)
     least, step = math.inf, math.inf
@@ -197,25 +216,29 @@ def box_side(pairs, s, swapped, half_a, half_b, flat_b, face, curvature, corner)
 
 
 @compiled
-def box_box(pairs, s, half, flat, curvature):
-    """Gap of two boxes: the largest over the sides of both (separating axes); returns 1 plus 2 where `second` owns it."""
+def box_box(pairs, s, half_i, half_j, flat_i, flat_j, curvature):
+    """Gap of two boxes: the largest over the sides of both (separating axes).
+
+    The look holds the certain step in place of the curvature. Returns 1, plus 2 where the second box owns the side.
+    """
     corner = np.empty(5)
     best = -math.inf
     result = 1
     for swapped in range(2):
-        a, b = (1, 0) if swapped else (0, 1)
+        half_a, half_b = (half_j, half_i) if swapped else (half_i, half_j)
+        flat_a, flat_b = (flat_j, flat_i) if swapped else (flat_i, flat_j)
+        height = 0.0 if flat_a else half_a
         for index in range(4):
-            if flat[a] and index % 2 == 0:
+            if flat_a and index % 2 == 0:
                 continue
             face = 0.5 * math.pi * index
-            half_a = 0.0 if flat[a] else half[a]
-            step = box_side(pairs, s, swapped == 1, half_a, half[b], flat[b], face, curvature[a], corner)
+            step = box_side(pairs, s, swapped == 1, height, half_b, flat_b, face, curvature[swapped], corner)
             if corner[4] > best:
                 best = corner[4]
                 result = 1 + 2 * swapped
-                pairs.found[0], pairs.found[1], pairs.found[2] = corner[0], corner[1], step
-                pairs.candidate[0] = 1.0 if index == 0 else (-1.0 if index == 2 else 0.0)
-                pairs.candidate[1] = 1.0 if index == 1 else (-1.0 if index == 3 else 0.0)
-                pairs.candidate[2] = 0.0 if flat[a] else 1.0
-                pairs.candidate[3], pairs.candidate[4], pairs.candidate[5] = corner[2], corner[3], 0.0
+                set_look(pairs, corner[0], corner[1], step)
+                x = 1.0 if index == 0 else (-1.0 if index == 2 else 0.0)
+                y = 1.0 if index == 1 else (-1.0 if index == 3 else 0.0)
+                set_feature(pairs, 0, x, y, 0.0 if flat_a else 1.0)
+                set_feature(pairs, 3, corner[2], corner[3], 0.0)
     return result

@@ -1,6 +1,6 @@
 """The laws of a model as compiled source: every hook is recorded once and written down with its derivative."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from vrdp_prob.models.effects.effect import BodyView, Effect
@@ -81,7 +81,7 @@ def _motion_source(effects: Sequence[Effect], layout: Layout) -> str:
     inputs = _Inputs(layout)
     time = inputs.recorder.input("t")
     state, constants = inputs.array("y", len(STATE)), inputs.array("body", len(layout.constants))
-    phase = inputs.array("phase", 4)
+    phase = inputs.array("phase", 5)
     body = inputs.view(state, constants, (phase[1], phase[2]))
     outputs = derivative(effects, time, body, Phase(phase[0], phase[3]), inputs.shared)
     arguments = "t, y, phase, body, shared"
@@ -124,48 +124,46 @@ def _contact_source(kind: ContactKind, effects: Sequence[Effect], layout: Layout
     more = [result.closing_speed, result.normal_impulse, *geometry.point, *geometry.normal, geometry.gap]
     arguments = "ya, yb, body_a, body_b, feature, shared"
     name = kind.name.lower()
-    value = _function(name, f"{arguments}, out", assignments(_targets("out", [*result.a, *result.b, *more])))
-    bars = inputs.array("bar", 7)
-    wanted = [*state_a, *state_b, *constants_a, *constants_b, *inputs.shared.values()]
-    adjoints = vector_jacobian([*result.a, *result.b, geometry.gap], bars, wanted)
-    targets: dict[str, Scalar] = {}
-    at = 0
-    for target, size in (
-        ("ya_bar", len(STATE)),
-        ("yb_bar", len(STATE)),
-        ("body_a_bar", len(layout.constants)),
-        ("body_b_bar", len(layout.constants)),
-        ("shared_bar", len(layout.shared)),
-    ):
-        targets |= _targets(target, adjoints[at : at + size])
-        at += size
-    bar_arguments = "bar, ya_bar, yb_bar, body_a_bar, body_b_bar, shared_bar"
-    return value + _function(f"{name}_vjp", f"{arguments}, {bar_arguments}", assignments(targets, add=True))
+    value = _function(
+        f"contact_{name}", f"{arguments}, out", assignments(_targets("out", [*result.a, *result.b, *more]))
+    )
+    bar_arguments = f"{arguments}, bar, ya_bar, yb_bar, body_a_bar, body_b_bar, shared_bar"
+    sizes = {
+        "ya_bar": state_a,
+        "yb_bar": state_b,
+        "body_a_bar": constants_a,
+        "body_b_bar": constants_b,
+        "shared_bar": list(inputs.shared.values()),
+    }
+    text = value
+    for part, outputs in (("contact", [*result.a, *result.b]), ("gap", [geometry.gap])):
+        wanted = [symbol for symbols in sizes.values() for symbol in symbols]
+        adjoints = iter(vector_jacobian(outputs, inputs.array("bar", len(outputs)), wanted))
+        targets = {target: next(adjoints) for array, symbols in sizes.items() for target in _targets(array, symbols)}
+        text += _function(f"{part}_{name}_vjp", bar_arguments, assignments(targets, add=True))
+    return text
 
 
-def _choice_source(suffix: str, arguments: str) -> str:
-    kinds = [kind.name.lower() for kind in ContactKind]
+def _choice_source(part: str, suffix: str, arguments: str) -> str:
+    arguments = f"ya, yb, body_a, body_b, feature, shared, {arguments}"
     lines = [
         f"if kind == {int(ContactKind.LINE_POINT)}:",
-        f"    {kinds[1]}{suffix}({arguments})",
+        f"    {part}_{ContactKind.LINE_POINT.name.lower()}{suffix}({arguments})",
         "else:",
-        f"    {kinds[0]}{suffix}({arguments})",
+        f"    {part}_{ContactKind.POINT_POINT.name.lower()}{suffix}({arguments})",
     ]
-    return _function(f"contact_law{suffix}", f"kind, {arguments}", lines)
+    return _function(f"{part}_law{suffix}", f"kind, {arguments}", lines)
 
 
-def law_sources(effects: Sequence[Effect], layout: Layout) -> Mapping[str, str]:
-    """Source of the compiled laws by name of a part: `forward` is needed to simulate, all for the derivative."""
-    makers: dict[str, Callable[[], str]] = {
-        "motion": lambda: _motion_source(effects, layout),
-        "external": lambda: _external_source(effects, layout),
-        "contact": lambda: "".join(_contact_source(kind, effects, layout) for kind in ContactKind),
-        "choice": lambda: (
-            _choice_source("", "ya, yb, body_a, body_b, feature, shared, out")
-            + _choice_source(
-                "_vjp",
-                "ya, yb, body_a, body_b, feature, shared, bar, ya_bar, yb_bar, body_a_bar, body_b_bar, shared_bar",
-            )
-        ),
-    }
-    return {name: maker() for name, maker in makers.items()}
+def law_source(effects: Sequence[Effect], layout: Layout) -> str:
+    """Source of all compiled laws of a model (see `laws_kernel.py`)."""
+    bars = "bar, ya_bar, yb_bar, body_a_bar, body_b_bar, shared_bar"
+    parts = [
+        _motion_source(effects, layout),
+        _external_source(effects, layout),
+        *(_contact_source(kind, effects, layout) for kind in ContactKind),
+        _choice_source("contact", "", "out"),
+        _choice_source("contact", "_vjp", bars),
+        _choice_source("gap", "_vjp", bars),
+    ]
+    return "".join(parts)

@@ -1,10 +1,11 @@
 """Signatures of the compiled laws of a model; the generated functions take their place when the kernel is assembled.
 
-Arrays: `y` is a body's state (x, y, angle, vx, vy, spin), `phase` is (moving, reference x, reference y, spin sense),
-`body` holds its constants and `shared` the parameters of the video. A function ending in `_vjp` adds the vector-Jacobian
-product with `bar` to the arrays ending in `_bar`.
+Arrays: `y` is a body's state (x, y, angle, vx, vy, spin, for models with slip also the rolling velocity), `phase` its
+phase (see `motion_kernel.py`), `body` its constants and `shared` the parameters of the video. A function ending in
+`_vjp` adds the vector-Jacobian product with `bar` to the arrays ending in `_bar`.
 """
 
+# ruff: noqa: PLR0917 - compiled functions take their arrays by position
 from typing import Any
 
 from numba import njit
@@ -15,6 +16,8 @@ STATE_SIZE = 6
 """Numbers in a body's state."""
 GROUP_SIZE = 1
 """Bodies that move together: 1, or all of them where an effect couples their motion."""
+SLIPS = False
+"""Whether spheres may slip, so that their state has a rolling velocity."""
 
 
 def motion(t: Any, y: Any, phase: Any, body: Any, shared: Any, out: Any) -> None:
@@ -32,7 +35,7 @@ def external(t: Any, y: Any, phase: Any, body: Any, shared: Any, out: Any) -> No
 
 
 def contact_law(kind: Any, ya: Any, yb: Any, body_a: Any, body_b: Any, feature: Any, shared: Any, out: Any) -> None:
-    """(vx, vy, spin) of both after a contact, closing speed, impulse, point (2), normal (2) and gap."""
+    """Write (vx, vy, spin) of both after a contact, closing speed, impulse, point (2), normal (2) and gap."""
 
 
 def contact_law_vjp(
@@ -50,4 +53,22 @@ def contact_law_vjp(
     body_b_bar: Any,
     shared_bar: Any,
 ) -> None:
-    """Derivative of the velocities after a contact (6) and of the gap."""
+    """Derivative of the six velocities after a contact."""
+
+
+def gap_law_vjp(
+    kind: Any,
+    ya: Any,
+    yb: Any,
+    body_a: Any,
+    body_b: Any,
+    feature: Any,
+    shared: Any,
+    bar: Any,
+    ya_bar: Any,
+    yb_bar: Any,
+    body_a_bar: Any,
+    body_b_bar: Any,
+    shared_bar: Any,
+) -> None:
+    """Derivative of the gap."""

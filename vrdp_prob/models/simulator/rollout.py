@@ -1,5 +1,6 @@
 """Simulate a batch of worlds: the result, and the gradient through the compiled kernel."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from types import ModuleType
 from typing import Any
@@ -89,7 +90,7 @@ def simulate(
     if len(times) == 0 or not torch.isfinite(detached).all() or (detached.diff() <= 0).any():
         raise InputError("simulate: the times must be finite and increasing, at least one.")
     arrays = kernel_arrays(worlds, model.layout, float(detached[0]))
-    flat = (arrays.bodies, arrays.shared, arrays.start, arrays.release, times.to(torch.float64))
+    flat = (arrays.bodies, arrays.shared, arrays.start, times.to(torch.float64))
     run = _Run(model.kernel, arrays, event_limit)
     states = _Simulation.apply(run, *(tensor.cpu() for tensor in flat))
     states = states[:, :, : len(worlds.shapes)].to(worlds.position)
@@ -108,57 +109,40 @@ class _Run:
     """One call of the kernel, and what its derivative needs to know of it."""
 
     def __init__(self, kernel: ModuleType, arrays: KernelArrays, event_limit: int) -> None:
-        self.kernel, self.arrays, self.event_limit = kernel, arrays, event_limit
-        self.outcomes: Int[np.ndarray, "world"] = np.zeros(len(arrays.present), dtype=np.int64)
+        self.kernel, self.kinds, self.event_limit = kernel, arrays.kinds, event_limit
+        self.outcomes: Int[np.ndarray, "world"] = np.zeros(len(arrays.kinds), dtype=np.int64)
         self.tapes: Tapes
 
-    def forward(self, inputs: tuple[Tensor, ...]) -> Tensor:
-        bodies, shared, start, release, times = (np.ascontiguousarray(tensor.numpy()) for tensor in inputs)
-        arrays = self.arrays
-        states = np.empty((len(bodies), len(times), *start.shape[1:]))
-        self.tapes = Tapes(
-            *self.kernel.rollout_batch(
-                arrays.shape,
-                arrays.fixed,
-                bodies,
-                shared,
-                start,
-                release,
-                arrays.present,
-                times,
-                self.event_limit,
-                states,
-                self.outcomes,
-            )
+    def forward(self, inputs: Sequence[Tensor]) -> Tensor:
+        """States [world, time, body, state] of bodies and walls."""
+        bodies, shared, start, times = (tensor.detach().contiguous().numpy() for tensor in inputs)
+        states = np.empty((*self.kinds.shape[:1], len(times), self.kinds.shape[1], start.shape[2] - 1))
+        rows = self.kernel.rollout_batch(
+            self.kinds, bodies, shared, start, times, self.event_limit, states, self.outcomes
         )
+        self.tapes = Tapes(*rows)
         return torch.from_numpy(states)
+
+    def backward(self, inputs: Sequence[Tensor], bar: Tensor) -> tuple[Tensor, ...]:
+        """Derivative by all inputs of the sum of states times `bar`."""
+        arrays = [tensor.detach().contiguous().numpy() for tensor in inputs]
+        bars = [np.zeros_like(array) for array in arrays]
+        self.kernel.reverse_batch(
+            self.kinds, *arrays, self.outcomes, *self.tapes, bar.to(torch.float64).contiguous().numpy(), *bars
+        )
+        return tuple(torch.from_numpy(array) for array in bars)
 
 
 class _Simulation(torch.autograd.Function):
+    """The kernel as a differentiable function of the tensors `bodies`, `shared`, `start` and `times`."""
+
     @staticmethod
     def forward(ctx: Any, run: _Run, *inputs: Tensor) -> Tensor:
         ctx.run = run
         ctx.save_for_backward(*inputs)
-        return run.forward(tuple(tensor.detach() for tensor in inputs))
+        return run.forward(inputs)
 
     @staticmethod
     @torch.autograd.function.once_differentiable
-    def backward(ctx: Any, *bars: Tensor) -> tuple[Tensor | None, ...]:
-        inputs = ctx.saved_tensors
-        return None, *(_differences(ctx.run, inputs, index, bars[0]) for index in range(len(inputs)))
-
-
-def _differences(run: _Run, inputs: tuple[Tensor, ...], index: int, bar: Tensor) -> Tensor:
-    step = 1e-6
-    gradient = torch.zeros_like(inputs[index])
-    per_world = index < len(inputs) - 1
-    flat = gradient.view(len(gradient), -1) if per_world else gradient.view(1, -1)
-    for column in range(flat.shape[1]):
-        values = []
-        for sign in (1, -1):
-            moved = [tensor.clone() for tensor in inputs]
-            moved[index].view(flat.shape[0], -1)[:, column] += sign * step
-            values.append((_Run(run.kernel, run.arrays, run.event_limit).forward(tuple(moved)) * bar).sum((1, 2, 3)))
-        difference = (values[0] - values[1]) / (2 * step)
-        flat[:, column] = difference if per_world else difference.sum()
-    return gradient
+    def backward(ctx: Any, bar: Tensor) -> tuple[Tensor | None, ...]:
+        return None, *ctx.run.backward(ctx.saved_tensors, bar)

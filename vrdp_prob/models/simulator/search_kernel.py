@@ -5,12 +5,21 @@ import math
 import numpy as np
 
 from vrdp_prob.models.simulator.detection_kernel import (
+    ANGLE_FIRST,
+    CONTACT_TIME,
     CRAWL,
-    DISC,
+    CURVATURE,
+    GAP,
+    LOOK,
+    LOOK_FEATURE,
+    OVERLAPPING,
+    OWNER,
+    PAIR_FEATURE,
+    PAIR_KIND,
+    RATE,
     SLACK,
     SLOW,
     TOUCHING,
-    WALL,
     add_path,
     bound,
     box_box,
@@ -19,110 +28,147 @@ from vrdp_prob.models.simulator.detection_kernel import (
     plane_bound,
     walk,
 )
-from vrdp_prob.models.simulator.laws_kernel import compiled
+from vrdp_prob.models.simulator.laws_kernel import GROUP_SIZE, compiled
+from vrdp_prob.models.simulator.world_kernel import (
+    ALIVE,
+    DISC,
+    MOVING,
+    RADIUS,
+    RESTING,
+    SHAPE,
+    SPIN_SENSE,
+    SQUARE,
+    UNTIL,
+    WALL,
+)
 
 CLEARING = 1e-3
 """Time in s between two looks at bodies that overlap."""
 
 
 @compiled
-def outer_radius(scene, body):
+def outer_radius(world, body):
     """Radius of a circle around the body's centre that holds it."""
-    radius = scene.body[body, 4]
-    return radius * math.sqrt(2.0) if scene.shape[body] == 1 else radius
+    radius = world.body[body, RADIUS]
+    return radius * math.sqrt(2.0) if world.kind[body, SHAPE] == SQUARE else radius
 
 
 @compiled
-def set_path(scene, motion_state, pairs, i, j, t, duration):
+def set_path(world, pairs, i, j, t, duration):
     """Relative motion of two bodies as polynomials of the share of `duration`."""
-    pairs.path[:] = 0.0
+    for row in range(4):
+        for power in range(8):
+            pairs.local[row, power] = 0.0
     for c in range(2):
-        add_path(motion_state, j, t, duration, 1.0, c, pairs.path[c])
-        add_path(motion_state, i, t, duration, -1.0, c, pairs.path[c])
-    if scene.shape[i] != DISC:
-        add_path(motion_state, i, t, duration, 1.0, 2, pairs.path[2])
-    if scene.shape[j] != DISC:
-        add_path(motion_state, j, t, duration, 1.0, 2, pairs.path[3])
+        add_path(world, j, t, duration, 1.0, c, pairs.local[c])
+        add_path(world, i, t, duration, -1.0, c, pairs.local[c])
+    if world.kind[i, SHAPE] != DISC:
+        add_path(world, i, t, duration, 1.0, 2, pairs.local[ANGLE_FIRST])
+    if world.kind[j, SHAPE] != DISC:
+        add_path(world, j, t, duration, 1.0, 2, pairs.local[ANGLE_FIRST + 1])
 
 
 @compiled
-def set_curvature(scene, pairs, i, j, curvature):
+def set_curvature(world, pairs, i, j, curvature):
     """Bounds on the fall of the rate of the gap, in the frames of both bodies."""
-    path = pairs.path
+    path = pairs.local
     acceleration, velocity, distance = plane_bound(path, 2), plane_bound(path, 1), plane_bound(path, 0)
     for own in range(2):
-        spin, other = bound(path[2 + own], 1), bound(path[3 - own], 1)
-        change, other_change = bound(path[2 + own], 2), bound(path[3 - own], 2)
-        reach = outer_radius(scene, j if own == 0 else i)
+        spin, other = bound(path[ANGLE_FIRST + own], 1), bound(path[ANGLE_FIRST + 1 - own], 1)
+        change, other_change = bound(path[ANGLE_FIRST + own], 2), bound(path[ANGLE_FIRST + 1 - own], 2)
+        reach = outer_radius(world, j if own == 0 else i)
         curvature[own] = acceleration + 2.0 * spin * velocity + (spin * spin + change) * distance
         curvature[own] += reach * ((spin + other) ** 2 + change + other_change)
 
 
 @compiled
-def look(scene, pairs, i, j, s, half, flat, curvature):
-    """Gap, rate, certain step and features of a pair at one place; returns 0 point-point, 1 line-point, +2 if swapped."""
-    if scene.shape[i] == DISC and scene.shape[j] == DISC:
-        return disc_disc(pairs, s, half[0] + half[1], curvature[0])
-    if scene.shape[i] == DISC:
-        return 2 + box_disc(pairs, s, half[1], flat[1], half[0], True, curvature[1])
-    if scene.shape[j] == DISC:
-        return box_disc(pairs, s, half[0], flat[0], half[1], False, curvature[0])
-    return box_box(pairs, s, half, flat, curvature)
+def look(world, pairs, i, j, s, curvature):
+    """Look at a pair at one place; returns 0 for point and point, 1 for line and point, plus 2 if j owns the line."""
+    half_i, half_j = world.body[i, RADIUS], world.body[j, RADIUS]
+    shape_i, shape_j = world.kind[i, SHAPE], world.kind[j, SHAPE]
+    if shape_i == DISC and shape_j == DISC:
+        return disc_disc(pairs, s, half_i + half_j, curvature[0])
+    if shape_i == DISC:
+        return 2 + box_disc(pairs, s, half_j, shape_j == WALL, half_i, True, curvature[1])
+    if shape_j == DISC:
+        return box_disc(pairs, s, half_i, shape_i == WALL, half_j, False, curvature[0])
+    return box_box(pairs, s, half_i, half_j, shape_i == WALL, shape_j == WALL, curvature)
 
 
 @compiled
-def certain_step(scene, pairs, i, j, duration):
+def certain_step(world, pairs, i, j, duration):
     """Step along the overlap that passes no contact."""
-    gap, rate = pairs.found[0], pairs.found[1]
+    gap, rate = pairs.local[LOOK, GAP], pairs.local[LOOK, RATE]
     touching = gap <= TOUCHING
-    if scene.shape[i] != DISC and scene.shape[j] != DISC:
-        step = pairs.found[2]
+    if world.kind[i, SHAPE] != DISC and world.kind[j, SHAPE] != DISC:
+        step = pairs.local[LOOK, CURVATURE]
     else:
-        step = walk(max(gap, 0.0) + SLACK if touching else gap, rate, pairs.found[2])
+        step = walk(max(gap, 0.0) + SLACK if touching else gap, rate, pairs.local[LOOK, CURVATURE])
     return max(step, CRAWL / duration) if touching else step
 
 
 @compiled
-def search(scene, motion_state, pairs, i, j, t, end):
+def search(world, pairs, i, j, t, end):
     """Find the next contact of bodies i < j in [t, end] and store it; infinity where there is none."""
-    pairs.time[i, j] = math.inf
+    pairs.table[i, j, CONTACT_TIME] = math.inf
     duration = end - t
     if not duration > 0.0:
         return
-    set_path(scene, motion_state, pairs, i, j, t, duration)
-    reach = outer_radius(scene, i) + outer_radius(scene, j)
-    if math.hypot(pairs.path[0, 0], pairs.path[1, 0]) - plane_bound(pairs.path, 1) > reach:
-        pairs.overlapping[i, j] = 0
+    set_path(world, pairs, i, j, t, duration)
+    reach = outer_radius(world, i) + outer_radius(world, j)
+    # Too far apart to meet, whatever the way.
+    if math.hypot(pairs.local[0, 0], pairs.local[1, 0]) - plane_bound(pairs.local, 1) > reach:
+        pairs.table[i, j, OVERLAPPING] = 0
         return
-    curvature, half, flat = np.empty(2), np.empty(2), np.empty(2, np.bool_)
-    set_curvature(scene, pairs, i, j, curvature)
-    half[0], half[1] = scene.body[i, 4], scene.body[j, 4]
-    flat[0], flat[1] = scene.shape[i] == WALL, scene.shape[j] == WALL
+    curvature = np.zeros(2)
+    set_curvature(world, pairs, i, j, curvature)
     s = 0.0
     while s <= 1.0:
-        code = look(scene, pairs, i, j, s, half, flat, curvature)
-        gap, rate = pairs.found[0], pairs.found[1] / duration
-        if pairs.overlapping[i, j]:
+        code = look(world, pairs, i, j, s, curvature)
+        gap, rate = pairs.local[LOOK, GAP], pairs.local[LOOK, RATE] / duration
+        if pairs.table[i, j, OVERLAPPING]:
             if gap >= 0.0:
-                pairs.overlapping[i, j] = 0
+                pairs.table[i, j, OVERLAPPING] = 0
             else:
                 s += CLEARING / duration
             continue
         if gap <= TOUCHING and (rate < -SLOW or (gap <= -SLACK and rate < 0.0)):
-            pairs.time[i, j] = t + s * duration
-            pairs.kind[i, j] = code % 2
-            pairs.owner[i, j] = j if code >= 2 else i
-            pairs.feature[i, j] = pairs.candidate
+            pairs.table[i, j, CONTACT_TIME] = t + s * duration
+            pairs.table[i, j, PAIR_KIND] = code % 2
+            pairs.table[i, j, OWNER] = j if code >= 2 else i
+            for c in range(6):
+                pairs.table[i, j, PAIR_FEATURE + c] = pairs.local[LOOK_FEATURE, c]
             return
-        s += certain_step(scene, pairs, i, j, duration)
+        s += certain_step(world, pairs, i, j, duration)
 
 
 @compiled
-def depth(scene, motion_state, pairs, i, j, t):
+def depth(world, pairs, i, j, t):
     """Gap of two bodies at one time."""
-    set_path(scene, motion_state, pairs, i, j, t, 1.0)
-    curvature, half, flat = np.zeros(2), np.empty(2), np.empty(2, np.bool_)
-    half[0], half[1] = scene.body[i, 4], scene.body[j, 4]
-    flat[0], flat[1] = scene.shape[i] == WALL, scene.shape[j] == WALL
-    look(scene, pairs, i, j, 0.0, half, flat, curvature)
-    return pairs.found[0]
+    set_path(world, pairs, i, j, t, 1.0)
+    curvature = np.zeros(2)
+    look(world, pairs, i, j, 0.0, curvature)
+    return pairs.local[LOOK, GAP]
+
+
+@compiled
+def search_pair(world, pairs, body, other, t, horizon):
+    """Search the next contact of two bodies while both current pieces hold."""
+    i, j = min(body, other), max(body, other)
+    pairs.table[i, j, CONTACT_TIME] = math.inf
+    first, second = world.phase[i], world.phase[j]
+    if first[ALIVE] == 0.0 or second[ALIVE] == 0.0:
+        return
+    if first[MOVING] == RESTING and second[MOVING] == RESTING and first[SPIN_SENSE] == 0.0 == second[SPIN_SENSE]:
+        return
+    end = min(world.clock[i // GROUP_SIZE, UNTIL], world.clock[j // GROUP_SIZE, UNTIL], horizon)
+    search(world, pairs, i, j, t, end)
+
+
+@compiled
+def search_group(world, pairs, group, t, horizon):
+    """Search the contacts of all bodies of a group with all others from a time on."""
+    for body in range(group * GROUP_SIZE, (group + 1) * GROUP_SIZE):
+        for other in range(world.kind.shape[0]):
+            if other != body and (other // GROUP_SIZE != group or other > body):
+                search_pair(world, pairs, body, other, t, horizon)

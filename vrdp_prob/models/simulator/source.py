@@ -18,12 +18,12 @@ from platformdirs import user_cache_dir
 from vrdp_prob.files import write_atomically
 from vrdp_prob.models.effects.effect import Effect
 from vrdp_prob.models.simulator import tableau
-from vrdp_prob.models.simulator.laws import STATE, Layout, law_sources
+from vrdp_prob.models.simulator.laws import STATE, Layout, law_source
 
 CACHE_VARIABLE = "VRDP_PROB_CACHE"
 """Environment variable that names another folder for compiled kernels."""
 
-_KERNELS = ("motion", "detection", "search", "tape", "rollout", "adjoint", "batch")
+_KERNELS = ("world", "motion", "detection", "search", "tape", "rollout", "adjoint", "batch")
 _HEADER = '"""Assembled by vrdp_prob.models.simulator.source; do not edit."""\n\n'
 
 
@@ -39,13 +39,12 @@ def assemble(effects: Sequence[Effect], layout: Layout) -> str:
         _HEADER,
         "import math\nfrom typing import NamedTuple\n\nimport numpy as np\nfrom numba import njit\n\n",
         'compiled = njit(nogil=True, error_model="numpy")\n',
-        f"STATE_SIZE, GROUP_SIZE = {len(STATE)}, 1\n",
-        f"CONSTANTS_SIZE, SHARED_SIZE = {len(layout.constants)}, {len(layout.shared)}\n",
+        f"STATE_SIZE, GROUP_SIZE, SLIPS = {len(STATE)}, 1, False\n",
         *(
             f"{name} = np.array({getattr(tableau, name).tolist()!r})\n"
             for name in ("DENSE", "ERRORS", "NODES", "WEIGHTS")
         ),
-        *law_sources(effects, layout).values(),
+        law_source(effects, layout),
     ]
     for name in _KERNELS:
         file = folder / f"{name}_kernel.py"

@@ -1,0 +1,113 @@
+"""Compiled: the arrays of one world while it is simulated.
+
+Numbers that belong together share an array, with named columns, because the time to compile a function grows with the
+number of arrays it is handed.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from vrdp_prob.models.simulator.laws_kernel import GROUP_SIZE, STATE_SIZE, compiled
+from vrdp_prob.models.simulator.tableau import DENSE
+
+DISC, SQUARE, WALL = 0, 1, 2
+SHAPE, FIXED, PRESENT = 0, 1, 2
+RADIUS = 4
+RELEASE_TIME = STATE_SIZE
+MOVING, REFERENCE_X, REFERENCE_Y, SPIN_SENSE, ALIVE = 0, 1, 2, 3, 4
+PHASE_SIZE = 5
+RESTING, SLIDING, SLIPPING = 0.0, 1.0, 2.0
+ORIGIN, LENGTH, UNTIL, STEP, ENDING, ENDING_BODY = 0, 1, 2, 3, 4, 5
+CONTINUES, STOPS, SPIN_STOPS, LASTS = 0.0, 1.0, 2.0, 3.0
+
+
+class World(NamedTuple):
+    """What is simulated, and the current piece of motion of every group of bodies.
+
+    A piece is a polynomial of the share of its length. A group holds one body, or all where an effect couples them.
+    """
+
+    kind: np.ndarray  # [body, (shape, fixed, present)]
+    body: np.ndarray  # [body, constant]
+    shared: np.ndarray  # [parameter]
+    start: np.ndarray  # [body, (state at release, release time in s)]
+    phase: np.ndarray  # [body, (moving, reference x, reference y, spin sense, alive)]
+    clock: np.ndarray  # [group, (origin, length, end of validity, next step, how it ends, for which body)], s
+    polynomial: np.ndarray  # [group, power, slot, state]
+    stages: np.ndarray  # [stage and one for work, slot, state]
+
+
+@compiled
+def new_world(kind, body, shared, start):
+    """World with room for its motion, nothing released."""
+    count = kind.shape[0]
+    groups = count // GROUP_SIZE
+    return World(
+        kind,
+        body,
+        shared,
+        start,
+        np.zeros((count, PHASE_SIZE)),
+        np.zeros((groups, 6)),
+        np.zeros((groups, DENSE.shape[0], GROUP_SIZE, STATE_SIZE)),
+        np.zeros((DENSE.shape[1] + 1, GROUP_SIZE, STATE_SIZE)),
+    )
+
+
+@compiled
+def evaluate(polynomial, slot, share, out):
+    """State of one body at a share of its piece."""
+    for c in range(STATE_SIZE):
+        total = 0.0
+        for power in range(polynomial.shape[0] - 1, -1, -1):
+            total = total * share + polynomial[power, slot, c]
+        out[c] = total
+
+
+@compiled
+def evaluate_rate(polynomial, slot, share, length, out):
+    """Time derivative of the state of one body at a share of its piece."""
+    for c in range(STATE_SIZE):
+        total = 0.0
+        for power in range(polynomial.shape[0] - 1, 0, -1):
+            total = total * share + power * polynomial[power, slot, c]
+        out[c] = total / length
+
+
+@compiled
+def share_of(world, group, t):
+    """Share of a group's current piece at which a time lies."""
+    return (t - world.clock[group, ORIGIN]) / world.clock[group, LENGTH]
+
+
+@compiled
+def evaluate_at(world, body, t, out):
+    """State of a body at a time in its current piece."""
+    group = body // GROUP_SIZE
+    evaluate(world.polynomial[group], body - group * GROUP_SIZE, share_of(world, group, t), out)
+
+
+@compiled
+def clear_world(world):
+    """Nothing released."""
+    for body in range(world.phase.shape[0]):
+        for c in range(PHASE_SIZE):
+            world.phase[body, c] = 0.0
+    for group in range(world.clock.shape[0]):
+        hold(world, group, 0.0)
+        for slot in range(GROUP_SIZE):
+            for c in range(STATE_SIZE):
+                world.polynomial[group, 0, slot, c] = 0.0
+
+
+@compiled
+def hold(world, group, t):
+    """Let a group stay in the state of its constant term."""
+    world.clock[group, ORIGIN], world.clock[group, LENGTH] = t, 1.0
+    world.clock[group, UNTIL], world.clock[group, ENDING] = math.inf, LASTS
+    for power in range(1, DENSE.shape[0]):
+        for slot in range(GROUP_SIZE):
+            for c in range(STATE_SIZE):
+                world.polynomial[group, power, slot, c] = 0.0

@@ -167,8 +167,10 @@ class _Pair:
         (place, speed), (other_place, other_speed) = one.kicked(kicks[:, :2]), other.kicked(kicks[:, 2:])
         apart = place - other_place
         fit = self._distance_fit(apart)
-        own = [c.time for c in taken if (c.first, c.second) == (self.first, self.second)]
-        allowed = (fit > -8) & np.all([np.abs(times - time) > SHORTEST_PAUSE for time in own] or [True], axis=0)
+        allowed = fit > -8
+        for contact in taken:
+            if (contact.first, contact.second) == (self.first, self.second):
+                allowed &= np.abs(times - contact.time) > SHORTEST_PAUSE
         allowed &= ((kicks[:, :2] - kicks[:, 2:]) * apart).sum(axis=1) > 0
         closing = -((speed - other_speed) * apart).sum(axis=1)
         allowed &= closing > SLOWEST_APPROACH * np.linalg.norm(apart, axis=1)

@@ -4,6 +4,7 @@ Without this, the speed of a resting body is only known to be small; with it, it
 """
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from jaxtyping import Float
@@ -21,6 +22,9 @@ SHORTEST_REST = 0.12
 PRIOR_LOG_ODDS = -6.0
 """Log odds of a rest before its evidence, which compares with speeds of metres per second: most doubtful bodies are
 slow, not fast."""
+
+MARGIN = 1e-3
+"""How far (s) a rest keeps from the contacts around it."""
 
 CERTAIN = 7.0
 """Log odds beyond which a rest is taken for certain."""
@@ -47,43 +51,60 @@ def possible_rests(smoother: Smoother, *, until: float) -> tuple[Rest, ...]:
     """Rests of a body before the end of the video (s), at most one between two contacts."""
     first, last = float(smoother.track.times[0]), min(float(smoother.track.times[-1]), until)
     bounds = [first, *(kick for kick in smoother.kicks if first < kick < last), last]
-    rests = [_rest(smoother, start, stop) for start, stop in zip(bounds[:-1], bounds[1:], strict=True)]
+    rests = [_rest(smoother, start, stop) for start, stop in pairwise(bounds)]
     return tuple(rest for rest in rests if rest is not None)
 
 
-def draw_motion(
-    smoother: Smoother,
-    rests: tuple[Rest, ...],
-    times: Float[np.ndarray, "time"],
-    draws: int,
-    generator: np.random.Generator,
-) -> tuple[Float[np.ndarray, "draw time 2"], Float[np.ndarray, "draw time 2"]]:
-    """Draws of positions (m) and velocities (m/s) of a body, each draw lying still in those rests that it has."""
-    chance = np.array([rest.probability for rest in rests])
-    has_rest = generator.random((draws, len(rests))) < chance
-    positions, velocities = np.empty((draws, len(times), 2)), np.empty((draws, len(times), 2))
-    for pattern in np.unique(has_rest, axis=0):
-        own = np.flatnonzero((has_rest == pattern).all(axis=1))
-        chosen = tuple((rest.start, rest.stop) for rest, taken in zip(rests, pattern, strict=True) if taken)
-        positions[own], velocities[own] = smoother.with_rests(chosen).draw_states(times, len(own), generator)
-    return positions, velocities
+class DrawnMotion:
+    """Draws of the whole motion of one body; in each draw it lies still in those rests that it has there.
+
+    Parameters
+    ----------
+    smoother
+        What its track and its contacts say.
+    rests
+        Where it may lie still.
+    draws
+        Number of draws.
+    generator
+        Source of the draws.
+    """
+
+    def __init__(self, smoother: Smoother, rests: tuple[Rest, ...], draws: int, generator: np.random.Generator) -> None:
+        chance = np.array([rest.probability for rest in rests])
+        has_rest = generator.random((draws, len(rests))) < chance
+        self._end = float(smoother.track.times[-1])
+        self.rests_at_end = np.zeros(draws, dtype=bool)
+        self._smoother = smoother
+        self._weights = np.empty((draws, smoother.weight_count, 2))
+        for pattern in np.unique(has_rest, axis=0):
+            own = np.flatnonzero((has_rest == pattern).all(axis=1))
+            chosen = tuple((rest.start, rest.stop) for rest, taken in zip(rests, pattern, strict=True) if taken)
+            self._weights[own] = smoother.with_rests(chosen).draw_weights(len(own), generator)
+            self.rests_at_end[own] = any(stop >= self._end - 2 * MARGIN for _, stop in chosen)
+
+    def state(
+        self, times: Float[np.ndarray, "time"], *, before: bool = False
+    ) -> tuple[Float[np.ndarray, "draw time 2"], Float[np.ndarray, "draw time 2"]]:
+        """Position (m) and velocity (m/s); `before`: a contact at the very time has not happened yet."""
+        place, rate = self._smoother.features(times, before=before)
+        return np.einsum("tw,dwa->dta", place, self._weights), np.einsum("tw,dwa->dta", rate, self._weights)
 
 
 def _rest(smoother: Smoother, start: float, stop: float) -> Rest | None:
-    margin = 1e-3
-    times = np.arange(start + margin, stop - SHORTEST_REST, CANDIDATE_SPACING)
+    times = np.arange(start + MARGIN, stop - SHORTEST_REST, CANDIDATE_SPACING)
     if not len(times):
         return None
     speed = np.linalg.norm(smoother.state(times)[1], axis=1)
-    slow = np.append(np.linalg.norm(smoother.state(np.array([stop - margin]))[1], axis=1) < 2 * SLOW, True)
+    slow = np.append(np.linalg.norm(smoother.state(np.array([stop - MARGIN]))[1], axis=1) < 2 * SLOW, True)
     if not slow.all():
         return None
     candidates = times[speed < SLOW]
     if not len(candidates):
         return None
-    evidence = np.array([smoother.rest_evidence(float(time), stop - margin) for time in candidates])
+    evidence = np.array([smoother.rest_evidence(float(time), stop - MARGIN) for time in candidates])
     log_odds = float(logsumexp(evidence) - np.log(len(candidates))) + PRIOR_LOG_ODDS
     if log_odds < -CERTAIN:
         return None
     best = float(candidates[evidence.argmax()])
-    return Rest(best, stop - margin, 1.0 if log_odds > CERTAIN else float(expit(log_odds)))
+    return Rest(best, stop - MARGIN, 1.0 if log_odds > CERTAIN else float(expit(log_odds)))

@@ -9,7 +9,7 @@ from jaxtyping import Bool, Float, Int
 from vrdp_prob.reasoning.contacts import Contact, SeenMotion, see
 from vrdp_prob.reasoning.events import EventTable, EventUniverse
 from vrdp_prob.reasoning.facts import MOVING_SPEED, Motion
-from vrdp_prob.reasoning.rest import Rest, draw_motion, possible_rests
+from vrdp_prob.reasoning.rest import DrawnMotion, Rest, possible_rests
 from vrdp_prob.reasoning.smoother import body_tracks
 from vrdp_prob.scene import Tracks
 
@@ -97,6 +97,15 @@ class SeenVideo:
         return tuple(possible_rests(smoother, until=end) for smoother in self.seen.smoothers)
 
     @cached_property
+    def drawn(self) -> tuple[DrawnMotion, ...]:
+        """Draws of the motion of each body."""
+        generator = np.random.default_rng((self.seed, 3))
+        return tuple(
+            DrawnMotion(smoother, rests, self.draws, generator)
+            for smoother, rests in zip(self.seen.smoothers, self.rests, strict=True)
+        )
+
+    @cached_property
     def events(self) -> EventTable:
         """What happened, with the start and the end of the video."""
         table = EventTable.empty(self.universe, self.draws)
@@ -119,13 +128,12 @@ class SeenVideo:
     def motion(self) -> Motion:
         """Who moves when."""
         times = self.tracks.times
-        generator = np.random.default_rng((self.seed, 3))
         shape = (self.draws, len(times), len(self.tracks.bodies))
         in_view, moving = np.zeros(shape, dtype=bool), np.zeros(shape, dtype=bool)
-        for place, smoother in enumerate(self.seen.smoothers):
+        for place, drawn in enumerate(self.drawn):
             first, after = self.presence[place]
             in_view[:, first:after, place] = True
-            _, velocity = draw_motion(smoother, self.rests[place], times[first:after], self.draws, generator)
+            _, velocity = drawn.state(times[first:after])
             moving[:, first:after, place] = np.linalg.norm(velocity, axis=-1) > MOVING_SPEED
         return Motion(times, in_view, moving)
 

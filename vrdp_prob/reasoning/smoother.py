@@ -150,25 +150,20 @@ class Smoother:
         self, times: Float[np.ndarray, "time"], *, before: bool = False
     ) -> tuple[Float[np.ndarray, "time 2"], Float[np.ndarray, "time 2"]]:
         """Mean position (m) and velocity (m/s); `before`: a contact at the very time has not happened yet."""
-        place, rate = self._features(times, before=before)
+        place, rate = self.features(times, before=before)
         return place @ self._mean, rate @ self._mean
 
     def state_covariance(self, time: float, *, before: bool = False) -> Float[np.ndarray, "2 2"]:
         """Covariance of position (m) and velocity (m/s) along one axis, the same for x and y."""
-        place, rate = self._features(np.array([time]), before=before)
+        place, rate = self.features(np.array([time]), before=before)
         features = np.concatenate([place, rate])
         covariance: Float[np.ndarray, "2 2"] = features @ self._root @ (features @ self._root).T
         return covariance
 
-    def draw_states(
-        self, times: Float[np.ndarray, "time"], draws: int, generator: np.random.Generator
-    ) -> tuple[Float[np.ndarray, "draw time 2"], Float[np.ndarray, "draw time 2"]]:
-        """Draws of the whole motion: positions (m) and velocities (m/s), each draw one smooth motion."""
-        place, rate = self._features(times)
-        weights = self._mean + np.einsum(
-            "wk,dka->dwa", self._root, generator.standard_normal((draws, self._root.shape[1], 2))
-        )
-        return np.einsum("tw,dwa->dta", place, weights), np.einsum("tw,dwa->dta", rate, weights)
+    def draw_weights(self, draws: int, generator: np.random.Generator) -> Float[np.ndarray, "draw weight 2"]:
+        """Draws of the weights; with `features` each is one smooth motion."""
+        normal = generator.standard_normal((draws, self._root.shape[1], 2))
+        return np.asarray(self._mean + np.einsum("wk,dka->dwa", self._root, normal))
 
     def one_more(self, times: Float[np.ndarray, "time"]) -> "OneMoreKick":
         """What the track says about one more contact at each of the times."""
@@ -184,8 +179,8 @@ class Smoother:
         evidence = 0.5 * held * (bend_data**2).sum(axis=1) + np.log(held / ACCELERATION_SD**2)
         slope = (ramp_bend * held)[:, None]
         means, shifts = [], []
-        seen_place, _ = self._features(self.track.times)
-        for features in self._features(times, before=True):
+        seen_place, _ = self.features(self.track.times)
+        for features in self.features(times, before=True):
             to_seen = (features * self._prior_sd**2) @ seen_place.T
             to_ramp = (to_seen * weighted_ramp.T).sum(axis=1)
             to_bend = (to_seen * weighted_bend.T).sum(axis=1)
@@ -196,12 +191,17 @@ class Smoother:
 
     def rest_evidence(self, start: float, stop: float) -> float:
         """Log Bayes factor for lying still from one time (s) to another, against not: the density ratio of speed 0."""
-        _, rate = self._features(rest_times(start, stop))
+        _, rate = self.features(rest_times(start, stop))
         noise = REST_SPEED_SD**2 * np.eye(len(rate))
         spread = rate @ self._root
         return _log_density(rate @ self._mean, spread @ spread.T + noise) - _log_density(
             np.zeros((len(rate), 2)), (rate * self._prior_sd**2) @ rate.T + noise
         )
+
+    @property
+    def weight_count(self) -> int:
+        """Number of weights."""
+        return 3 + len(self._knots) + 2 * len(self.kicks)
 
     @cached_property
     def _prior_sd(self) -> Float[np.ndarray, "weight"]:
@@ -213,10 +213,10 @@ class Smoother:
     @cached_property
     def _observed(self) -> Float[np.ndarray, "row weight"]:
         """What was seen, and the rests, as linear functions of the weights in units of the noise."""
-        place, _ = self._features(self.track.times)
+        place, _ = self.features(self.track.times)
         rows = [place / self.track.noise[:, None]]
         for start, stop in self.rests:
-            _, rate = self._features(rest_times(start, stop))
+            _, rate = self.features(rest_times(start, stop))
             rows.append(rate / REST_SPEED_SD)
         return np.concatenate(rows)
 
@@ -236,12 +236,12 @@ class Smoother:
     @cached_property
     def _data_precision(self) -> Float[np.ndarray, "seen seen"]:
         """Inverse covariance of the seen positions along one axis."""
-        place, _ = self._features(self.track.times)
+        place, _ = self.features(self.track.times)
         scaled = place * self._prior_sd
         covariance = scaled @ scaled.T + np.diag(self.track.noise**2)
         return np.asarray(np.linalg.inv(covariance))
 
-    def _features(
+    def features(
         self, times: Float[np.ndarray, "time"], *, before: bool = False
     ) -> tuple[Float[np.ndarray, "time weight"], Float[np.ndarray, "time weight"]]:
         """Position and velocity at the times as linear functions of the weights."""
@@ -282,7 +282,7 @@ def _smooth(times: np.ndarray, at: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 def rest_times(start: float, stop: float) -> Float[np.ndarray, "time"]:
     """Times in s at which a body that rests from `start` to `stop` is held."""
-    return np.linspace(start, stop, max(int(round((stop - start) / KNOT_SPACING)) + 1, 2))
+    return np.linspace(start, stop, max(round((stop - start) / KNOT_SPACING) + 1, 2))
 
 
 def _log_density(values: Float[np.ndarray, "row 2"], covariance: Float[np.ndarray, "row row"]) -> float:

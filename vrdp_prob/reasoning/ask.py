@@ -1,0 +1,70 @@
+"""The door: a posterior and a question in, an answer out."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+from functools import cached_property
+
+from vrdp_prob.inference.posterior import Posterior
+from vrdp_prob.progress import ProgressDisplay
+from vrdp_prob.reasoning.answer import Answer
+from vrdp_prob.reasoning.executor import ChoiceInput, answer_question
+from vrdp_prob.reasoning.facts import Facts
+from vrdp_prob.reasoning.worlds import DRAWS, PosteriorLike, PosteriorWorlds
+from vrdp_prob.scene import Question
+
+
+def ask(
+    known: PosteriorLike | Facts,
+    question: str | Sequence[str] | Question,
+    *,
+    choices: Sequence[ChoiceInput] = (),
+    draws: int = DRAWS,
+    progress: ProgressDisplay | None = None,
+) -> Answer:
+    """Answer a question about a video with probabilities.
+
+    Parameters
+    ----------
+    known
+        A posterior, or its `PosteriorWorlds`: several questions then share the simulated worlds.
+    question
+        English in CLEVRER's wording, a program (a list of tokens), or a question of a question file.
+    choices
+        Options of a multiple-choice question, in English or as programs.
+    draws
+        Number of posterior draws to use, where `known` is a posterior.
+    progress
+        Who follows the simulation, where `known` is a posterior.
+
+    Raises
+    ------
+    InputError
+        If the question is not understood, names an object that is not there or that two objects fit, or needs choices
+        and has none.
+    """
+    if isinstance(known, AskablePosterior):
+        facts: Facts = known.all_worlds
+    elif isinstance(known, PosteriorLike):
+        facts = PosteriorWorlds(known, draws=draws, progress=progress)
+    else:
+        facts = known
+    return answer_question(facts, question, choices=choices)
+
+
+@dataclass(frozen=True)
+class AskablePosterior(Posterior):
+    """A posterior that answers questions; its simulated worlds are kept from question to question."""
+
+    @classmethod
+    def of(cls, posterior: Posterior) -> "AskablePosterior":
+        """The same posterior, ready to be asked."""
+        return cls(**{entry.name: getattr(posterior, entry.name) for entry in fields(Posterior)})
+
+    @cached_property
+    def all_worlds(self) -> PosteriorWorlds:
+        """What was, what will be and what would be, in all draws."""
+        return PosteriorWorlds(self)
+
+    def ask(self, question: str | Sequence[str] | Question, *, choices: Sequence[ChoiceInput] = ()) -> Answer:
+        """Answer a question; see `vrdp_prob.reasoning.ask`."""
+        return answer_question(self.all_worlds, question, choices=choices)

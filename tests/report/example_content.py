@@ -96,6 +96,19 @@ def roll(draws: Draws, frames: int, kind: WorldKind, body: str | None = None) ->
     )
 
 
+def from_frame(world: WorldContent, frame: int) -> WorldContent:
+    """What happens in a world from a frame on."""
+    late = world.collisions.time > world.times[frame]
+    table = world.collisions
+    return replace(
+        world,
+        times=world.times[frame:],
+        trajectory=world.trajectory[:, frame:],
+        exists=world.exists[:, frame:],
+        collisions=Collisions(table.draw[late], table.time[late], table.bodies[late], table.point[late]),
+    )
+
+
 def _bounce(draws: Draws, now: Moment, events: dict) -> None:
     position, velocity, mass, spin, out = now.position, now.velocity, now.mass, now.spin, now.out
     for a, b in PAIRS[_touching(position)]:
@@ -276,7 +289,7 @@ def make_content(*, camera: Camera | None = None, draws: int = DRAWS) -> ReportC
     """Content with all worlds; without a camera there is no still."""
     unknown = make_draws(draws)
     kinds = (WorldKind.REMOVED, WorldKind.HEAVIER, WorldKind.LIGHTER)
-    worlds = [roll(unknown, 128, WorldKind.FACTUAL), roll(unknown, 186, WorldKind.FUTURE)]
+    worlds = [roll(unknown, 128, WorldKind.FACTUAL), from_frame(roll(unknown, 186, WorldKind.FUTURE), 127)]
     worlds += [roll(unknown, 128, kind, body) for kind in kinds for body in IDS]
     mass, bounce = unknown.mass, unknown.bounce
     return ReportContent(

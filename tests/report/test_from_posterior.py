@@ -18,7 +18,6 @@ from vrdp_prob.models.physics import PhysicsModel
 from vrdp_prob.models.simulator.worlds import Worlds
 from vrdp_prob.reasoning.answer import Answer
 from vrdp_prob.report import build, schema, write_report
-from vrdp_prob.report.from_posterior import player_worlds
 from vrdp_prob.scene import Camera, QuestionType, Tracks
 
 CYLINDER, SPHERE = 2, 3
@@ -95,32 +94,30 @@ def test_worlds_of_the_player(content):
     keys = [world.key for world in content.worlds]
     assert keys == ["factual", "future", "removed:2", "removed:3", "heavier:2", "heavier:3", "lighter:2", "lighter:3"]
     factual, future, without = content.worlds[:3]
-    assert factual.draws == 12
-    assert future.times[-1] == pytest.approx(factual.times[-1] + 2.32)
+    assert all(world.draws == 12 for world in content.worlds)
+    assert (future.times[0], future.times[-1]) == pytest.approx((factual.times[-1], factual.times[-1] + 2.32), abs=0.05)
     assert not without.exists[:, :, 0].any()
     assert len(without.collisions.time) == 0
 
 
 def test_long_recordings_are_thinned(monkeypatch):
-    monkeypatch.setattr("vrdp_prob.report.from_posterior.MOST_FRAMES", 20)
-    times = player_worlds(hand_made(), draws=2)[0].times
+    monkeypatch.setattr("vrdp_prob.report.rollouts.MOST_FRAMES", 20)
+    times = build(hand_made(), (), draws=2).worlds[0].times
     assert len(times) == 20
     assert (times[0], times[-1]) == pytest.approx((1.08, 3.96))
 
 
 def test_heavier_bodies_are_moved_less(content):
     worlds = {world.key: world for world in content.worlds}
-    moved = {
-        key: np.abs(worlds[key].trajectory[:, -1, 0, 0] + 0.15).mean() for key in ("heavier:2", "factual", "lighter:2")
-    }
-    assert moved["heavier:2"] < moved["factual"] < moved["lighter:2"]
+    moved = [np.abs(worlds[key].trajectory[:, -1, 0, 0] + 0.15).mean() for key in ("heavier:2", "lighter:2")]
+    assert moved[0] < moved[1]
 
 
-def test_collision_of_the_pair_is_found(content):
+def test_collision_that_was_seen_is_shown(content):
     shown = content.worlds[0].collisions
     assert sorted(shown.draw) == list(range(12))
     assert (shown.bodies == [0, 1]).all()
-    assert ((shown.time > 2.0) & (shown.time < 2.8)).all()
+    assert np.abs(shown.time - 2.4).max() < 0.1
 
 
 def test_question_is_about_its_world(content):

@@ -1,7 +1,7 @@
 """What a report says, as plain data: everything the page and report.json show, and nothing that computes it.
 
-`vrdp_prob.report.build` fills a `ReportContent` from a posterior and its answers; the page, the document and the player's
-data are renderings of it. So each rendering is tested with content made by hand.
+`vrdp_prob.report.build` fills a `ReportContent` from a posterior and its answers; the page, the document and
+the player's data are renderings of it. So each rendering is tested with content made by hand.
 """
 
 from dataclasses import dataclass
@@ -33,7 +33,7 @@ class AnswerContent:
 
 
 class WorldKind(StrEnum):
-    """What is done to a world before it runs."""
+    """What is done to a world; the future begins where the video ends."""
 
     FACTUAL = "factual"
     FUTURE = "future"
@@ -79,7 +79,7 @@ class WorldContent:
     trajectory
         Position (m) and angle (rad, counter-clockwise) of each body.
     exists
-        Whether a body is released and present; once it is, it stays.
+        Whether a body is there: from one moment on, and until it leaves.
     collisions
         First contacts.
 

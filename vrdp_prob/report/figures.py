@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Float
 
 from vrdp_prob.inference.summaries import Summary
-from vrdp_prob.report.content import ReportContent, WorldKind
+from vrdp_prob.report.content import ReportContent, WorldContent, WorldKind
 from vrdp_prob.report.wording import color_of, tags
 from vrdp_prob.scene import Camera
 from vrdp_prob.scene.camera import REST_HEIGHT
@@ -120,20 +120,26 @@ def _height(content: ReportContent) -> float:
 def _rollouts(
     content: ReportContent, index: int, projection: Projection, size: tuple[int, int]
 ) -> tuple[list[str], list[str], list[tuple[float, float]]]:
-    world = content.world(WorldKind.FUTURE) or content.world(WorldKind.FACTUAL)
+    seen = _paths(content.world(WorldKind.FACTUAL), index, projection)
+    future = _paths(content.world(WorldKind.FUTURE), index, projection)
+    ends = [_points(path[-1:])[0] for path in future if _inside(path[-1], size)]
+    return _drawn(seen, size), _drawn(future, size), ends
+
+
+def _paths(world: WorldContent | None, index: int, projection: Projection) -> list[Float[np.ndarray, "_ 2"]]:
+    """Where a body goes in each draw, in figure coordinates."""
     if world is None:
-        return [], [], []
-    split = int(np.searchsorted(world.times, content.tracks.times[-1] + 1e-9))
-    seen, future, ends = [], [], []
-    for draw in range(min(world.draws, FIGURE_DRAWS)):
-        exists = world.exists[draw, :, index]
-        points = projection(world.trajectory[draw, :, index, :2])
-        before, after = points[:split][exists[:split]], points[max(split - 1, 0) :][exists[max(split - 1, 0) :]]
-        seen.append(path_data(_clipped(before, size)))
-        if len(after) > 1:
-            future.append(path_data(_clipped(after, size)))
-            ends.extend(_points(after[-1:]) if _inside(after[-1], size) else [])
-    return [path for path in seen if path], [path for path in future if path], ends
+        return []
+    points = [
+        projection(world.trajectory[draw, world.exists[draw, :, index], index, :2])
+        for draw in range(min(world.draws, FIGURE_DRAWS))
+    ]
+    return [path for path in points if len(path)]
+
+
+def _drawn(paths: list[Float[np.ndarray, "_ 2"]], size: tuple[int, int]) -> list[str]:
+    data = [path_data(_clipped(path, size)) for path in paths]
+    return [path for path in data if path]
 
 
 def _inside(point: Float[np.ndarray, "2"], size: tuple[int, int]) -> bool:

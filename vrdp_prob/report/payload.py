@@ -80,7 +80,10 @@ def encode(
 def _world(world: WorldContent, content: ReportContent, reach: float) -> dict[str, Any]:
     step = reach / _STEPS
     data, _ = encode(world.trajectory, step)
-    first = np.where(world.exists.any(axis=1), world.exists.argmax(axis=1), len(world.times))
+    frames = len(world.times)
+    there = world.exists.any(axis=1)
+    first = np.where(there, world.exists.argmax(axis=1), frames)
+    until = np.where(there, frames - world.exists[:, ::-1].argmax(axis=1), frames)
     collisions = world.collisions
     order = np.argsort(collisions.time, kind="stable")
     return {
@@ -94,6 +97,7 @@ def _world(world: WorldContent, content: ReportContent, reach: float) -> dict[st
         "step": step,
         "data": data,
         "first": first.tolist(),
+        "until": until.tolist(),
         "collisions": {
             "draw": collisions.draw[order].tolist(),
             "time": _rounded(collisions.time[order]),

@@ -70,10 +70,8 @@ class Player {
   /* The world that a question is about, from shortly before something happens in it. */
   async jump(key) {
     await this.show(key);
-    const future = this.world.kind === "future";
-    const first = this.world.pairs().find((pair) => !future || pair.median > this.data.seenUntil);
-    const start = future ? this.data.seenUntil : this.world.start;
-    this.seek(first ? Math.max(start, first.median - 0.6) : start);
+    const first = this.world.pairs()[0];
+    this.seek(first ? first.median - 0.6 : this.world.start);
     const calm = matchMedia("(prefers-reduced-motion: reduce)").matches;
     const box = this.root.getBoundingClientRect();
     if (box.top < 0 || box.top > 0.4 * innerHeight) {
@@ -104,7 +102,7 @@ class Player {
   seek(time) {
     this.time = Math.min(Math.max(time, this.world.start), this.world.end);
     this.part("time").value = this.time;
-    const frame = Math.round((this.time - this.world.start) * this.data.frameRate);
+    const frame = Math.round((this.time - this.data.tracks.times[0]) * this.data.frameRate);
     const predicted = this.time > this.data.seenUntil + 1e-6 ? " · predicted" : "";
     const label = `${this.time.toFixed(2)} s · frame ${frame}${predicted}`;
     this.part("label").textContent = label;

@@ -90,7 +90,7 @@ class Scene {
   strokePath(layer, world, draw, body) {
     const height = this.data.bodies[body].radius;
     layer.beginPath();
-    for (let frame = world.first[draw][body]; frame < world.frames; frame++) {
+    for (let frame = world.first[draw][body]; frame < world.until[draw][body]; frame++) {
       const state = world.state(draw, body, [frame, 0]);
       if (this.view.visible(state)) layer.lineTo(...this.view.point(state.x, state.y, height));
     }

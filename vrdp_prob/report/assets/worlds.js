@@ -58,13 +58,14 @@ class World {
     return [low, span > 0 ? Math.max(0, (time - this.times[low]) / span) : 0];
   }
 
-  /* {x, y, angle} of a body in a draw, or null before it is there. */
+  /* {x, y, angle} of a body in a draw, or null before it is there and after it has left. */
   state(draw, body, [frame, share]) {
-    if (frame < this.first[draw][body]) return null;
+    const until = this.until[draw][body];
+    if (frame < this.first[draw][body] || frame >= until) return null;
     const at = (axis) => {
       const index = ((body * 3 + axis) * this.draws + draw) * this.frames + frame;
       const now = this.values[index];
-      const next = frame + 1 < this.frames ? this.values[index + 1] : now;
+      const next = frame + 1 < until ? this.values[index + 1] : now;
       const change = axis === 2 ? (next - now) << 16 >> 16 : next - now; /* the short way round */
       return now + share * change;
     };

@@ -33,8 +33,6 @@ _FAINT_ODDS = 0.0
 _FAINT_SUPPORT = 0.7
 """Where the colours say little (a gray object in its own shadow's colour), so much of the outline must lie on edges."""
 _LEARN_VISIBLE = 0.5
-_LEARN_EVERY = 3
-_LEARN_FIRST = 5
 _MEMORY = 0.85
 _FLOOR_LIKE = -9.0
 """Log density above which a pixel looks like plain floor."""
@@ -218,8 +216,7 @@ class Placer:
         self, evidence: Evidence, track: Track, sighting: Sighting, covered: UInt8[np.ndarray, "height width"]
     ) -> None:
         """Update a track's colours from a sighting that shows enough of it."""
-        count = len(track.sightings)
-        if sighting.visible < _LEARN_VISIBLE or (count > _LEARN_FIRST and count % _LEARN_EVERY):
+        if sighting.visible < _LEARN_VISIBLE:
             return
         window = self.window(track.solid, sighting.pose)
         core = cv2.erode(window.mask, np.ones((3, 3), np.uint8)) > 0

@@ -56,16 +56,21 @@ class Proposal:
 
 
 def propose(
-    placer: Placer, evidence: Evidence, explained: UInt8[np.ndarray, "height width"], radius: float
+    placer: Placer,
+    evidence: Evidence,
+    explained: UInt8[np.ndarray, "height width"],
+    radius: float,
+    *,
+    gray: bool = True,
 ) -> list[Proposal]:
-    """New objects in one frame, given the pixels that belong to known ones."""
+    """New objects in one frame, given the pixels that belong to known ones; the search for gray ones takes longest."""
     near = cv2.dilate(explained, np.ones((7, 7), np.uint8)) > 0
     found: list[Proposal] = []
     for patch in _patches(evidence.strange & ~near):
         if patch.sum() >= _LEAST_PATCH * _sphere_area(placer, patch, radius):
             proposal = _from_colour(placer, evidence, _main_colour(evidence, patch), explained, radius)
             found += [proposal] if proposal else []
-    if found:
+    if found or not gray:
         return found
     for patch in _patches((evidence.dark | evidence.strange) & ~near):
         if patch.sum() >= _DARK_PATCH * _sphere_area(placer, patch, radius):

@@ -17,6 +17,10 @@ from vrdp_prob.progress import ProgressDisplay, SilentProgress
 from vrdp_prob.scene.body import Shape
 from vrdp_prob.scene.camera import Camera
 
+_LEARN_EVERY = 2
+_LEARN_FIRST = 5
+_GRAY_EVERY = 4
+"""Frames between searches for gray objects, which the backward pass follows into the frames between."""
 _SHAPE_EVERY = 8
 """Frames between looks at a track's shape after the first few."""
 _SHAPE_FIRST = 4
@@ -85,7 +89,7 @@ class Tracker:
         sightings = self.placer.place(evidence, live, starts)
         self._record(evidence, frame, live, sightings)
         explained = self._explained(evidence, live, sightings)
-        proposals = propose(self.placer, evidence, explained, self.radius)
+        proposals = propose(self.placer, evidence, explained, self.radius, gray=frame % _GRAY_EVERY == 0)
         self._adopt(evidence, frame, proposals)
 
     def _backward(self, frame: int) -> None:
@@ -108,7 +112,8 @@ class Tracker:
             sighting = sightings[track.number]
             if sighting.seen:
                 track.sightings[frame] = sighting
-                self.placer.learn(evidence, track, sighting, self.covered(track, live, sightings))
+                if frame % _LEARN_EVERY == 0:
+                    self.placer.learn(evidence, track, sighting, self.covered(track, live, sightings))
 
     def _starts(self, track: Track, frame: int, direction: int) -> list[Pose]:
         predicted = track.predict(frame, direction)
@@ -123,7 +128,8 @@ class Tracker:
             if sighting.seen:
                 track.sightings[frame] = sighting
                 track.expected = sighting.pose
-                self.placer.learn(evidence, track, sighting, self.covered(track, live, sightings))
+                if frame % _LEARN_EVERY == 0 or len(track.sightings) <= _LEARN_FIRST:
+                    self.placer.learn(evidence, track, sighting, self.covered(track, live, sightings))
                 self._look_at_shape(evidence, track, live, sightings)
             else:
                 track.expected = track.predict(frame, 1) or track.expected

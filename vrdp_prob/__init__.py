@@ -1,3 +1,35 @@
-"""vrdp-prob: a differentiable rigid-body simulator as a likelihood, questions answered with probabilities."""
+"""vrdp-prob: a differentiable rigid-body simulator as a likelihood, questions answered with probabilities.
+
+>>> import vrdp_prob
+>>> tracks = vrdp_prob.load("examples/demo/video_00000.mp4")
+>>> posterior = vrdp_prob.infer(tracks, seed=0)
+>>> posterior.ask("How many collisions happen?").probability
+"""
 
 __version__ = "0.1.0"
+
+from vrdp_prob.datasets import load, load_all
+from vrdp_prob.errors import InputError
+from vrdp_prob.models.physics import PhysicsModel
+from vrdp_prob.reasoning import Answer, AskablePosterior, ask, infer
+from vrdp_prob.report.pipeline import Report, report
+from vrdp_prob.scene import Body, Camera, Event, Question, Tracks, Wall
+
+__all__ = [
+    "Answer",
+    "AskablePosterior",
+    "Body",
+    "Camera",
+    "Event",
+    "InputError",
+    "PhysicsModel",
+    "Question",
+    "Report",
+    "Tracks",
+    "Wall",
+    "ask",
+    "infer",
+    "load",
+    "load_all",
+    "report",
+]

@@ -3,9 +3,25 @@
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from tempfile import mkstemp
+from tempfile import TemporaryFile, mkstemp
 
 from vrdp_prob.errors import InputError
+
+
+def check_writable(folder: Path) -> None:
+    """Refuse a folder that could not be written, before the work whose result shall go there; nothing is left in it.
+
+    Raises
+    ------
+    InputError
+        If the folder could not be made or written.
+    """
+    existing = next(parent for parent in (folder, *folder.absolute().parents) if parent.exists())
+    try:
+        with TemporaryFile(dir=existing):
+            return
+    except OSError as error:
+        raise InputError(f"{folder}: the folder cannot be written ({error.strerror}); choose another one.") from error
 
 
 @contextmanager

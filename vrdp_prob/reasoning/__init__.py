@@ -1,8 +1,8 @@
 """Questions answered by marginalising over posterior rollouts."""
 
 from vrdp_prob.reasoning.answer import Answer, ChoiceAnswer
-from vrdp_prob.reasoning.ask import AskablePosterior, ask
+from vrdp_prob.reasoning.ask import AskablePosterior, ask, infer
 from vrdp_prob.reasoning.values import Change
 from vrdp_prob.reasoning.worlds import PosteriorWorlds
 
-__all__ = ["Answer", "AskablePosterior", "Change", "ChoiceAnswer", "PosteriorWorlds", "ask"]
+__all__ = ["Answer", "AskablePosterior", "Change", "ChoiceAnswer", "PosteriorWorlds", "ask", "infer"]

@@ -4,13 +4,18 @@ from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from functools import cached_property
 
-from vrdp_prob.inference.posterior import Posterior
+from vrdp_prob import inference
+from vrdp_prob.inference import SamplerName
+from vrdp_prob import inference
+from vrdp_prob.inference import Posterior, SamplerName
+from vrdp_prob.models.physics import PhysicsModel
+from vrdp_prob.models.physics import PhysicsModel
 from vrdp_prob.progress import ProgressDisplay
 from vrdp_prob.reasoning.answer import Answer
 from vrdp_prob.reasoning.executor import ChoiceInput, answer_question
 from vrdp_prob.reasoning.facts import Facts
 from vrdp_prob.reasoning.worlds import DRAWS, PosteriorLike, PosteriorWorlds
-from vrdp_prob.scene import Question
+from vrdp_prob.scene import Question, Tracks, Tracks
 
 
 def ask(
@@ -51,6 +56,24 @@ def ask(
     return answer_question(facts, question, choices=choices)
 
 
+def infer(
+    tracks: Tracks,
+    *,
+    sampler: SamplerName | None = None,
+    model: PhysicsModel | None = None,
+    seed: int = 0,
+    draws: int = 1000,
+    progress: ProgressDisplay | None = None,
+) -> "AskablePosterior":
+    """Infer masses, restitutions and motion from tracks; the posterior answers questions (`ask`).
+
+    Parameters are those of `vrdp_prob.inference.infer`; without a sampler its default one is used.
+    """
+    chosen = {} if sampler is None else {"sampler": sampler}
+    posterior = inference.infer(tracks, model=model, seed=seed, draws=draws, progress=progress, **chosen)
+    return AskablePosterior.of(posterior)
+
+
 @dataclass(frozen=True)
 class AskablePosterior(Posterior):
     """A posterior that answers questions; its simulated worlds are kept from question to question."""
@@ -68,3 +91,18 @@ class AskablePosterior(Posterior):
     def ask(self, question: str | Sequence[str] | Question, *, choices: Sequence[ChoiceInput] = ()) -> Answer:
         """Answer a question; see `vrdp_prob.reasoning.ask`."""
         return answer_question(self.all_worlds, question, choices=choices)
+
+
+def infer(
+    tracks: Tracks,
+    *,
+    sampler: SamplerName = "emcee",
+    model: PhysicsModel | None = None,
+    seed: int = 0,
+    draws: int = 1000,
+    progress: ProgressDisplay | None = None,
+) -> AskablePosterior:
+    """Infer a posterior that can be asked; parameters as for `vrdp_prob.inference.infer`."""
+    return AskablePosterior.of(
+        inference.infer(tracks, sampler=sampler, model=model, seed=seed, draws=draws, progress=progress)
+    )

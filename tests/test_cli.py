@@ -1,0 +1,231 @@
+"""The command line as a user meets it: exit codes, one sentence for a mistake, nothing half-written."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import cv2
+import jsonschema
+import numpy as np
+import pytest
+
+from vrdp_prob import cli
+from vrdp_prob.report import schema
+from vrdp_prob.scene import Camera
+
+TRACKS_HEADER = "video,object,time,x,y"
+OBJECTS = "video,object,shape,radius,material,color\nv,1,sphere,0.2,metal,red\nv,2,cylinder,0.2,rubber,blue\n"
+
+
+def two_discs(frames: int = 60) -> str:
+    """Tracks of a red sphere that runs into a resting blue cylinder, computed by hand: no friction, e = 0.8."""
+    noise = np.random.default_rng(0)
+    rows = [TRACKS_HEADER]
+    for frame in range(frames):
+        time = frame / 25
+        contact = 1.1 / 1.5
+        first = -1.5 + 1.5 * min(time, contact) + 0.15 * max(time - contact, 0)
+        second = 0.0 + 1.35 * max(time - contact, 0)
+        for name, x in (("1", first), ("2", second)):
+            rows.append(f"v,{name},{time:.2f},{x + noise.normal(0, 0.003):.5f},{noise.normal(0, 0.003):.5f}")
+    return "\n".join(rows) + "\n"
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """A tracks folder of one video with one collision."""
+    (tmp_path / "tracks.csv").write_text(two_discs())
+    (tmp_path / "objects.csv").write_text(OBJECTS)
+    return tmp_path
+
+
+def refused(capsys: pytest.CaptureFixture[str], *arguments: object) -> str:
+    """Run a command that must refuse its input with exit code 2 and one line; return the line."""
+    assert cli.run([str(argument) for argument in arguments]) == cli.UNUSABLE_INPUT
+    captured = capsys.readouterr()
+    assert captured.out == ""
+    (line,) = captured.err.strip().splitlines()
+    assert line.startswith("vrdp-prob: ")
+    assert line.endswith((".", ")"))
+    return line
+
+
+def write_video(path: Path, frames: int = 12, *, size: tuple[int, int] = (480, 320)) -> None:
+    """A video of an empty gray floor."""
+    writer = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"mp4v"), 25, size)
+    for _ in range(frames):
+        writer.write(np.full((size[1], size[0], 3), 128, np.uint8))
+    writer.release()
+
+
+def test_report_writes_its_three_files(folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    questions = [
+        {
+            "video_filename": "v.mp4",
+            "questions": [
+                {"question_id": 0, "question": "How many collisions happen?"},
+                {
+                    "question_id": 1,
+                    "question": "What will happen without the red object?",
+                    "choices": [{"choice_id": 0, "choice": "The sphere and the cylinder collide"}],
+                },
+            ],
+        }
+    ]
+    (tmp_path / "questions.json").write_text(json.dumps(questions))
+    out = tmp_path / "out"
+    command = ["report", folder, "--questions", tmp_path / "questions.json", "--out", out, "--sampler", "laplace"]
+    assert cli.run([str(word) for word in command]) == 0
+    captured = capsys.readouterr()
+    assert sorted(path.name for path in out.iterdir()) == ["posterior.nc", "report.html", "report.json"]
+    assert str(out / "report.html") in captured.out
+    document = json.loads((out / "report.json").read_text())
+    jsonschema.validate(document, schema("report"))
+    assert [answer["answer"] for answer in document["answers"]] == [1, []]
+    assert document["objects"][0]["mass"]["status"] == "ratio_only"
+
+
+def test_ask_prints_exactly_one_document(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    question = "What color is the object that collides with the red object?"
+    assert cli.run(["ask", str(folder), question, "--json", "--sampler", "laplace", "--seed", "3"]) == 0
+    document = json.loads(capsys.readouterr().out)
+    assert document["answer"] == "blue"
+    jsonschema.validate(document, schema("report")["properties"]["answers"]["items"])
+
+
+def test_the_same_seed_gives_the_same_answer(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    command = ["ask", str(folder), "How many collisions happen?", "--json", "--sampler", "laplace"]
+    outputs = []
+    for seed in ("5", "5"):
+        assert cli.run([*command, "--seed", seed]) == 0
+        outputs.append(capsys.readouterr().out)
+    assert outputs[0] == outputs[1]
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        (None, "no such file"),
+        (b"", "clip.mp4"),
+        (b"not a video at all" * 50, "clip.mp4"),
+    ],
+)
+def test_files_that_are_no_videos(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], content: bytes | None, message: str
+) -> None:
+    video = tmp_path / "clip.mp4"
+    if content is not None:
+        video.write_bytes(content)
+    assert message in refused(capsys, "report", video, "--camera", "clevrer", "--out", tmp_path / "out")
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_truncated_video(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    whole = cli.demo_folder() / "video_00000.mp4"
+    (tmp_path / "clip.mp4").write_bytes(whole.read_bytes()[: whole.stat().st_size // 2])
+    assert "clip.mp4" in refused(capsys, "report", tmp_path / "clip.mp4", "--camera", cli.demo_folder() / "camera.json")
+
+
+def test_a_video_of_an_empty_floor(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    write_video(tmp_path / "clip.mp4")
+    assert "object" in refused(capsys, "report", tmp_path / "clip.mp4", "--camera", "clevrer")
+
+
+def test_a_video_without_a_camera(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "deep").mkdir()
+    write_video(tmp_path / "deep" / "clip.mp4")
+    assert "no camera; put camera.json beside the video" in refused(capsys, "report", tmp_path / "deep" / "clip.mp4")
+
+
+def test_a_camera_with_a_singular_matrix(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    write_video(tmp_path / "clip.mp4")
+    document = Camera.clevrer().to_document() | {"projection": [[1, 2, 3, 4]] * 3}
+    (tmp_path / "camera.json").write_text(json.dumps(document))
+    assert "singular matrix" in refused(capsys, "report", tmp_path / "clip.mp4")
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("video,object,time,x,y", "video,object,time,x,z", "column y missing"),
+        ("v,1,0.04,", "v,1,nan,", "'time' is 'nan'"),
+        ("v,1,0.04,-1", "v,1,0.04,inf", "'x' is 'inf'"),
+        ("v,1,0.04,", "v,1,0.00,", "is there twice"),
+        ("v,1,0.08,", "v,1,0.02,", "comes after a later one"),
+    ],
+)
+def test_unusable_tracks(folder: Path, capsys: pytest.CaptureFixture[str], old: str, new: str, message: str) -> None:
+    text = (folder / "tracks.csv").read_text()
+    changed = [new + line.removeprefix(old) if line.startswith(old) else line for line in text.splitlines()]
+    (folder / "tracks.csv").write_text("\n".join(changed) + "\n")
+    assert message in refused(capsys, "report", folder, "--out", folder / "out")
+    assert not (folder / "out").exists()
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("sphere", "ball", "shape 'ball' is not known"),
+        ("sphere,0.2", "sphere,-1", "radius is -1"),
+        ("0.2", "1.2", "objects 1 and 2 overlap at 0 s"),
+    ],
+)
+def test_unusable_objects(folder: Path, capsys: pytest.CaptureFixture[str], old: str, new: str, message: str) -> None:
+    (folder / "objects.csv").write_text(OBJECTS.replace(old, new))
+    assert message in refused(capsys, "report", folder)
+
+
+@pytest.mark.parametrize(("rows", "message"), [(1, "there are 0 objects"), (2, "seen in 1 frame")])
+def test_too_few_rows(folder: Path, capsys: pytest.CaptureFixture[str], rows: int, message: str) -> None:
+    lines = two_discs().splitlines()[:rows]
+    (folder / "tracks.csv").write_text("\n".join(lines) + "\n")
+    assert message in refused(capsys, "report", folder)
+
+
+@pytest.mark.parametrize(
+    ("question", "message"),
+    [
+        ("", "the question is empty"),
+        ("   ", "the question is empty"),
+        ("Why does the moon shine?", "Why"),
+        ("What color is the cube?", "cube"),
+        ("What will happen next?", "choice"),
+    ],
+)
+def test_unusable_questions(folder: Path, capsys: pytest.CaptureFixture[str], question: str, message: str) -> None:
+    assert message.lower() in refused(capsys, "ask", folder, question, "--sampler", "laplace").lower()
+
+
+@pytest.mark.parametrize(("text", "message"), [("", "not a JSON file"), ("[]", "holds no question")])
+def test_unusable_question_files(folder: Path, capsys: pytest.CaptureFixture[str], text: str, message: str) -> None:
+    (folder / "questions.json").write_text(text)
+    assert message in refused(capsys, "report", folder, "--questions", folder / "questions.json")
+
+
+def test_an_output_folder_that_cannot_be_written(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (folder / "taken").write_text("a file is in the way")
+    line = refused(capsys, "report", folder, "--out", folder / "taken", "--sampler", "laplace")
+    assert "taken" in line
+
+
+def test_unusable_options(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert "sampler 'gibbs' is not known" in refused(capsys, "report", folder, "--sampler", "gibbs")
+    assert "--seed" in refused(capsys, "report", folder, "--seed", "many")
+    assert "No such option" in refused(capsys, "report", folder, "--colour")
+    assert "INPUT" in refused(capsys, "report")
+
+
+def test_interruption_leaves_nothing_half_written(folder: Path) -> None:
+    script = (
+        "import signal, sys, threading, os, time\n"
+        "threading.Timer(float(sys.argv[1]), lambda: os.kill(os.getpid(), signal.SIGINT)).start()\n"
+        "from vrdp_prob import cli\n"
+        "sys.exit(cli.run(sys.argv[2:]))\n"
+    )
+    command = [sys.executable, "-c", script, "4", "report", str(folder), "--out", str(folder / "out")]
+    finished = subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
+    assert finished.returncode == cli.FAILURE, finished.stderr
+    assert "interrupted" in finished.stderr
+    assert "Traceback" not in finished.stderr
+    assert not (folder / "out").exists() or not any((folder / "out").iterdir())

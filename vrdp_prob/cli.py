@@ -1,0 +1,230 @@
+"""The command line: `vrdp-prob report`, `ask`, `demo` and `calibrate-camera`.
+
+Exit code 0: done; 2: input that cannot be used (one line says what, where, and how to mend it); 1: anything else.
+"""
+
+import json
+import sys
+from pathlib import Path
+from typing import Annotated, cast, get_args
+
+import typer
+
+from vrdp_prob.datasets import load, load_all, read_questions, video_files
+from vrdp_prob.errors import InputError
+from vrdp_prob.inference import SamplerName
+from vrdp_prob.models.physics import PhysicsModel
+from vrdp_prob.progress import progress_display
+from vrdp_prob.reasoning import Answer, ask, infer
+from vrdp_prob.report.pipeline import Report
+from vrdp_prob.report.pipeline import report as write_report
+from vrdp_prob.scene import Choice, Question, Tracks
+
+UNUSABLE_INPUT = 2
+FAILURE = 1
+DEFAULT_SAMPLER: SamplerName = "emcee"
+
+app = typer.Typer(
+    help="Fit a rigid-body simulator to a video and answer questions about it with probabilities.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,
+)
+
+Input = Annotated[Path, typer.Argument(metavar="INPUT", help="A video, a tracks folder, or a CLEVRER annotation file.")]
+Model = Annotated[Path | None, typer.Option(metavar="FILE.toml", help="Physics model; the base model by default.")]
+Sampler = Annotated[str, typer.Option(metavar="|".join(get_args(SamplerName)), help="How the posterior is drawn.")]
+Seed = Annotated[int, typer.Option(help="Same seed, same numbers.")]
+Quiet = Annotated[bool, typer.Option("--quiet", help="No progress bars, no closing lines.")]
+CameraOption = Annotated[
+    str | None,
+    typer.Option(
+        metavar="FILE|clevrer", help="Camera file; by default camera.json beside the video or in its parent folder."
+    ),
+]
+Video = Annotated[str | None, typer.Option(metavar="ID", help="Which video of a folder of several.")]
+
+
+@app.command()
+def report(
+    path: Input,
+    *,
+    questions: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="CLEVRER question file; answered in the report.")
+    ] = None,
+    out: Annotated[Path, typer.Option(metavar="DIR", help="Folder of the report.")] = Path("vrdp-prob-report"),
+    video: Video = None,
+    camera: CameraOption = None,
+    model: Model = None,
+    sampler: Sampler = DEFAULT_SAMPLER,
+    seed: Seed = 0,
+    quiet: Quiet = False,
+) -> None:
+    """Write an uncertainty report: report.html, report.json and posterior.nc."""
+    progress = progress_display(quiet=quiet)
+    asked = {} if questions is None else read_questions(questions)
+    videos = load_all(path, videos=None if video is None else [video], camera=camera, progress=progress)
+    physics = _model(model)
+    files = video_files(path)
+    for tracks in videos:
+        written = write_report(
+            tracks,
+            questions=_questions_of(asked, questions, tracks),
+            directory=out if len(videos) == 1 else out / tracks.video,
+            video_file=files.get(tracks.video),
+            model=physics,
+            sampler=cast(SamplerName, sampler),
+            seed=seed,
+            progress=progress,
+        )
+        if not quiet:
+            _tell(written)
+
+
+@app.command(name="ask")
+def ask_question(
+    path: Input,
+    question: Annotated[str, typer.Argument(metavar="QUESTION", help="In English, CLEVRER's wording.")],
+    *,
+    choice: Annotated[list[str] | None, typer.Option(metavar="TEXT", help="An option; repeat for each.")] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="One JSON document on standard output.")] = False,
+    video: Video = None,
+    camera: CameraOption = None,
+    model: Model = None,
+    sampler: Sampler = DEFAULT_SAMPLER,
+    seed: Seed = 0,
+    quiet: Quiet = False,
+) -> None:
+    """Answer one question with probabilities."""
+    progress = progress_display(quiet=quiet)
+    if not question.strip():
+        raise InputError('the question is empty; ask one, for example "What will happen next?" with --choice options.')
+    asked = Question(question, choices=tuple(Choice(number, text) for number, text in enumerate(choice or ())))
+    tracks = load(path, video=video, camera=camera, progress=progress)
+    posterior = infer(tracks, sampler=cast(SamplerName, sampler), model=_model(model), seed=seed, progress=progress)
+    answer = ask(posterior, asked, progress=progress)
+    if as_json:
+        print(json.dumps(answer.to_document(), allow_nan=False))
+    else:
+        print("\n".join(_answer_lines(answer)))
+
+
+@app.command()
+def demo(
+    *,
+    out: Annotated[Path, typer.Option(metavar="DIR", help="Folder of the report.")] = Path("vrdp-prob-demo"),
+    model: Model = None,
+    sampler: Sampler = DEFAULT_SAMPLER,
+    seed: Seed = 0,
+    quiet: Quiet = False,
+) -> None:
+    """Run the main job on the example that ships: a short video with its questions."""
+    folder = demo_folder()
+    video = next(folder.glob("*.mp4"))
+    report(video, questions=folder / "questions.json", out=out, model=model, sampler=sampler, seed=seed, quiet=quiet)
+
+
+@app.command(name="calibrate-camera")
+def calibrate_camera(
+    videos: Annotated[
+        list[Path], typer.Argument(metavar="VIDEO...", help="Videos of one fixed camera, or a folder of them.")
+    ],
+    *,
+    positions: Annotated[
+        Path, typer.Option(metavar="PATH", help="Known plane positions: a tracks folder, or a folder of annotations.")
+    ],
+    out: Annotated[Path, typer.Option(metavar="FILE", help="Camera file to write.")] = Path("camera.json"),
+    quiet: Quiet = False,
+) -> None:
+    """Estimate the camera from videos whose objects' plane positions are known (the paper uses 20)."""
+    from vrdp_prob.perception import calibrate_from_videos  # noqa: PLC0415 - OpenCV is loaded only for videos
+
+    progress = progress_display(quiet=quiet)
+    files = {name: file for path in videos for name, file in video_files(path).items()}
+    known = {tracks.video: tracks for tracks in load_all(positions)}
+    unknown = sorted(set(files) - set(known))
+    if unknown:
+        raise InputError(f"{positions}: no positions of {unknown[0]}; the name of a video is the stem of its file.")
+    camera = calibrate_from_videos(list(files.values()), [known[name] for name in files], progress=progress)
+    camera.write(out)
+    if not quiet:
+        print(f"{out}: reprojection error {camera.pixel_sd:.2f} pixels per coordinate", file=sys.stderr)
+
+
+def demo_folder() -> Path:
+    """Folder of the example that ships: in the installed package, or in the repository it is installed from."""
+    package = Path(__file__).parent
+    for folder in (package / "demo", package.parent / "examples" / "demo"):
+        if folder.is_dir():
+            return folder
+    raise InputError("the example is not installed; install the package from its wheel or its repository.")
+
+
+def main() -> None:
+    """Entry point of the command `vrdp-prob`."""
+    sys.exit(run(sys.argv[1:]))
+
+
+def run(arguments: list[str]) -> int:
+    """Run a command line.
+
+    Parameters
+    ----------
+    arguments
+        The words after `vrdp-prob`.
+
+    Returns
+    -------
+    int
+        The exit code: 0 done, 2 unusable input, 1 interrupted.
+    """
+    try:
+        result = app(arguments, prog_name="vrdp-prob", standalone_mode=False)
+    except InputError as error:
+        return _refuse(str(error))
+    except (KeyboardInterrupt, typer.Abort):
+        print("vrdp-prob: interrupted; nothing half-written was left behind.", file=sys.stderr)
+        return FAILURE
+    except Exception as error:
+        # usage errors of the command-line library, whose classes moved between its versions
+        if not hasattr(error, "format_message"):
+            raise
+        return _refuse(f"{error.format_message().rstrip('.')}; see vrdp-prob --help.")
+    return result if isinstance(result, int) else 0
+
+
+def _refuse(message: str) -> int:
+    print(f"vrdp-prob: {' '.join(message.split())}", file=sys.stderr)
+    return UNUSABLE_INPUT
+
+
+def _model(path: Path | None) -> PhysicsModel | None:
+    return None if path is None else PhysicsModel.read(path)
+
+
+def _questions_of(asked: dict[str, list[Question]], path: Path | None, tracks: Tracks) -> list[Question]:
+    if path is None:
+        return []
+    if tracks.video not in asked:
+        raise InputError(
+            f"{path}: there is no question about {tracks.video}; "
+            "the stem of a scene's 'video_filename' must be the name of the video."
+        )
+    return asked[tracks.video]
+
+
+def _tell(written: Report) -> None:
+    for line in written.summary:
+        print(line)
+    for file in written.files:
+        print(file)
+
+
+def _answer_lines(answer: Answer) -> list[str]:
+    if answer.choices:
+        lines = [f"{choice.probability:6.1%} ± {choice.mc_error:.1%}  {choice.choice}" for choice in answer.choices]
+    else:
+        ordered = sorted(answer.distribution.items(), key=lambda item: -item[1])
+        lines = [f"{probability:6.1%}  {value}" for value, probability in ordered]
+    return lines + [f"note: {note}" for note in answer.notes]

@@ -1,0 +1,97 @@
+"""The main job in one call: infer, answer, and write the report."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from vrdp_prob.files import check_writable
+from vrdp_prob.inference import Posterior, SamplerName, infer
+from vrdp_prob.models.physics import PhysicsModel
+from vrdp_prob.perception.video import read_frames
+from vrdp_prob.progress import ProgressDisplay, SilentProgress
+from vrdp_prob.reasoning import Answer, PosteriorWorlds, ask
+from vrdp_prob.report.content import ReportContent
+from vrdp_prob.report.from_posterior import build
+from vrdp_prob.report.summary import summary
+from vrdp_prob.report.writing import write_report
+from vrdp_prob.scene import Question, Tracks
+
+
+@dataclass(frozen=True)
+class Report:
+    """A report that was written.
+
+    Parameters
+    ----------
+    posterior
+        What was learned.
+    answers
+        The answers, in the order asked.
+    content
+        What the report says, as plain data.
+    files
+        Paths of the page, the document and the posterior.
+    """
+
+    posterior: Posterior
+    answers: tuple[Answer, ...]
+    content: ReportContent
+    files: tuple[Path, Path, Path]
+
+    @property
+    def summary(self) -> list[str]:
+        """Sentences of the report's opening paragraph."""
+        return summary(self.content)
+
+
+def report(
+    source: Tracks | Posterior,
+    *,
+    directory: Path | str,
+    questions: Sequence[Question | str] = (),
+    video_file: Path | str | None = None,
+    sampler: SamplerName = "emcee",
+    model: PhysicsModel | None = None,
+    seed: int = 0,
+    progress: ProgressDisplay | None = None,
+) -> Report:
+    """Write `report.html`, `report.json` and `posterior.nc`.
+
+    Parameters
+    ----------
+    source
+        Tracks of a video, or a posterior that was inferred from them before.
+    directory
+        Folder of the report, made where it is missing.
+    questions
+        Questions to answer.
+    video_file
+        The video itself, for the pictures in the page.
+    sampler, model, seed
+        How the posterior is drawn, where `source` is not one yet; see `vrdp_prob.infer`.
+    progress
+        Who follows the work.
+
+    Raises
+    ------
+    InputError
+        If the folder cannot be written, or a question cannot be answered (see `vrdp_prob.reasoning.ask`).
+    """
+    directory, progress = Path(directory), progress or SilentProgress()
+    check_writable(directory)
+    if isinstance(source, Posterior):
+        posterior = source
+    else:
+        posterior = infer(source, sampler=sampler, model=model, seed=seed, progress=progress)
+    worlds = PosteriorWorlds(posterior)
+    answers = []
+    with progress.stage("Questions", total=len(questions)) as advance:
+        for question in questions:
+            answers.append(ask(worlds, question))
+            advance(1)
+    with progress.stage("Report") as advance:
+        frames = None if video_file is None else read_frames(Path(video_file)).frames
+        content = build(posterior, answers, frames=frames)
+        written = write_report(content, directory)
+        posterior.write(directory / "posterior.nc")
+    return Report(posterior, tuple(answers), content, (written.page, written.document, directory / "posterior.nc"))

@@ -17,7 +17,7 @@ from vrdp_prob.models.parameters import MASS, RESTITUTION
 from vrdp_prob.models.physics import PhysicsModel
 from vrdp_prob.models.simulator.worlds import Worlds
 from vrdp_prob.reasoning.answer import Answer
-from vrdp_prob.report import build, schema, write_report
+from vrdp_prob.report import build, rollouts, schema, write_report
 from vrdp_prob.scene import Camera, QuestionType, Tracks
 
 CYLINDER, SPHERE = 2, 3
@@ -101,7 +101,7 @@ def test_worlds_of_the_player(content):
 
 
 def test_long_recordings_are_thinned(monkeypatch):
-    monkeypatch.setattr("vrdp_prob.report.rollouts.MOST_FRAMES", 20)
+    monkeypatch.setattr(rollouts, "MOST_FRAMES", 20)
     times = build(hand_made(), (), draws=2).worlds[0].times
     assert len(times) == 20
     assert (times[0], times[-1]) == pytest.approx((1.08, 3.96))

@@ -59,10 +59,12 @@ def test_long_ids_become_letters():
 @given(st.floats(0, 1))
 def test_percent_is_certain_only_where_the_probability_is(probability):
     assert (percent(probability) in ("0 %", "100 %")) == (probability in (0, 1))
+    assert percent(probability, 0.01) not in ("0 %", "100 %")
 
 
 def test_percent_errors():
-    assert [percent_error(value) for value in (0.0, 0.004, 0.02)] == ["", "± 0.4", "± 2"]
+    assert [percent_error(0.8, error) for error in (0.0, 0.004, 0.02)] == ["", "± 0.4", "± 2"]
+    assert percent_error(1.0, 0.01) == percent_error(0.0, 0.01) == ""
 
 
 @pytest.mark.parametrize(

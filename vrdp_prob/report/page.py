@@ -157,8 +157,8 @@ def _question(item: AnswerContent, content: ReportContent) -> dict[str, Any]:
         "entropy": round(answer.entropy, 6),
         "answer": answer_words(answer),
         "multiple": bool(answer.choices),
-        "probability": percent(answer.probability),
-        "error": percent_error(answer.mc_error),
+        "probability": percent(answer.probability, answer.mc_error),
+        "error": percent_error(answer.probability, answer.mc_error),
         "bars": _bars(answer),
         "notes": notes,
         "world": None if world is None else world.key,
@@ -184,7 +184,7 @@ def _bars(answer: Answer) -> list[dict[str, Any]]:
 
 
 def _bar(text: str, probability: float, error: float, chosen: bool) -> dict[str, Any]:
-    words = f"{percent(probability)} {percent_error(error)}".strip()
+    share, plus_minus = percent(probability, error), percent_error(probability, error)
     return {
         "text": text,
         "probability": round(probability, 6),
@@ -192,9 +192,9 @@ def _bar(text: str, probability: float, error: float, chosen: bool) -> dict[str,
         "error_low": round(100 * max(probability - error, 0), 2),
         "error_high": round(100 * min(probability + error, 1), 2),
         "chosen": chosen,
-        "percent": percent(probability),
-        "error": percent_error(error),
-        "label": f"{text}: {words}",
+        "percent": share,
+        "error": plus_minus,
+        "label": f"{text}: {share} {plus_minus}".strip(),
     }
 
 

@@ -99,18 +99,20 @@ def sentence(text: str) -> str:
     return text[:1].upper() + text[1:]
 
 
-def percent(probability: float) -> str:
-    """A probability in per cent, never rounded to certainty."""
-    if probability <= 0 or probability >= 1:
+def percent(probability: float, error: float = 0.0) -> str:
+    """A probability in per cent; certain only where it is, and its Monte Carlo error is nothing."""
+    if probability in (0, 1) and error == 0:
         return f"{100 * probability:.0f} %"
     if probability <= 0.005:
         return "< 1 %"
     return "> 99 %" if probability >= 0.995 else f"{100 * probability:.0f} %"
 
 
-def percent_error(error: float) -> str:
-    """A Monte Carlo error in percentage points; empty where it is too small to show."""
-    return "" if error < 0.0005 else f"± {100 * error:.1f}" if error < 0.0095 else f"± {100 * error:.0f}"
+def percent_error(probability: float, error: float) -> str:
+    """A Monte Carlo error in percentage points; empty where it is too small to tell or the probability is extreme."""
+    if error < 0.0005 or not 0.005 < probability < 0.995:
+        return ""
+    return f"± {100 * error:.1f}" if error < 0.0095 else f"± {100 * error:.0f}"
 
 
 def decimals(interval: Summary) -> int:

@@ -5,17 +5,14 @@ from dataclasses import dataclass, fields
 from functools import cached_property
 
 from vrdp_prob import inference
-from vrdp_prob.inference import SamplerName
-from vrdp_prob import inference
 from vrdp_prob.inference import Posterior, SamplerName
-from vrdp_prob.models.physics import PhysicsModel
 from vrdp_prob.models.physics import PhysicsModel
 from vrdp_prob.progress import ProgressDisplay
 from vrdp_prob.reasoning.answer import Answer
 from vrdp_prob.reasoning.executor import ChoiceInput, answer_question
 from vrdp_prob.reasoning.facts import Facts
 from vrdp_prob.reasoning.worlds import DRAWS, PosteriorLike, PosteriorWorlds
-from vrdp_prob.scene import Question, Tracks, Tracks
+from vrdp_prob.scene import Question, Tracks
 
 
 def ask(
@@ -54,24 +51,6 @@ def ask(
     else:
         facts = known
     return answer_question(facts, question, choices=choices)
-
-
-def infer(
-    tracks: Tracks,
-    *,
-    sampler: SamplerName | None = None,
-    model: PhysicsModel | None = None,
-    seed: int = 0,
-    draws: int = 1000,
-    progress: ProgressDisplay | None = None,
-) -> "AskablePosterior":
-    """Infer masses, restitutions and motion from tracks; the posterior answers questions (`ask`).
-
-    Parameters are those of `vrdp_prob.inference.infer`; without a sampler its default one is used.
-    """
-    chosen = {} if sampler is None else {"sampler": sampler}
-    posterior = inference.infer(tracks, model=model, seed=seed, draws=draws, progress=progress, **chosen)
-    return AskablePosterior.of(posterior)
 
 
 @dataclass(frozen=True)

@@ -14,34 +14,32 @@ import vrdp_prob
 FRAME_RATE = 100.0
 RADIUS = 0.025
 DECELERATION = 0.1
-SPEED_BEFORE, SPEED_A_AFTER, SPEED_B_AFTER = 0.60, 0.10, 0.4375
 CONTACT_TIME = 0.5
+MASS_OF_A, MASS_OF_B = 0.030, 0.036
+NOISE = 2e-4
 
 
-def position_after(start: float, speed: float, time: np.ndarray) -> np.ndarray:
-    """Positions of a disc that slides and slows down."""
-    return start + speed * time - DECELERATION * time**2 / 2
+def travelled(speed: float, time: np.ndarray) -> np.ndarray:
+    """Distance in m that a disc slides in a time (s) while friction slows it."""
+    return speed * time - DECELERATION * time**2 / 2
 
 
 def write_tables(folder: Path) -> None:
-    """Write one video of 1.2 s; momentum conservation makes B 1.2 times as heavy as A."""
+    """Write one video of 1.2 s; A loses at the contact the momentum that B gains."""
     noise = np.random.default_rng(0)
     times = np.arange(120) / FRAME_RATE
     before, after = np.minimum(times, CONTACT_TIME), np.maximum(times - CONTACT_TIME, 0)
-    speed_at_contact = SPEED_BEFORE - DECELERATION * CONTACT_TIME
-    impulse_ratio = 1.2
-    speed_b = (speed_at_contact - SPEED_A_AFTER) / impulse_ratio
-    a = position_after(0.0, SPEED_BEFORE, before) + position_after(0.0, SPEED_A_AFTER, after)
-    contact_b = position_after(0.0, SPEED_BEFORE, np.array(CONTACT_TIME)) + 2 * RADIUS
-    b = contact_b + position_after(0.0, speed_b, after)
+    speed, speed_of_a = 0.55, 0.10
+    speed_of_b = MASS_OF_A / MASS_OF_B * (speed - speed_of_a)
+    a = travelled(speed + DECELERATION * CONTACT_TIME, before) + travelled(speed_of_a, after)
+    b = a[times <= CONTACT_TIME][-1] + 2 * RADIUS + travelled(speed_of_b, after)
     rows = ["video,object,time,x,y"]
     for name, x in (("A", a), ("B", b)):
-        for time, position in zip(times, x + noise.normal(0, 2e-4, len(times)), strict=True):
-            rows.append(f"run1,{name},{time:.2f},{position:.6f},{noise.normal(0, 2e-4):.6f}")
+        measured = np.stack([x, np.zeros_like(x)], axis=1) + noise.normal(0, NOISE, (len(x), 2))
+        rows += [f"run1,{name},{time:.2f},{x:.6f},{y:.6f}" for time, (x, y) in zip(times, measured, strict=True)]
     (folder / "tracks.csv").write_text("\n".join(rows) + "\n")
-    (folder / "objects.csv").write_text(
-        f"video,object,shape,radius,mass\nrun1,A,cylinder,{RADIUS},0.030\nrun1,B,cylinder,{RADIUS},\n"
-    )
+    objects = f"run1,A,cylinder,{RADIUS},{MASS_OF_A}\nrun1,B,cylinder,{RADIUS},\n"
+    (folder / "objects.csv").write_text("video,object,shape,radius,mass\n" + objects)
 
 
 def main() -> None:
@@ -50,7 +48,10 @@ def main() -> None:
         write_tables(folder)
         posterior = vrdp_prob.infer(vrdp_prob.load(folder), sampler="laplace", seed=0)
     mass = posterior.object_summary("B").mass
-    print(f"mass of B: {mass.mean:.4f} kg, 90 % interval {mass.q05:.4f} to {mass.q95:.4f} kg ({mass.status})")
+    interval = f"{mass.summary.q05:.4f} to {mass.summary.q95:.4f} kg"
+    print(
+        f"mass of B: {mass.summary.mean:.4f} kg, 90 % interval {interval} ({mass.status}); the truth is {MASS_OF_B} kg"
+    )
 
 
 if __name__ == "__main__":

@@ -5,14 +5,7 @@ from typing import ClassVar
 
 from vrdp_prob.models.effects.effect import BodyView, Effect
 from vrdp_prob.models.simulator.formula import Scalar
-from vrdp_prob.models.simulator.mathematics import maximum, minimum
-
-SLOWEST_REBOUND = 1e-3
-"""Rebound speed in m/s below which a contact loses no energy.
-
-Bodies that press on each other would otherwise meet infinitely often in finite time. They hop instead by less than a
-micrometre, which pushes as a lasting contact would.
-"""
+from vrdp_prob.models.simulator.mathematics import minimum
 
 
 class NormalImpact(Effect):
@@ -22,7 +15,7 @@ class NormalImpact(Effect):
     sentence: ClassVar = (
         "Two bodies that meet part with the product of their restitution factors as share of the speed."
     )
-    law: ClassVar = "e = min(1, r1 r2), but the rebound is no slower than min(closing speed, 1 mm/s)"
+    law: ClassVar = "e = min(1, r1 r2)"
     source: ClassVar = "Ding et al., NeurIPS 2021 (VRDP), section 3.3; momentum balance with the moments of inertia"
 
     def restitution(
@@ -33,6 +26,5 @@ class NormalImpact(Effect):
         second: BodyView,
         parameters: Mapping[str, Scalar],
     ) -> Scalar:
-        """Product of the two factors, with the floor that keeps pressing contacts finite."""
-        slow = minimum(1.0, SLOWEST_REBOUND / maximum(closing_speed, SLOWEST_REBOUND))
-        return maximum(minimum(1.0, first.restitution * second.restitution), slow)
+        """Product of the two factors, at most 1."""
+        return minimum(1.0, first.restitution * second.restitution)

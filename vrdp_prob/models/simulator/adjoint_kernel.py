@@ -7,6 +7,10 @@ pieces from one event to the next, also has an adjoint of its beginning: what is
 against its rate when it begins later.
 """
 
+# numba infers types, and compiled functions take their arrays one by one and by position.
+# mypy: disable-error-code="no-untyped-def"
+# ruff: noqa: PLR0912, PLR0917
+
 from typing import NamedTuple
 
 import numpy as np
@@ -338,7 +342,7 @@ def reverse_contact(world, adjoint, kind, a, b, numbers, t):
     of_a, of_b, bar, one = adjoint.local[OF_A], adjoint.local[OF_B], adjoint.local[VELOCITIES], adjoint.local[ONE]
     evaluate(world.polynomial[group_a], a - group_a * GROUP_SIZE, share_of(world, group_a, t), ya)
     evaluate(world.polynomial[group_b], b - group_b * GROUP_SIZE, share_of(world, group_b, t), yb)
-    feature = numbers[FEATURE : FEATURE + 6]
+    feature = numbers[FEATURE : FEATURE + 7]
     take_velocities(world, adjoint, a, of_a, bar[0:3])
     take_velocities(world, adjoint, b, of_b, bar[3:6])
     body, shared = adjoint.body, adjoint.shared

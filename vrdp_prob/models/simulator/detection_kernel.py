@@ -8,6 +8,10 @@ same in the frame that turns with the side. Source of the idea: B. Mirtich, Impu
 body systems, PhD thesis, Berkeley 1996, section 2.3 (conservative advancement), here of second order.
 """
 
+# numba infers types, and compiled functions take their arrays one by one and by position.
+# mypy: disable-error-code="no-untyped-def"
+# ruff: noqa: PLR0917
+
 import math
 from typing import NamedTuple
 
@@ -24,8 +28,8 @@ SLACK = 1e-7
 """Depth in m of that, and of an overlap that is not yet an error."""
 CRAWL = 1e-6
 """Shortest walk in s while two bodies touch."""
-# Columns of `table`; the contact's features (x, y, extent of the owner; x, y, extent of the other) follow.
-CONTACT_TIME, PAIR_KIND, OWNER, OVERLAPPING, PAIR_FEATURE = 0, 1, 2, 3, 4
+# Columns of `table`; a contact has 6 numbers of features (x, y, extent of the owner, the same of the other).
+CONTACT_TIME, PAIR_KIND, OWNER, OVERLAPPING, LAST_CONTACT, PAIR_FEATURE, PRESSING = 0, 1, 2, 3, 4, 5, 11
 # Rows of `local`: the difference of the positions and both angles as polynomials; a look; its features.
 ANGLE_FIRST, LOOK, LOOK_FEATURE = 2, 4, 5
 GAP, RATE, CURVATURE = 0, 1, 2
@@ -34,14 +38,16 @@ GAP, RATE, CURVATURE = 0, 1, 2
 class Pairs(NamedTuple):
     """Next contact of each pair, and room for a search."""
 
-    table: np.ndarray  # [first, second, (time, kind, owner, overlapping, features)] with first < second
+    table: (
+        np.ndarray
+    )  # [first, second, (time, kind, owner, overlapping, last contact, features, pressing)] with first < second
     local: np.ndarray  # [6, 8]
 
 
 @compiled
 def new_pairs(count):
     """Room for the contacts of `count` bodies."""
-    return Pairs(np.zeros((count, count, 10)), np.zeros((6, 8)))
+    return Pairs(np.zeros((count, count, 12)), np.zeros((6, 8)))
 
 
 @compiled

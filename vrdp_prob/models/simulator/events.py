@@ -100,8 +100,8 @@ class EventTable:
             kind=kind.astype(np.int64),
             first=first,
             second=np.where(wall, second - body_count, second),
-            point=numbers[:, 9:11],
-            normal=np.where(swap[:, None], -1.0, 1.0) * numbers[:, 11:13],
-            impulse=numbers[:, 8],
-            closing_speed=numbers[:, 7],
+            point=numbers[:, 10:12],
+            normal=np.where(swap[:, None], -1.0, 1.0) * numbers[:, 12:14],
+            impulse=numbers[:, 9],
+            closing_speed=numbers[:, 8],
         )

@@ -6,15 +6,23 @@ the recorded steps down as straight-line Python (common steps once): the law's v
 (reverse-mode derivative; A. Griewank and A. Walther, Evaluating Derivatives, 2nd ed. 2008, section 3.2).
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+import operator
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 Scalar = Any
 """A number in a law: float, tensor or `Symbol`."""
 
 _COMPARISONS = frozenset({"<", "<=", ">", ">="})
-_INFIX = frozenset({"+", "-", "*", "/"}) | _COMPARISONS
-_TINY = "1e-300"
+_ARITHMETIC: dict[str, Callable[[float, float], float]] = {
+    "+": operator.add,
+    "-": operator.sub,
+    "*": operator.mul,
+    "/": operator.truediv,
+}
+_INFIX = frozenset(_ARITHMETIC) | _COMPARISONS
+_TINY = 1e-300
+"""Keeps a derivative finite where a root or a logarithm has none."""
 
 
 class Symbol:
@@ -110,28 +118,41 @@ class Recorder:
         return self._steps[key]
 
     def _simplified(self, operation: str, arguments: tuple[Symbol, ...]) -> Symbol | None:
-        if operation == "neg":
-            inner = arguments[0]
-            if inner.operation == "neg":
-                return inner.arguments[0]
-            return None if inner.constant is None else self.constant(-inner.constant)
         if operation == "where":
             return arguments[1] if arguments[1] is arguments[2] else None
-        if operation not in _INFIX - _COMPARISONS:
+        if operation == "neg":
+            return self._negated(arguments[0])
+        if operation not in _ARITHMETIC:
             return None
-        left, right = arguments
-        a, b = left.constant, right.constant
+        a, b = arguments[0].constant, arguments[1].constant
         if a is not None and b is not None and not (operation == "/" and b == 0):
-            return self.constant({"+": a + b, "-": a - b, "*": a * b, "/": a / b if b else 0.0}[operation])
-        if operation == "+":
-            return right if a == 0 else left if b == 0 else None
-        if operation == "-":
-            return -right if a == 0 else left if b == 0 else self.constant(0) if left is right else None
-        if operation == "*":
-            if 0 in (a, b):
-                return self.constant(0)
-            return right if a == 1 else left if b == 1 else -right if a == -1 else -left if b == -1 else None
-        return left if b == 1 else self.constant(0) if a == 0 else None
+            return self.constant(_ARITHMETIC[operation](a, b))
+        simplify = {"+": self._sum, "-": self._difference, "*": self._product, "/": self._quotient}[operation]
+        return simplify(*arguments)
+
+    def _negated(self, inner: Symbol) -> Symbol | None:
+        if inner.operation == "neg":
+            return inner.arguments[0]
+        return None if inner.constant is None else self.constant(-inner.constant)
+
+    def _sum(self, left: Symbol, right: Symbol) -> Symbol | None:
+        return right if left.constant == 0 else left if right.constant == 0 else None
+
+    def _difference(self, left: Symbol, right: Symbol) -> Symbol | None:
+        if left is right:
+            return self.constant(0)
+        return -right if left.constant == 0 else left if right.constant == 0 else None
+
+    def _product(self, left: Symbol, right: Symbol) -> Symbol | None:
+        for factor, other in ((left, right), (right, left)):
+            if factor.constant == 0:
+                return factor
+            if factor.constant in (1, -1):
+                return other if factor.constant == 1 else -other
+        return None
+
+    def _quotient(self, left: Symbol, right: Symbol) -> Symbol | None:
+        return left if right.constant == 1 or left.constant == 0 else None
 
 
 def _ordered(outputs: Iterable[Symbol]) -> list[Symbol]:
@@ -152,48 +173,45 @@ def _ordered(outputs: Iterable[Symbol]) -> list[Symbol]:
 
 def _partials(symbol: Symbol, bar: Symbol) -> tuple[Scalar, ...]:
     """Adjoints of the arguments of one step from the adjoint of its result."""
-    operation, arguments = symbol.operation, symbol.arguments
-    first = arguments[0]
-    second = arguments[1] if len(arguments) > 1 else first
-    step = symbol.recorder.step
-    match operation:
-        case "+":
-            return bar, bar
-        case "-":
-            return bar, -bar
-        case "*":
-            return bar * second, bar * first
-        case "/":
-            return bar / second, -(bar * symbol) / second
-        case "neg":
-            return (-bar,)
-        case "sqrt":
-            return (bar * 0.5 / step("max", symbol, float(_TINY)),)
-        case "sin":
-            return (bar * step("cos", first),)
-        case "cos":
-            return (-(bar * step("sin", first)),)
-        case "exp":
-            return (bar * symbol,)
-        case "log":
-            return (bar / first,)
-        case "tanh":
-            return (bar * (1 - symbol * symbol),)
-        case "abs":
-            return (step("where", first < 0, -bar, bar),)
-        case "atan2":
-            square = first * first + second * second
-            return bar * second / square, -(bar * first) / square
-        case "pow":
-            exponent = bar * symbol * step("log", step("max", first, float(_TINY)))
-            return bar * second * first ** (second - 1), exponent
-        case "max":
-            return step("where", first < second, 0.0, bar), step("where", first < second, bar, 0.0)
-        case "min":
-            return step("where", second < first, 0.0, bar), step("where", second < first, bar, 0.0)
-        case "where":
-            return 0.0, step("where", first, bar, 0.0), step("where", first, 0.0, bar)
-    raise NotImplementedError(f"no derivative is known for the operation '{operation}'")
+    if symbol.operation not in _DERIVATIVES:
+        raise NotImplementedError(f"no derivative is known for the operation '{symbol.operation}'")
+    return _DERIVATIVES[symbol.operation](symbol, bar, *symbol.arguments)
+
+
+def _of_arc_tangent(_: Symbol, bar: Symbol, y: Symbol, x: Symbol) -> tuple[Scalar, ...]:
+    square = x * x + y * y
+    return bar * x / square, -(bar * y) / square
+
+
+def _of_power(result: Symbol, bar: Symbol, base: Symbol, exponent: Symbol) -> tuple[Scalar, ...]:
+    step = bar.recorder.step
+    return bar * exponent * base ** (exponent - 1), bar * result * step("log", step("max", base, _TINY))
+
+
+def _if(condition: Symbol, a: Scalar, b: Scalar) -> Symbol:
+    return condition.recorder.step("where", condition, a, b)
+
+
+_DERIVATIVES: dict[str, Callable[..., tuple[Scalar, ...]]] = {
+    "+": lambda _, bar, a, b: (bar, bar),
+    "-": lambda _, bar, a, b: (bar, -bar),
+    "*": lambda _, bar, a, b: (bar * b, bar * a),
+    "/": lambda result, bar, a, b: (bar / b, -(bar * result) / b),
+    "neg": lambda _, bar, a: (-bar,),
+    "sqrt": lambda result, bar, a: (bar * 0.5 / bar.recorder.step("max", result, _TINY),),
+    "sin": lambda _, bar, a: (bar * bar.recorder.step("cos", a),),
+    "cos": lambda _, bar, a: (-(bar * bar.recorder.step("sin", a)),),
+    "exp": lambda result, bar, a: (bar * result,),
+    "log": lambda _, bar, a: (bar / a,),
+    "tanh": lambda result, bar, a: (bar * (1 - result * result),),
+    "abs": lambda _, bar, a: (_if(a < 0, -bar, bar),),
+    "atan2": _of_arc_tangent,
+    "pow": _of_power,
+    "max": lambda _, bar, a, b: (_if(a < b, 0.0, bar), _if(a < b, bar, 0.0)),
+    "min": lambda _, bar, a, b: (_if(b < a, 0.0, bar), _if(b < a, bar, 0.0)),
+    "where": lambda _, bar, condition, a, b: (0.0, _if(condition, bar, 0.0), _if(condition, 0.0, bar)),
+}
+"""Adjoints of the arguments of a step from its result, the adjoint of the result, and the arguments."""
 
 
 def vector_jacobian(outputs: Sequence[Scalar], bars: Sequence[Symbol], inputs: Sequence[Symbol]) -> list[Symbol]:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from vrdp_prob.models.effects.effect import BodyView, Effect
 from vrdp_prob.models.parameters import Parameter, Scope
-from vrdp_prob.models.simulator.contact import ContactKind, Feature, contact
+from vrdp_prob.models.simulator.contact import ContactKind, Feature, contact, contact_geometry
 from vrdp_prob.models.simulator.formula import Recorder, Scalar, Symbol, assignments, vector_jacobian
 from vrdp_prob.models.simulator.mathematics import length, where
 from vrdp_prob.models.simulator.motion import (
@@ -117,10 +117,10 @@ def _contact_source(kind: ContactKind, effects: Sequence[Effect], layout: Layout
     state_a, state_b = inputs.array("ya", len(STATE)), inputs.array("yb", len(STATE))
     constants_a = inputs.array("body_a", len(layout.constants))
     constants_b = inputs.array("body_b", len(layout.constants))
-    feature = inputs.array("feature", 6)
+    feature = inputs.array("feature", 7)
     a, b = inputs.view(state_a, constants_a), inputs.view(state_b, constants_b)
-    result = contact(kind, effects, a, b, Feature(*feature[:3]), Feature(*feature[3:]), inputs.shared)
-    geometry = result.geometry
+    geometry = contact_geometry(kind, a, b, Feature(*feature[:3]), Feature(*feature[3:6]))
+    result = contact(effects, geometry, a, b, inputs.shared, pressing=feature[6])
     more = [result.closing_speed, result.normal_impulse, *geometry.point, *geometry.normal, geometry.gap]
     arguments = "ya, yb, body_a, body_b, feature, shared"
     name = kind.name.lower()

@@ -1,28 +1,45 @@
 """The functions a physical law may call: on numbers, on tensors, and on the symbols that record the law."""
 
 import math
+from collections.abc import Callable
 
 import torch
 
 from vrdp_prob.models.simulator.formula import Scalar, Symbol
+
+_ON_NUMBERS: dict[str, Callable[..., Scalar]] = {
+    "sqrt": math.sqrt,
+    "sin": math.sin,
+    "cos": math.cos,
+    "atan2": math.atan2,
+    "exp": math.exp,
+    "log": math.log,
+    "tanh": math.tanh,
+    "abs": abs,
+    "min": min,
+    "max": max,
+}
+_ON_TENSORS: dict[str, Callable[..., Scalar]] = {
+    "sqrt": torch.sqrt,
+    "sin": torch.sin,
+    "cos": torch.cos,
+    "atan2": torch.atan2,
+    "exp": torch.exp,
+    "log": torch.log,
+    "tanh": torch.tanh,
+    "abs": torch.abs,
+    "min": torch.minimum,
+    "max": torch.maximum,
+}
 
 
 def _apply(operation: str, *operands: Scalar) -> Scalar:
     for operand in operands:
         if isinstance(operand, Symbol):
             return operand.recorder.step(operation, *operands)
-    if not any(isinstance(operand, torch.Tensor) for operand in operands):
-        return (
-            {"min": min, "max": max, "abs": abs}[operation](*operands)
-            if operation in _PLAIN
-            else getattr(math, operation)(*operands)
-        )
-    tensors = [torch.as_tensor(operand, dtype=torch.float64) for operand in operands]
-    return getattr(torch, _TORCH_NAMES.get(operation, operation))(*tensors)
-
-
-_PLAIN = ("min", "max", "abs")
-_TORCH_NAMES = {"min": "minimum", "max": "maximum"}
+    if any(isinstance(operand, torch.Tensor) for operand in operands):
+        return _ON_TENSORS[operation](*(torch.as_tensor(operand) for operand in operands))
+    return _ON_NUMBERS[operation](*operands)
 
 
 def sqrt(x: Scalar) -> Scalar:

@@ -1,5 +1,9 @@
 """Compiled motion between events: one Runge-Kutta step of a group of bodies, and its polynomial."""
 
+# numba infers types, and compiled functions take their arrays one by one and by position.
+# mypy: disable-error-code="no-untyped-def"
+# ruff: noqa: PLR0917
+
 import math
 
 import numpy as np
@@ -222,12 +226,12 @@ def find_ending(world, group):
     for slot in range(GROUP_SIZE):
         body = group * GROUP_SIZE + slot
         phase = world.phase[body]
-        if phase[SPIN_SENSE] != 0.0 and polynomial[0, slot, 5] != 0.0:
-            if spin_along(polynomial, slot, phase, 1.0) <= 0.0:
-                share = cut(world, group, share, vanishing_share(polynomial, slot, phase, True), SPIN_STOPS, body)
-        if phase[REFERENCE_X] != 0.0 or phase[REFERENCE_Y] != 0.0:
-            if along(polynomial, slot, phase, 1.0) <= 0.0:
-                share = cut(world, group, share, vanishing_share(polynomial, slot, phase, False), STOPS, body)
+        spins = phase[SPIN_SENSE] != 0.0 and polynomial[0, slot, 5] != 0.0
+        if spins and spin_along(polynomial, slot, phase, 1.0) <= 0.0:
+            share = cut(world, group, share, vanishing_share(polynomial, slot, phase, True), SPIN_STOPS, body)
+        moves = phase[REFERENCE_X] != 0.0 or phase[REFERENCE_Y] != 0.0
+        if moves and along(polynomial, slot, phase, 1.0) <= 0.0:
+            share = cut(world, group, share, vanishing_share(polynomial, slot, phase, False), STOPS, body)
     return share
 
 

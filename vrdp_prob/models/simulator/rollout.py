@@ -92,7 +92,8 @@ def simulate(
     arrays = kernel_arrays(worlds, model.layout, float(detached[0]))
     flat = (arrays.bodies, arrays.shared, arrays.start, times.to(torch.float64))
     run = _Run(model.kernel, arrays, event_limit)
-    states = _Simulation.apply(run, *(tensor.cpu() for tensor in flat))
+    # torch does not annotate Function.apply.
+    states: Tensor = _Simulation.apply(run, *(tensor.cpu() for tensor in flat))  # type: ignore[no-untyped-call]
     states = states[:, :, : len(worlds.shapes)].to(worlds.position)
     released = times.to(worlds.release_time)[None, :, None] >= worlds.release_time[:, None, :]
     return Rollout(

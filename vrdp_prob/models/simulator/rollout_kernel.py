@@ -1,16 +1,20 @@
 """Compiled event loop: the earliest of releases, piece ends and contacts, one after the other."""
 
+# numba infers types, and compiled functions take their arrays one by one and by position.
+# mypy: disable-error-code="no-untyped-def"
+# ruff: noqa: PLR0917
+
 import math
 
 from vrdp_prob.models.simulator.detection_kernel import (
     CONTACT_TIME,
     CRAWL,
+    LAST_CONTACT,
     OVERLAPPING,
     OWNER,
     PAIR_FEATURE,
     PAIR_KIND,
     SLACK,
-    Pairs,
 )
 from vrdp_prob.models.simulator.laws_kernel import GROUP_SIZE, SLIPS, STATE_SIZE, compiled, contact_law
 from vrdp_prob.models.simulator.motion_kernel import advance, settle
@@ -192,10 +196,11 @@ def collide(world, pairs, tape, i, j, horizon):
     if not result[6] > 0.0:
         search_pair(world, pairs, i, j, t + CRAWL, horizon)
         return OK
+    pairs.table[i, j, LAST_CONTACT] = t
     row = add_row(tape, CONTACT, a, b, t)
     tape.counts[EVENTS] += 1
     tape.integers[row, CONTACT_KIND] = kind
-    for c in range(6):
+    for c in range(7):
         tape.numbers[row, FEATURE + c] = feature[c]
     for c in range(7):
         tape.numbers[row, CLOSING_SPEED + c] = result[6 + c]
@@ -235,6 +240,7 @@ def clear_pairs(pairs):
     for i in range(pairs.table.shape[0]):
         for j in range(pairs.table.shape[0]):
             pairs.table[i, j, CONTACT_TIME], pairs.table[i, j, OVERLAPPING] = math.inf, 0.0
+            pairs.table[i, j, LAST_CONTACT] = -math.inf
 
 
 @compiled

@@ -1,5 +1,9 @@
 """Compiled search for the next contact of a pair of bodies."""
 
+# numba infers types, and compiled functions take their arrays one by one and by position.
+# mypy: disable-error-code="no-untyped-def"
+# ruff: noqa: PLR0917
+
 import math
 
 import numpy as np
@@ -10,12 +14,14 @@ from vrdp_prob.models.simulator.detection_kernel import (
     CRAWL,
     CURVATURE,
     GAP,
+    LAST_CONTACT,
     LOOK,
     LOOK_FEATURE,
     OVERLAPPING,
     OWNER,
     PAIR_FEATURE,
     PAIR_KIND,
+    PRESSING,
     RATE,
     SLACK,
     SLOW,
@@ -42,6 +48,8 @@ from vrdp_prob.models.simulator.world_kernel import (
     WALL,
 )
 
+PRESSING_TIME = 0.02
+"""Time in s after a contact within which the same two bodies count as pressing on each other when they meet again."""
 CLEARING = 1e-3
 """Time in s between two looks at bodies that overlap."""
 
@@ -136,6 +144,8 @@ def search(world, pairs, i, j, t, end):
             pairs.table[i, j, CONTACT_TIME] = t + s * duration
             pairs.table[i, j, PAIR_KIND] = code % 2
             pairs.table[i, j, OWNER] = j if code >= 2 else i
+            pressing = pairs.table[i, j, CONTACT_TIME] - pairs.table[i, j, LAST_CONTACT] < PRESSING_TIME
+            pairs.table[i, j, PRESSING] = 1.0 if pressing else 0.0
             for c in range(6):
                 pairs.table[i, j, PAIR_FEATURE + c] = pairs.local[LOOK_FEATURE, c]
             return

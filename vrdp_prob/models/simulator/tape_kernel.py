@@ -1,5 +1,8 @@
 """Compiled record of a simulated world: its frames, and every piece of motion and every event in order."""
 
+# numba infers types, and compiled functions take their arrays one by one and by position.
+# mypy: disable-error-code="no-untyped-def"
+
 import math
 from typing import NamedTuple
 
@@ -15,7 +18,7 @@ KIND, FIRST, SECOND, BEFORE_FIRST, BEFORE_SECOND, FRAME_BEGIN, FRAME_END = 0, 1,
 CONTACT_KIND = FRAME_BEGIN
 INTEGERS = 7
 # Columns of numbers. A piece: origin, length, states, phases. An event: its time. A contact: features, then its result.
-TIME, FEATURE, CLOSING_SPEED = 0, 1, 7
+TIME, FEATURE, CLOSING_SPEED = 0, 1, 8
 NUMBERS = max(2 + GROUP_SIZE * (STATE_SIZE + PHASE_SIZE), 16)
 # Columns of `place`: next frame of a body, row of the current piece of a group.
 FRAME, ROW = 0, 1

@@ -4,6 +4,9 @@ Numbers that belong together share an array, with named columns, because the tim
 number of arrays it is handed.
 """
 
+# numba infers types, and compiled functions take their arrays one by one and by position.
+# mypy: disable-error-code="no-untyped-def"
+
 import math
 from typing import NamedTuple
 

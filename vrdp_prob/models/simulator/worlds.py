@@ -73,8 +73,8 @@ class Worlds:
             object.__setattr__(self, "wall_restitution", torch.ones(len(self), len(self.walls), dtype=torch.float64))
         if self.restitution_of_walls.shape != (len(self), len(self.walls)):
             raise InputError(
-                f"worlds: wall_restitution has shape {tuple(self.restitution_of_walls.shape)}, but there are {len(self)} "
-                f"worlds and {len(self.walls)} walls; give one factor per world and wall."
+                f"worlds: wall_restitution has shape {tuple(self.restitution_of_walls.shape)}, but there are "
+                f"{len(self)} worlds and {len(self.walls)} walls; give one factor per world and wall."
             )
         for name in ("mass", "radius"):
             if (getattr(self, name) <= 0).any():

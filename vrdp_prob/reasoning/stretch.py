@@ -12,6 +12,9 @@ from vrdp_prob.models.simulator.events import RolloutEventKind
 from vrdp_prob.models.simulator.rollout import simulate
 from vrdp_prob.models.simulator.worlds import Worlds
 
+EVENT_LIMIT = 1000
+"""Events of one draw in one stretch after which it is left as it is: bodies pressed together touch without end."""
+
 
 @dataclass
 class State:
@@ -87,7 +90,7 @@ class Stretch:
     exists
         Whether a body is present and released.
     contacts
-        All contacts of bodies.
+        Contacts of bodies; of an unbroken series of contacts of the same pair the first.
     """
 
     times: Float[np.ndarray, "time"]
@@ -133,9 +136,11 @@ def advance(worlds: Worlds, state: State, times: Float[np.ndarray, "time"], mode
         present=torch.from_numpy(np.ascontiguousarray(state.present)),
     )
     with torch.no_grad():
-        rollout = simulate(released, torch.from_numpy(np.ascontiguousarray(times)), model)
+        rollout = simulate(released, torch.from_numpy(np.ascontiguousarray(times)), model, event_limit=EVENT_LIMIT)
     events = rollout.events.of_kind(RolloutEventKind.COLLISION)
     order = np.lexsort((events.time, events.world))
+    same = [np.diff(array[order], prepend=-1) == 0 for array in (events.world, events.first, events.second)]
+    order = order[~np.all(same, axis=0)]
     trajectory, velocity = rollout.trajectory.numpy(), rollout.velocity.numpy()
     return Stretch(
         np.asarray(times),

@@ -21,6 +21,7 @@ from vrdp_prob.progress import ProgressDisplay, SilentProgress
 from vrdp_prob.reasoning.counterfactual import Counterfactual
 from vrdp_prob.reasoning.events import EventTable
 from vrdp_prob.reasoning.facts import Motion, draw_attributes
+from vrdp_prob.reasoning.friction import OwnFriction, apply_friction, own_friction, with_friction_ratio
 from vrdp_prob.reasoning.refit import state_at_end
 from vrdp_prob.reasoning.seen import SeenVideo
 from vrdp_prob.reasoning.stretch import advance
@@ -100,8 +101,8 @@ class PosteriorWorlds:
             raise InputError(f"draws is {draws}; ask for at least 1.")
         self.posterior = posterior
         self._progress = progress or SilentProgress()
-        self._worlds = posterior.worlds(draws)
-        self._seen = SeenVideo(posterior.tracks, len(self._worlds), posterior.seed)
+        self._drawn = posterior.worlds(draws)
+        self._seen = SeenVideo(posterior.tracks, len(self._drawn), posterior.seed)
         self._changed: dict[tuple[Change, int], WorldDraws] = {}
 
     @property
@@ -112,7 +113,7 @@ class PosteriorWorlds:
     @property
     def draws(self) -> int:
         """Number of draws."""
-        return len(self._worlds)
+        return len(self._drawn)
 
     @property
     def effective_draws(self) -> float:
@@ -148,7 +149,7 @@ class PosteriorWorlds:
     @cached_property
     def factual(self) -> Rollout:
         """Rollouts of the draws from their release on, at the frames of the video."""
-        return self._simulate(self._worlds, self._seen.tracks.times)
+        return self._simulate(self._drawn, self._seen.tracks.times)
 
     @cached_property
     def future(self) -> WorldDraws:
@@ -161,7 +162,7 @@ class PosteriorWorlds:
         if (change, body) not in self._changed:
             with self._progress.stage(f"Object {self.bodies[body].id} {change}"):
                 world = Counterfactual(
-                    self._seen, self._worlds, self.posterior.model, self.turning, change=change, body=body
+                    self._seen, self._acting, self._model, self.turning, change=change, body=body
                 ).run()
             self._changed[change, body] = world
         return self._changed[change, body]
@@ -199,6 +200,29 @@ class PosteriorWorlds:
         generator = np.random.default_rng((self.posterior.seed, 5))
         return draw_attributes(self.bodies, self.draws, generator)
 
+    @cached_property
+    def _extended(self) -> tuple[Worlds, PhysicsModel]:
+        """The draws and the model with a friction ratio for each body, as they are where there is no friction."""
+        return with_friction_ratio(self._drawn, self.posterior.model) or (self._drawn, self.posterior.model)
+
+    @property
+    def _model(self) -> PhysicsModel:
+        return self._extended[1]
+
+    @cached_property
+    def _friction(self) -> OwnFriction | None:
+        """Friction of each body by its own flights."""
+        if with_friction_ratio(self._drawn, self.posterior.model) is None:
+            return None
+        return own_friction(self._seen, *self._extended)
+
+    @cached_property
+    def _acting(self) -> Worlds:
+        """The draws with each body's own friction: what counterfactuals are simulated with."""
+        if self._friction is None:
+            return self._drawn
+        return apply_friction(self._extended[0], self._friction.log_ratio)
+
     def _is_default(self, body: str) -> bool:
         status = self.posterior.status[body]
         return DEFAULT in (str(status.mass.status), str(status.restitution.status))
@@ -208,8 +232,9 @@ class PosteriorWorlds:
             return simulate(worlds, torch.from_numpy(times.copy()), self.posterior.model)
 
     def _future(self) -> WorldDraws:
-        seen, model = self._seen, self.posterior.model
-        state = state_at_end(seen, self._worlds, model, self.turning)
+        seen, model = self._seen, self._model
+        state, log_ratio = state_at_end(seen, self._extended[0], model, self.turning, self._friction)
+        worlds = self._extended[0] if self._friction is None else apply_friction(self._extended[0], log_ratio)
         end = float(seen.tracks.times[-1])
         times = end + np.arange(FUTURE_FRAMES + 1) / seen.tracks.frame_rate
         # in view of the last frame, bodies are held to start there; those that left are on their way since they did
@@ -217,7 +242,7 @@ class PosteriorWorlds:
         unseen = np.where(here, end - state.release[0], 0.0)
         state.position += state.velocity * unseen[:, None]
         state.release[:, here] = end
-        stretch = advance(self._worlds, state, times[1:], model)
+        stretch = advance(worlds, state, times[1:], model)
         timeline = Timeline(seen.universe, seen.draws, seen.tracks.camera)
         timeline.met[:, seen.universe.collisions] = seen.events.happens[:, seen.universe.collisions]
         for meeting in stretch.meetings():

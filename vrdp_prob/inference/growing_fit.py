@@ -18,7 +18,7 @@ from vrdp_prob.inference.samples import Gaussian
 from vrdp_prob.models.likelihood import Likelihood
 from vrdp_prob.models.unknowns import ANGLE_NOISE, NOISE
 
-CANDIDATES = 160
+CANDIDATES = 128
 """Worlds drawn where a window brings something new."""
 REFINED = 3
 """Candidates that are refined after that."""
@@ -30,7 +30,8 @@ HUBER = 4.0
 """Residuals beyond it (in units of the noise) pull less while the fit is not finished."""
 WORSE = 1.3
 """A window whose new frames fit worse than this (root mean square in units of the noise) gets fresh candidates."""
-NORMAL_MAD = 0.6745
+GOOD_FIT = 1.1
+"""No further candidate is refined once the mean squared residual is below this (in units of the noise)."""
 
 
 class GrowingFit:
@@ -89,7 +90,7 @@ class GrowingFit:
             self._update_noise()
             before = self.point
             active = self._active(frame_count)
-            self._refine(self.point[None], frame_count, active, iterations=12, threshold=None)
+            self._refine(self.point[None], frame_count, active, iterations=12, threshold=None, tolerance=1e-3)
             if np.abs((self.point - before) / self._coordinates.scale).max() < 1e-3:
                 break
 
@@ -171,14 +172,15 @@ class GrowingFit:
         *,
         iterations: int = 6,
         threshold: float | None = HUBER,
+        tolerance: float = 0.05,
     ) -> None:
         """Refine the best candidates and keep the best result."""
         chosen = candidates
         if len(candidates) > 1:
             costs = robust_cost(self.likelihood.residuals(candidates, frame_count), threshold)
             self.evaluations += len(candidates)
-            order = np.argsort(costs)[:REFINED]
-            chosen = candidates[np.unique(np.append(order, 0))]
+            order = np.argsort(costs)[:REFINED].tolist()
+            chosen = candidates[order if 0 in order else [*order, 0]]
         best: Minimum | None = None
         for start in chosen:
             minimum = minimise(
@@ -187,11 +189,14 @@ class GrowingFit:
                 self._coordinates.scale,
                 active=active,
                 iterations=iterations,
+                tolerance=tolerance,
                 threshold=threshold,
             )
             self.evaluations += minimum.evaluations
             if best is None or minimum.cost < best.cost:
                 best = minimum
+            if best.cost < GOOD_FIT * len(best.jacobian) / 2:
+                break
         if best is None or not np.isfinite(best.cost):
             return
         self.point, self.converged = best.point, best.converged

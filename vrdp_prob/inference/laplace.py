@@ -9,12 +9,22 @@ from jaxtyping import Float
 from scipy.special import gammaln
 
 from vrdp_prob.inference.samples import Gaussian, LogDensity, Samples, evaluate
-from vrdp_prob.progress import ProgressDisplay, SilentProgress
+from vrdp_prob.progress import Advance, ProgressDisplay, SilentProgress
 
-DEGREES_OF_FREEDOM = 20.0
+DEGREES_OF_FREEDOM = 30.0
 """The proposal's tails: heavier than Gaussian, light enough to lose little in 40 dimensions."""
 OVERSAMPLING = 4
 """Proposals per draw that is handed back."""
+ROUNDS = 2
+"""At most so many times the proposal is moved and shaped towards what its weighted draws show."""
+ROUND_DRAWS = 1500
+EFFECTIVE_PER_DIMENSION = 6.0
+"""Weights are flattened until so many effective draws per dimension shape the next proposal."""
+GOOD_ENOUGH = 0.1
+"""Effective share of the draws from which on the proposal is left as it is."""
+FEWEST = 100.0
+"""Where the weights leave fewer effective draws than this they are flattened, so that the draws at least spread; Pareto
+k then says that they are not to be trusted."""
 BATCH = 500
 
 
@@ -46,26 +56,85 @@ def sample_laplace(
     One chain of draws, with Pareto k-hat and the effective number of proposals.
     """
     count = OVERSAMPLING * draws
-    whitened, log_proposal = _proposals(start, count, generator)
-    points = start.points(whitened)
-    log_density = np.empty(count)
-    with (progress or SilentProgress()).stage("Importance sampling", total=count) as advance:
-        for begin in range(0, count, BATCH):
-            chosen = slice(begin, min(begin + BATCH, count))
-            log_density[chosen] = evaluate(density, points[chosen])
-            advance(chosen.stop - chosen.start)
-    weights, pareto_k = smoothed_weights(log_density - log_proposal)
+    with (progress or SilentProgress()).stage("Importance sampling", total=count + ROUNDS * ROUND_DRAWS) as advance:
+        proposal, evaluations = adapted(density, start, generator, advance)
+        points, log_density, log_ratio = _weighted(density, proposal, count, generator, advance)
+    weights, pareto_k = smoothed_weights(log_ratio)
+    effective = effective_count(weights)
+    if effective < FEWEST:
+        weights = _flattened(log_ratio, FEWEST)
     chosen_draws = _resample(weights, draws, generator)
     statistics = {"log_weight": np.log(np.maximum(weights[chosen_draws], 1e-300))[None]}
-    effective = float(1 / np.sum(weights**2))
     return Samples(
         points[chosen_draws][None],
         log_density[chosen_draws][None],
         statistics,
         pareto_k=pareto_k,
         effective=effective,
-        evaluations=count,
+        evaluations=count + evaluations,
     )
+
+
+def adapted(
+    density: LogDensity, start: Gaussian, generator: np.random.Generator, advance: Advance
+) -> tuple[Gaussian, int]:
+    """Move and shape a Gaussian towards the density by weighted draws (population Monte Carlo).
+
+    Source: Cappe, Douc, Guillin, Marin and Robert, Adaptive importance sampling in general mixture classes,
+    Statistics and Computing 18 (2008).
+    """
+    gaussian, evaluations = start, 0
+    dimension = len(start.mean)
+    for _ in range(ROUNDS):
+        points, _, log_ratio = _weighted(density, gaussian, ROUND_DRAWS, generator, advance)
+        evaluations += ROUND_DRAWS
+        weights, _ = smoothed_weights(log_ratio)
+        if effective_count(weights) > GOOD_ENOUGH * ROUND_DRAWS:
+            break
+        weights = _flattened(log_ratio, EFFECTIVE_PER_DIMENSION * dimension)
+        mean = weights @ points
+        centred = points - mean
+        covariance = (centred * weights[:, None]).T @ centred
+        share = min(1.0, effective_count(weights) / (2 * EFFECTIVE_PER_DIMENSION * dimension))
+        covariance = share * covariance + (1 - share) * gaussian.root @ gaussian.root.T
+        gaussian = Gaussian(mean, np.linalg.cholesky(covariance))
+    return gaussian, evaluations
+
+
+def effective_count(weights: Float[np.ndarray, "draw"]) -> float:
+    """Number of equally weighted draws that are worth as much."""
+    return float(1 / np.sum(weights**2))
+
+
+def _weighted(
+    density: LogDensity, proposal: Gaussian, count: int, generator: np.random.Generator, advance: Advance
+) -> tuple[Float[np.ndarray, "draw dimension"], Float[np.ndarray, "draw"], Float[np.ndarray, "draw"]]:
+    """Points of a proposal, their log density and the log of density over proposal."""
+    whitened, log_proposal = _proposals(proposal, count, generator)
+    points = proposal.points(whitened)
+    log_density = np.empty(count)
+    for begin in range(0, count, BATCH):
+        chosen = slice(begin, min(begin + BATCH, count))
+        log_density[chosen] = evaluate(density, points[chosen])
+        advance(chosen.stop - chosen.start)
+    return points, log_density, log_density - log_proposal
+
+
+def _flattened(log_ratio: Float[np.ndarray, "draw"], effective: float) -> Float[np.ndarray, "draw"]:
+    """Weights to the largest power up to 1 that leaves so many effective draws."""
+    shifted = np.where(np.isfinite(log_ratio), log_ratio, -np.inf) - log_ratio.max()
+
+    def weights(power: float) -> Float[np.ndarray, "draw"]:
+        values = np.where(np.isfinite(shifted), np.exp(power * np.maximum(shifted, -1e6)), 0.0)
+        return values / values.sum()
+
+    if effective_count(weights(1.0)) >= effective:
+        return weights(1.0)
+    low, high = 0.0, 1.0
+    for _ in range(30):
+        middle = (low + high) / 2
+        low, high = (middle, high) if effective_count(weights(middle)) >= effective else (low, middle)
+    return weights(low)
 
 
 def smoothed_weights(log_ratio: Float[np.ndarray, "draw"]) -> tuple[Float[np.ndarray, "draw"], float]:

@@ -18,6 +18,9 @@ from vrdp_prob.models.simulator.worlds import Worlds
 from vrdp_prob.models.unknowns import ANGLE_NOISE, NOISE
 from vrdp_prob.scene import Tracks
 
+EVENT_LIMIT = 1000
+"""Events of one world after which it counts as impossible; a video shows a few dozen at most, and bodies that press on
+each other some hundred."""
 LOG_TWO_PI = float(np.log(2 * np.pi))
 
 
@@ -60,7 +63,7 @@ class Likelihood:
     def rollout(self, points: Float[Tensor, "point dimension"], frame_count: int | None = None) -> Rollout:
         """Simulate the worlds of some points over the (first) frames of the video."""
         times = torch.tensor(self.tracks.times[:frame_count])
-        return simulate(self.worlds(points), times, self.model)
+        return simulate(self.worlds(points), times, self.model, event_limit=EVENT_LIMIT)
 
     def residuals(
         self, points: Float[np.ndarray, "point dimension"], frame_count: int | None = None

@@ -133,7 +133,7 @@ def test_noise_grows_with_the_camera_s_reprojection_error_and_with_hidden_outlin
     assert whole is not None
     assert half is not None
     sharp, blurred, hidden = (
-        position_covariance(view, solid, Sighting(fit.pose, fit, 1.0, 0.0, 5.0))
+        position_covariance(view, solid, Sighting(fit.pose, fit, 1.0, 5.0))
         for view, fit in ((camera, whole), (camera_of(stage, 1.0), whole), (camera, half))
     )
     assert sharp is not None
@@ -143,4 +143,4 @@ def test_noise_grows_with_the_camera_s_reprojection_error_and_with_hidden_outlin
     np.testing.assert_allclose(blurred - sharp, to_plane @ to_plane.T, rtol=1e-6)
     assert np.isfinite(hidden).all()
     assert np.linalg.det(half.information[:2, :2]) < 0.5 * np.linalg.det(whole.information[:2, :2])
-    assert position_covariance(camera, solid, Sighting(whole.pose, None, 1.0, 0.0, 5.0)) is None
+    assert position_covariance(camera, solid, Sighting(whole.pose, None, 1.0, 5.0)) is None

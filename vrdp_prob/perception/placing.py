@@ -50,8 +50,6 @@ class Sighting:
         The fit of its outline, None where too little of it shows.
     visible
         Share of its picture that lies in the frame and in front of the others.
-    hidden
-        Share of its picture that lies in the frame behind others.
     odds
         Mean log odds per visible pixel that the object is there.
     """
@@ -59,7 +57,6 @@ class Sighting:
     pose: Pose
     contour: ContourFit | None
     visible: float
-    hidden: float
     odds: float
 
     @property
@@ -86,9 +83,13 @@ class Track:
     sightings
         By frame; frames in which it was not seen are absent.
     shape_scores
-        Evidence for each shape, in log odds summed over the frames that were looked at.
+        Evidence for each shape: outline misfits, negative, summed over the frames that were looked at.
+    shape_frames
+        How many these are.
     expected
         Where it is thought to be now.
+    gone
+        Whether it has left the picture; it is not looked for any more.
     """
 
     number: int
@@ -181,9 +182,9 @@ class Placer:
                 value = fitted
             else:
                 contour = None
-        visible, hidden = self.visibility(solid, pose, covered)
+        visible = self.visibility(solid, pose, covered)
         pixels = visible * polygon_area(solid.polygon(self.camera, pose))
-        return Sighting(pose, contour, visible, hidden, value / max(pixels, 1.0))
+        return Sighting(pose, contour, visible, value / max(pixels, 1.0))
 
     def refine(
         self, evidence: Evidence, solid: Solid, pose: Pose, covered: UInt8[np.ndarray, "height width"]
@@ -204,13 +205,12 @@ class Placer:
         blocked = cv2.dilate(covered, np.ones((2 * _COVER_MARGIN + 1,) * 2, np.uint8)) if covered.any() else None
         return fit_contour(picture, self.camera, solid, pose, halves=halves, covered=blocked)
 
-    def visibility(self, solid: Solid, pose: Pose, covered: UInt8[np.ndarray, "height width"]) -> tuple[float, float]:
-        """Shares of the solid's picture that show, and that lie in the frame behind something nearer."""
+    def visibility(self, solid: Solid, pose: Pose, covered: UInt8[np.ndarray, "height width"]) -> float:
+        """Share of the solid's picture that lies in the frame and in front of what is nearer."""
         polygon = solid.polygon(self.camera, pose)
         window = paint(polygon, self.camera.height, self.camera.width)
-        full = max(polygon_area(polygon), 1.0)
-        behind = int(np.count_nonzero(window.mask & (covered[window.place] > 0)))
-        return min(1.0, (window.area - behind) / full), min(1.0, behind / full)
+        free = int(np.count_nonzero(window.mask & (covered[window.place] == 0)))
+        return min(1.0, free / max(polygon_area(polygon), 1.0))
 
     def learn(
         self, evidence: Evidence, track: Track, sighting: Sighting, covered: UInt8[np.ndarray, "height width"]

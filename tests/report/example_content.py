@@ -7,7 +7,15 @@ import numpy as np
 from vrdp_prob.inference.samples import Convergence
 from vrdp_prob.inference.summaries import ObjectSummary, PairSummary, ParameterSummary, Summary
 from vrdp_prob.reasoning.answer import Answer, ChoiceAnswer
-from vrdp_prob.report.content import AnswerContent, Collisions, Footage, ReportContent, WorldContent, WorldKind
+from vrdp_prob.report.content import (
+    AnswerContent,
+    Collisions,
+    Footage,
+    PairShare,
+    ReportContent,
+    WorldContent,
+    WorldKind,
+)
 from vrdp_prob.scene import Body, Camera, QuestionType, Shape, Tracks
 
 FRAME = 0.04
@@ -92,7 +100,13 @@ def roll(draws: Draws, frames: int, kind: WorldKind, body: str | None = None) ->
             spin = np.where(out, 0.995 * spin, spin)
             _bounce(draws, Moment(time, position, velocity, mass, spin, out), events)
     return WorldContent(
-        kind, body, FRAME * np.arange(frames), np.stack(trajectory, axis=1), np.stack(exists, axis=1), _table(events)
+        kind,
+        body,
+        FRAME * np.arange(frames),
+        np.stack(trajectory, axis=1),
+        np.stack(exists, axis=1),
+        _table(events),
+        _shares(_table(events), count),
     )
 
 
@@ -100,12 +114,14 @@ def from_frame(world: WorldContent, frame: int) -> WorldContent:
     """What happens in a world from a frame on."""
     late = world.collisions.time > world.times[frame]
     table = world.collisions
+    late_ones = Collisions(table.draw[late], table.time[late], table.bodies[late], table.point[late])
     return replace(
         world,
         times=world.times[frame:],
         trajectory=world.trajectory[:, frame:],
         exists=world.exists[:, frame:],
-        collisions=Collisions(table.draw[late], table.time[late], table.bodies[late], table.point[late]),
+        collisions=late_ones,
+        pairs=_shares(late_ones, world.draws),
     )
 
 
@@ -140,6 +156,14 @@ def _table(events) -> Collisions:
         np.array([key[1:] for key in keys], dtype=int).reshape(-1, 2),
         np.array([events[key][1] for key in keys], dtype=float).reshape(-1, 2),
     )
+
+
+def _shares(table: Collisions, draws: int) -> tuple[PairShare, ...]:
+    found = []
+    for pair in np.unique(table.bodies, axis=0):
+        times = table.time[(table.bodies == pair).all(axis=1)]
+        found.append(PairShare((int(pair[0]), int(pair[1])), len(times) / draws, float(np.median(times))))
+    return tuple(sorted(found, key=lambda met: met.time))
 
 
 def make_tracks(camera: Camera | None, seed: int = 1) -> Tracks:

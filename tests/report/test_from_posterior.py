@@ -17,6 +17,7 @@ from vrdp_prob.models.parameters import MASS, RESTITUTION
 from vrdp_prob.models.physics import PhysicsModel
 from vrdp_prob.models.simulator.worlds import Worlds
 from vrdp_prob.reasoning.answer import Answer
+from vrdp_prob.reasoning.worlds import PosteriorWorlds
 from vrdp_prob.report import build, rollouts, schema, write_report
 from vrdp_prob.scene import Camera, QuestionType, Tracks
 
@@ -98,6 +99,13 @@ def test_worlds_of_the_player(content):
     assert (future.times[0], future.times[-1]) == pytest.approx((factual.times[-1], factual.times[-1] + 2.32), abs=0.05)
     assert not without.exists[:, :, 0].any()
     assert len(without.collisions.time) == 0
+
+
+def test_worlds_of_the_answers_are_shown():
+    posterior = hand_made()
+    content = build(posterior, [QUESTION], worlds=PosteriorWorlds(posterior, draws=40), draws=8)
+    assert all(world.draws == 8 for world in content.worlds)
+    assert [met.share for met in content.worlds[0].pairs] == [1.0]
 
 
 def test_long_recordings_are_thinned(monkeypatch):

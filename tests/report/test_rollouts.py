@@ -4,7 +4,7 @@ import numpy as np
 from example_content import make_tracks
 
 from vrdp_prob.reasoning.events import EventTable
-from vrdp_prob.report.rollouts import collisions, measured_course
+from vrdp_prob.report.rollouts import collisions, measured_course, pair_shares
 from vrdp_prob.scene import Camera, Event, EventKind
 
 
@@ -27,6 +27,13 @@ def test_collisions_stand_midway_between_their_bodies():
         (2, 0.9, [0, 1], positions[2, 1, :2].mean(axis=0).tolist()),
         (2, 2.0, [1, 2], positions[2, 2, 1:].mean(axis=0).tolist()),
     ]
+
+
+def test_shares_count_draws():
+    hit = EventKind.COLLISION
+    draws = [[Event(1.0, hit, ("b", "c")), Event(2.0, hit, ("a", "b"))], [Event(1.5, hit, ("b", "c"))], [], []]
+    shares = pair_shares(EventTable.from_events("abc", draws))
+    assert [(met.bodies, met.share, met.time) for met in shares] == [((1, 2), 0.5, 1.25), ((0, 1), 0.25, 2.0)]
 
 
 def test_world_without_collisions():

@@ -65,6 +65,25 @@ class Collisions:
 
 
 @dataclass(frozen=True)
+class PairShare:
+    """How often two bodies collide in a world.
+
+    Parameters
+    ----------
+    bodies
+        Their indices, the smaller one first.
+    share
+        Share of all draws that answers come from, not only of those shown.
+    time
+        Median time in s.
+    """
+
+    bodies: tuple[int, int]
+    share: float
+    time: float
+
+
+@dataclass(frozen=True)
 class WorldContent:
     """Rollouts of some posterior draws in one world.
 
@@ -81,7 +100,9 @@ class WorldContent:
     exists
         Whether a body is there: from one moment on, and until it leaves.
     collisions
-        First contacts.
+        First contacts in these draws.
+    pairs
+        The pairs that collide, in the order of their times.
 
     Raises
     ------
@@ -95,6 +116,7 @@ class WorldContent:
     trajectory: Float[np.ndarray, "draw time body 3"]
     exists: Bool[np.ndarray, "draw time body"]
     collisions: Collisions
+    pairs: tuple[PairShare, ...]
 
     def __post_init__(self) -> None:
         if not np.isfinite(self.trajectory).all():

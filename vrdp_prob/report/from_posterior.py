@@ -23,6 +23,7 @@ def build(
     posterior: Posterior,
     answers: Sequence[Answer],
     *,
+    worlds: PosteriorWorlds | None = None,
     frames: UInt8[np.ndarray, "frame height width 3"] | None = None,
     draws: int = PLAYER_DRAWS,
     progress: ProgressDisplay | None = None,
@@ -35,6 +36,8 @@ def build(
         What was learned.
     answers
         The answers, in the order asked.
+    worlds
+        The worlds that the answers were counted in; the player then shows the same ones.
     frames
         Pictures of the video (red, green, blue) at the tracks' frame rate from time 0, where there is a video.
     draws
@@ -43,6 +46,8 @@ def build(
         Told how far the work is.
     """
     tracks = posterior.tracks
+    asked = tuple(AnswerContent(answer, world_of(answer, tracks.bodies)) for answer in answers)
+    few = PosteriorWorlds(posterior, draws=draws, progress=progress)
     return ReportContent(
         tracks=tracks,
         objects=tuple(posterior.object_summary(body.id) for body in tracks.bodies),
@@ -50,8 +55,8 @@ def build(
         restitution_pairs=posterior.restitution_pairs(),
         convergence=posterior.convergence,
         warnings=posterior.warnings,
-        answers=tuple(AnswerContent(answer, world_of(answer, tracks.bodies)) for answer in answers),
-        worlds=player_worlds(PosteriorWorlds(posterior, draws=draws, progress=progress)),
+        answers=asked,
+        worlds=player_worlds(few, asked={item.world for item in asked if item.world is not None}, many=worlds),
         model=posterior.model.name,
         effects=tuple(effect.name for effect in posterior.model.effects),
         seed=posterior.seed,

@@ -14,7 +14,7 @@ from jaxtyping import Float, Int
 
 from vrdp_prob.report.content import ReportContent, WorldContent
 from vrdp_prob.report.footage import film_data
-from vrdp_prob.report.wording import color_of, names, tags, world_group, world_label
+from vrdp_prob.report.wording import color_of, names, percent, tags, world_group, world_label
 from vrdp_prob.scene import Camera
 
 _STEPS = 16000
@@ -98,6 +98,10 @@ def _world(world: WorldContent, content: ReportContent, reach: float) -> dict[st
         "data": data,
         "first": first.tolist(),
         "until": until.tolist(),
+        "pairs": [
+            {"bodies": list(pair.bodies), "share": percent(pair.share, 1e-3), "time": round(pair.time, 4)}
+            for pair in world.pairs
+        ],
         "collisions": {
             "draw": collisions.draw[order].tolist(),
             "time": _rounded(collisions.time[order]),

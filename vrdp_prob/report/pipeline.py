@@ -91,7 +91,7 @@ def report(
             advance(1)
     with progress.stage("Report") as advance:
         frames = None if video_file is None else read_frames(Path(video_file)).frames
-        content = build(posterior, answers, frames=frames)
+        content = build(posterior, answers, worlds=worlds, frames=frames)
         written = write_report(content, directory)
         posterior.write(directory / "posterior.nc")
     return Report(posterior, tuple(answers), content, (written.page, written.document, directory / "posterior.nc"))

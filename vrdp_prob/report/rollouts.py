@@ -1,5 +1,7 @@
 """From the worlds that answers come from to what the player shows of them."""
 
+from collections.abc import Collection
+
 import numpy as np
 from jaxtyping import Float
 
@@ -7,7 +9,7 @@ from vrdp_prob.reasoning.events import EventTable
 from vrdp_prob.reasoning.timeline import WorldDraws
 from vrdp_prob.reasoning.values import Change
 from vrdp_prob.reasoning.worlds import PosteriorWorlds
-from vrdp_prob.report.content import Collisions, WorldContent, WorldKind
+from vrdp_prob.report.content import Collisions, PairShare, WorldContent, WorldKind
 from vrdp_prob.scene import Tracks
 
 MOST_FRAMES = 500
@@ -20,43 +22,75 @@ _KINDS = {
 }
 
 
-def player_worlds(worlds: PosteriorWorlds) -> tuple[WorldContent, ...]:
-    """The video, what happens next, and the video with each body removed, heavier and lighter."""
-    shown = [_factual(worlds), _simulated(worlds.future, WorldKind.FUTURE)]
+def player_worlds(
+    few: PosteriorWorlds, *, asked: Collection[str] = (), many: PosteriorWorlds | None = None
+) -> tuple[WorldContent, ...]:
+    """The video, what happens next, and the video with each body removed, heavier and lighter.
+
+    Parameters
+    ----------
+    few
+        As many draws as are shown.
+    asked, many
+        Keys of the worlds that answers come from, and the draws that these were counted in: such a world is shown by an
+        even choice of those, and its probabilities are theirs.
+    """
+    count = few.draws
+    first = _factual(many or few, count)
+    shown = [first] if first is not None else []
+    key = str(WorldKind.FUTURE)
+    shown.append(_simulated(_source(key, few, asked, many).future, count, WorldKind.FUTURE))
     for change, kind in _KINDS.items():
-        for place, body in enumerate(worlds.bodies):
-            shown.append(_simulated(worlds.counterfactual(change, place), kind, body.id))
-    return tuple(world for world in shown if world is not None)
+        for place, body in enumerate(few.bodies):
+            world = _source(f"{kind}:{body.id}", few, asked, many).counterfactual(change, place)
+            shown.append(_simulated(world, count, kind, body.id))
+    return tuple(shown)
 
 
-def _factual(worlds: PosteriorWorlds) -> WorldContent | None:
+def _source(key: str, few: PosteriorWorlds, asked: Collection[str], many: PosteriorWorlds | None) -> PosteriorWorlds:
+    return many if many is not None and key in asked else few
+
+
+def _factual(worlds: PosteriorWorlds, count: int) -> WorldContent | None:
     """Rollouts of the video, with the collisions that were seen in it; None where no draw could be simulated."""
     rollout = worlds.factual
-    kept = np.flatnonzero(rollout.fine)
-    if not len(kept):
+    fine = np.flatnonzero(rollout.fine)
+    if not len(fine):
         return None
     tracks = worlds.posterior.tracks
-    chosen = _chosen(len(tracks.times))
+    draws, frames = fine[_evenly(len(fine), count)], _evenly(len(tracks.times), MOST_FRAMES)
     return WorldContent(
         WorldKind.FACTUAL,
         None,
-        tracks.times[chosen],
-        rollout.trajectory.numpy()[kept][:, chosen].astype(float),
-        rollout.exists.numpy()[kept][:, chosen],
-        collisions(worlds.events().select(kept), tracks.times, measured_course(tracks)[None]),
+        tracks.times[frames],
+        rollout.trajectory.numpy()[draws][:, frames].astype(float),
+        rollout.exists.numpy()[draws][:, frames],
+        collisions(worlds.events().select(draws), tracks.times, measured_course(tracks)[None]),
+        pair_shares(worlds.events()),
     )
 
 
-def _simulated(world: WorldDraws, kind: WorldKind, body: str | None = None) -> WorldContent:
-    chosen = _chosen(len(world.times))
+def _simulated(world: WorldDraws, count: int, kind: WorldKind, body: str | None = None) -> WorldContent:
+    draws, frames = _evenly(len(world.trajectory), count), _evenly(len(world.times), MOST_FRAMES)
     return WorldContent(
         kind,
         body,
-        world.times[chosen],
-        world.trajectory[:, chosen],
-        world.exists[:, chosen],
-        collisions(world.events, world.times, world.trajectory[..., :2]),
+        world.times[frames],
+        world.trajectory[draws][:, frames],
+        world.exists[draws][:, frames],
+        collisions(world.events.select(draws), world.times, world.trajectory[draws][..., :2]),
+        pair_shares(world.events),
     )
+
+
+def pair_shares(events: EventTable) -> tuple[PairShare, ...]:
+    """The pairs that collide in some draw, in the order of their median times."""
+    met = []
+    for place, pair in enumerate(events.universe.pairs):
+        happens = events.happens[:, place]
+        if happens.any():
+            met.append(PairShare(pair, float(happens.mean()), float(np.median(events.time[happens, place]))))
+    return tuple(sorted(met, key=lambda one: one.time))
 
 
 def collisions(
@@ -91,6 +125,6 @@ def measured_course(tracks: Tracks) -> Float[np.ndarray, "time body 2"]:
     return course
 
 
-def _chosen(count: int) -> np.ndarray:
-    """Indices of evenly chosen moments, the first and the last among them; integers with axis `kept`."""
-    return np.linspace(0, count - 1, min(count, MOST_FRAMES)).round().astype(int)
+def _evenly(count: int, wanted: int) -> np.ndarray:
+    """Indices of evenly chosen things, the first and the last among them; integers with axis `kept`."""
+    return np.linspace(0, count - 1, min(count, wanted)).round().astype(int)

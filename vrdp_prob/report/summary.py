@@ -2,7 +2,7 @@
 
 from vrdp_prob.reasoning.answer import Answer
 from vrdp_prob.report.content import AnswerContent, ReportContent, WorldKind
-from vrdp_prob.report.wording import collision_shares, counted, listed, names, number_word, percent, seconds, sentence
+from vrdp_prob.report.wording import counted, listed, names, number_word, percent, seconds, sentence
 from vrdp_prob.scene import QuestionType
 
 CERTAIN_SHARE = 0.95
@@ -50,12 +50,12 @@ def _collisions(content: ReportContent) -> list[str]:
     ids = [body.id for body in content.tracks.bodies]
     name = names(content.tracks.bodies)
     sure, unsure = [], []
-    for (first, second), share, time in collision_shares(world):
-        pair = f"the {name[ids[first]]} with the {name[ids[second]]}"
-        if share >= CERTAIN_SHARE:
-            sure.append(f"{pair} at {seconds(time)}")
-        elif share > RARE_SHARE:
-            unsure.append(f"{pair} ({percent(share)} of the draws)")
+    for met in world.pairs:
+        first, second = (name[ids[body]] for body in met.bodies)
+        if met.share >= CERTAIN_SHARE:
+            sure.append(f"the {first} with the {second} at {seconds(met.time)}")
+        elif met.share > RARE_SHARE:
+            unsure.append(f"the {first} with the {second} ({percent(met.share)})")
     told = sentence(f"{counted(len(sure), 'collision')} happened{': ' + listed(sure) if sure else ''}.")
     return [told, f"Whether others happened is not certain: {listed(unsure)}."] if unsure else [told]
 

@@ -5,8 +5,6 @@ import string
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 
-import numpy as np
-
 from vrdp_prob.inference.summaries import ParameterSummary, Summary
 from vrdp_prob.report.content import WorldContent, WorldKind
 from vrdp_prob.scene import Body, Shape, Tracks
@@ -158,14 +156,3 @@ def restitution_status(parameter: ParameterSummary, name: Mapping[str, str]) -> 
 
 def _the(partners: Sequence[str], name: Mapping[str, str]) -> str:
     return listed(f"the {name.get(partner, partner)}" for partner in partners) if partners else "its collision partners"
-
-
-def collision_shares(world: WorldContent) -> list[tuple[tuple[int, int], float, float]]:
-    """Pairs of body indices that collide in a world, each with its share of the draws and median time in s, by time."""
-    pairs = np.sort(world.collisions.bodies, axis=1)
-    found = []
-    for first, second in np.unique(pairs, axis=0):
-        rows = (pairs == (first, second)).all(axis=1)
-        share = len(np.unique(world.collisions.draw[rows])) / world.draws
-        found.append(((int(first), int(second)), share, float(np.median(world.collisions.time[rows]))))
-    return sorted(found, key=lambda entry: entry[2])

@@ -70,8 +70,8 @@ class Player {
   /* The world that a question is about, from shortly before something happens in it. */
   async jump(key) {
     await this.show(key);
-    const first = this.world.pairs()[0];
-    this.seek(first ? first.median - 0.6 : this.world.start);
+    const [first] = this.world.pairs;
+    this.seek(first ? first.time - 0.6 : this.world.start);
     const calm = matchMedia("(prefers-reduced-motion: reduce)").matches;
     const box = this.root.getBoundingClientRect();
     if (box.top < 0 || box.top > 0.4 * innerHeight) {
@@ -149,11 +149,11 @@ class Player {
     this.part("play").textContent = this.playing ? "Pause" : "Play";
   }
 
-  /* A row for each pair that collides in some draw: when, and in how many. */
+  /* A row for each pair that collides in some draw: when, and how probable that is. */
   listPairs() {
     const list = this.part("pairs");
     list.style.setProperty("--seen", `${Math.min(100, this.share(this.data.seenUntil))}%`);
-    const rows = this.world.pairs().map((pair) => this.pairRow(pair));
+    const rows = this.world.pairs.map((pair) => this.pairRow(pair));
     if (!rows.length) {
       const none = document.createElement("li");
       none.textContent = "No draw has a collision in this world.";
@@ -166,11 +166,10 @@ class Player {
     const button = document.createElement("button");
     button.type = "button";
     const [first, second] = pair.bodies.map((body) => this.data.bodies[body]);
-    const count = `${pair.draws.size} of ${this.world.draws}`;
-    button.append(span("pair-name", `${first.name} – ${second.name}`), this.strip(pair), span("pair-count", count));
-    const name = `${first.name} and ${second.name} collide in ${count} draws, at about ${pair.median.toFixed(1)} s`;
+    button.append(span("pair-name", `${first.name} – ${second.name}`), this.strip(pair), span("pair-share", pair.share));
+    const name = `${first.name} and ${second.name} collide with probability ${pair.share}, at about ${pair.time.toFixed(1)} s`;
     button.setAttribute("aria-label", `${name}; go there`);
-    button.addEventListener("click", () => { this.pause(); this.seek(pair.median); });
+    button.addEventListener("click", () => { this.pause(); this.seek(pair.time); });
     const row = document.createElement("li");
     row.append(button);
     return row;
@@ -178,7 +177,7 @@ class Player {
 
   strip(pair) {
     const strip = span("strip", "");
-    for (const time of pair.times) {
+    for (const time of this.world.contactTimes(pair.bodies)) {
       const tick = span("tick", "");
       tick.style.left = `${this.share(time)}%`;
       tick.style.opacity = Math.min(1, 0.15 + 4 / this.world.draws);

@@ -72,21 +72,9 @@ class World {
     return { x: at(0) * this.step, y: at(1) * this.step, angle: at(2) * 2 * Math.PI / 65536 };
   }
 
-  /* First contacts by pair: [{bodies, times, draws, median}], by time. */
-  pairs() {
-    const found = new Map();
-    const { draw, time, bodies } = this.collisions;
-    bodies.forEach((pair, row) => {
-      const key = pair.join("-");
-      if (!found.has(key)) found.set(key, { bodies: pair, times: [], draws: new Set() });
-      found.get(key).times.push(time[row]);
-      found.get(key).draws.add(draw[row]);
-    });
-    const pairs = [...found.values()];
-    for (const pair of pairs) {
-      const sorted = [...pair.times].sort((a, b) => a - b);
-      pair.median = sorted[sorted.length >> 1];
-    }
-    return pairs.sort((a, b) => a.median - b.median);
+  /* Times of a pair's first contact in the draws shown. */
+  contactTimes([first, second]) {
+    const { time, bodies } = this.collisions;
+    return time.filter((_, row) => bodies[row][0] === first && bodies[row][1] === second);
   }
 }

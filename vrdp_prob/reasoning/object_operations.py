@@ -39,8 +39,8 @@ def filter_shape(run: Run, chosen: ObjectSet, shape: Word) -> ObjectSet:
 @operation("filter_moving", ObjectSet, Moment, gives=ObjectSet)
 def filter_moving(run: Run, chosen: ObjectSet, moment: Moment) -> ObjectSet:
     """The objects that are in view and move at a frame."""
-    _, moving = _motion_at(run, moment)
-    return ObjectSet(chosen.mask & moving, ("moving", *chosen.words))
+    in_view, moving = _motion_at(run, moment)
+    return ObjectSet(chosen.mask & in_view & moving, ("moving", *chosen.words))
 
 
 @operation("filter_moving", ObjectSet, Word, gives=ObjectSet, words=(ANY_FRAME,))

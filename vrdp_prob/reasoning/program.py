@@ -66,7 +66,7 @@ class Program:
         return stack[-1]
 
 
-def check(program: Sequence[str], *, ends_in: tuple[type, ...] = ANSWERS) -> Program:
+def check(program: Sequence[str], *, ends_in: tuple[type, ...] = ANSWERS, given: type | None = None) -> Program:
     """Type-check a program.
 
     Parameters
@@ -75,6 +75,8 @@ def check(program: Sequence[str], *, ends_in: tuple[type, ...] = ANSWERS) -> Pro
         Tokens in postfix order, in any of the known spellings.
     ends_in
         Types that its result may have.
+    given
+        Type of a value that lies on the stack before it begins, as a choice leaves one for its question.
 
     Raises
     ------
@@ -85,8 +87,8 @@ def check(program: Sequence[str], *, ends_in: tuple[type, ...] = ANSWERS) -> Pro
     tokens = meaningful(tuple(program))
     if not tokens:
         raise InputError("the program is empty; give at least one token.")
-    stack: list[type] = []
-    words: list[str | None] = []
+    stack: list[type] = [] if given is None else [given]
+    words: list[str | None] = [None] * len(stack)
     steps: list[Operation | Word] = []
     for place, token in enumerate(tokens, start=1):
         if token in REGISTRY:
@@ -120,14 +122,18 @@ def check(program: Sequence[str], *, ends_in: tuple[type, ...] = ANSWERS) -> Pro
 
 
 def needs_choices(program: Sequence[str]) -> bool:
-    """Whether a question's program judges choices: it takes something that it does not push itself."""
-    depth = 0
-    for token in meaningful(tuple(program)):
-        signatures = REGISTRY.get(token)
-        depth += 1 if signatures is None else 1 - len(signatures[0].takes)
-        if depth < 1:
-            return True
-    return False
+    """Whether a question's program judges choices: it does not run by itself, but does on an event or an object."""
+    if _fits(program, None):
+        return False
+    return "belong_to" in meaningful(tuple(program)) or any(_fits(program, entry) for entry in ENTRIES)
+
+
+def _fits(program: Sequence[str], given: type | None) -> bool:
+    try:
+        check(program, given=given)
+    except InputError:
+        return False
+    return True
 
 
 def question_type(program: Sequence[str]) -> QuestionType:

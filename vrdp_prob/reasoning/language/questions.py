@@ -132,15 +132,18 @@ def _named_event(reader: Reader, source: str) -> Tokens:
 
 
 def _attribute(reader: Reader) -> Tokens:
-    """'What is the color of ...?', 'What color is ...?', 'What material is ... made of?'."""
-    if reader.accept("what is the"):
-        attribute = reader.one_of(ATTRIBUTE_WORDS)
-        reader.expect("of")
-        return (*_described(reader), f"query_{attribute}")
-    if reader.accept("what is"):
-        described = _described(reader)
-        reader.expect("made of")
-        return (*described, "query_material")
+    """'What is the color of ...?', 'What color is ...?', 'What is ... made of?'."""
+    return reader.first(lambda: _attribute_of(reader), lambda: _attribute_first(reader), lambda: _made_of(reader))
+
+
+def _attribute_of(reader: Reader) -> Tokens:
+    reader.expect("what is the")
+    attribute = reader.one_of(ATTRIBUTE_WORDS)
+    reader.expect("of")
+    return (*_described(reader), f"query_{attribute}")
+
+
+def _attribute_first(reader: Reader) -> Tokens:
     reader.expect("what", "which")
     attribute = reader.one_of(ATTRIBUTE_WORDS)
     reader.expect("is", "are")
@@ -148,6 +151,13 @@ def _attribute(reader: Reader) -> Tokens:
     if attribute == "material":
         reader.accept("made of")
     return (*described, f"query_{attribute}")
+
+
+def _made_of(reader: Reader) -> Tokens:
+    reader.expect("what is")
+    described = _described(reader)
+    reader.expect("made of")
+    return (*described, "query_material")
 
 
 def _described(reader: Reader) -> Tokens:

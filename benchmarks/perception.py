@@ -17,8 +17,10 @@ from pathlib import Path
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
-from vrdp_prob.perception import read_video
+from vrdp_prob.datasets.clevrer import read_annotation
+from vrdp_prob.perception import calibrate_from_videos, read_video
 from vrdp_prob.scene import Camera, Tracks
+from vrdp_prob.scene.camera import REST_HEIGHT
 
 DATA = Path(__file__).parents[2] / "shared" / "data" / "clevrer_bullet"
 DEVELOPMENT = (1, 2, 4, 5, 6, 7, 8, 9)
@@ -169,6 +171,25 @@ def checks(name: str, tally: Tally) -> list[dict]:
     return [_check(f"{name}: {label}", value, goal, sense) for label, value, goal, sense in rows]
 
 
+def calibration_checks(camera: Camera) -> list[dict]:
+    """A camera estimated from the development videos and their annotations against the true one."""
+    known = [read_annotation(DATA / f"annotations/annotation_{number:05d}.json") for number in DEVELOPMENT]
+    videos = [DATA / f"videos/video_{number:05d}.mp4" for number in DEVELOPMENT]
+    found = calibrate_from_videos(videos, known)
+    places = np.stack(np.meshgrid(np.linspace(-4, 4, 33), np.linspace(-4, 4, 33)), axis=-1).reshape(-1, 2)
+    places = places[camera.in_view(places)]
+    points = np.column_stack([places, np.full(len(places), REST_HEIGHT)])
+    pixels = np.linalg.norm(found.project(points) - camera.project(points), axis=1)
+    metres = np.linalg.norm(found.to_plane(camera.project(points), REST_HEIGHT) - places, axis=1)
+    rows: list[tuple[str, float, float | None, str]] = [
+        ("reprojection against the true camera, median (px)", round(float(np.median(pixels)), 3), None, ""),
+        ("reprojection against the true camera, largest (px)", round(float(pixels.max()), 3), 1, "<="),
+        ("position on the plane, largest (m)", round(float(metres.max()), 4), 0.03, "<="),
+        ("stated reprojection error (px)", round(found.pixel_sd, 3), None, ""),
+    ]
+    return [_check(f"calibration: {label}", value, goal, sense) for label, value, goal, sense in rows]
+
+
 def _check(name: str, value: float | None, goal: float | None, sense: str) -> dict:
     met = value is not None and (goal is None or (value <= goal if sense == "<=" else value >= goal))
     return {"name": name, "value": value, "goal": None if goal is None else f"{sense} {goal:g}", "ok": met}
@@ -209,6 +230,8 @@ def main() -> None:
                 file=sys.stderr,
             )
     rows = [check for name, tally in groups.items() for check in checks(name, tally)]
+    if DATA.is_dir() and not arguments.videos:
+        rows += calibration_checks(Camera.read(DATA / "camera.json"))
     width = max(len(row["name"]) for row in rows)
     for row in rows:
         value = "-" if row["value"] is None else f"{row['value']:g}"

@@ -1,11 +1,14 @@
 """A physics model is a set of effects; it is written to and read from a TOML file."""
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
 from functools import cached_property
+from pathlib import Path
 from types import ModuleType
 
 from vrdp_prob.errors import InputError
+from vrdp_prob.files import write_atomically
+from vrdp_prob.models import model_file
 from vrdp_prob.models.effects.air_drag import AirDrag
 from vrdp_prob.models.effects.angular_drag import AngularDrag
 from vrdp_prob.models.effects.dry_friction import DryFriction
@@ -26,20 +29,26 @@ class PhysicsModel:
         Name of the model.
     effects
         Its causes. The order matters where one changes what another has made (the restitution of a contact).
+    beliefs
+        Parameters by name whose prior or default differs from what the effect states.
 
     Raises
     ------
     InputError
-        If an effect or a parameter appears twice.
+        If an effect appears twice, or a belief is about a parameter that no effect has.
     """
 
     name: str
     effects: tuple[Effect, ...]
+    beliefs: Mapping[str, Parameter] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         names = [effect.name for effect in self.effects]
         if len(set(names)) < len(names):
             raise InputError(f"model {self.name}: an effect appears twice ({', '.join(names)}); list each effect once.")
+        strange = sorted(set(self.beliefs) - {parameter.name for parameter in self._stated_parameters()})
+        if strange:
+            raise InputError(f"model {self.name}: no effect has a parameter '{strange[0]}'; leave it out.")
 
     @classmethod
     def base(cls) -> "PhysicsModel":
@@ -48,14 +57,42 @@ class PhysicsModel:
 
     def with_effect(self, effect: Effect) -> "PhysicsModel":
         """The model with one more cause."""
-        return PhysicsModel(f"{self.name}+{effect.name}", (*self.effects, effect))
+        return PhysicsModel(f"{self.name}+{effect.name}", (*self.effects, effect), self.beliefs)
+
+    @classmethod
+    def read(cls, path: Path) -> "PhysicsModel":
+        """Read a model file that `write` wrote, or that a person did.
+
+        Raises
+        ------
+        InputError
+            With file and field, if the file cannot be read or is not a model.
+        """
+        try:
+            return cls(*model_file.parse(path.read_text(encoding="utf-8")))
+        except OSError as error:
+            raise InputError(f"{path}: the model file cannot be read ({error.strerror}); check the path.") from error
+        except (InputError, UnicodeDecodeError) as error:
+            raise InputError(f"{path}: {error}") from error
+
+    def write(self, path: Path) -> None:
+        """Write the model as a TOML file.
+
+        Raises
+        ------
+        InputError
+            If the file cannot be written.
+        """
+        with write_atomically(path) as temporary:
+            temporary.write_text(model_file.text(self.name, self.effects, self.parameters), encoding="utf-8")
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
         """Parameters of all effects, each once."""
-        return tuple({parameter.name: parameter for parameter in self._all_parameters()}.values())
+        stated = {parameter.name: parameter for parameter in self._stated_parameters()}
+        return tuple({**stated, **self.beliefs}.values())
 
-    def _all_parameters(self) -> Iterator[Parameter]:
+    def _stated_parameters(self) -> Iterator[Parameter]:
         for effect in self.effects:
             yield from effect.parameters
 

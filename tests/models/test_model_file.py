@@ -1,0 +1,62 @@
+"""Models as files."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from vrdp_prob.errors import InputError
+from vrdp_prob.models.model_file import known_effects
+from vrdp_prob.models.parameters import SLIDING_FRICTION
+from vrdp_prob.models.physics import PhysicsModel
+
+
+def test_write_then_read_gives_the_same(tmp_path: Path) -> None:
+    belief = replace(SLIDING_FRICTION, default=0.25, prior=replace(SLIDING_FRICTION.prior, sd=0.3))
+    model = PhysicsModel("mine", PhysicsModel.base().effects, {"sliding_friction": belief})
+    model.write(tmp_path / "model.toml")
+    again = PhysicsModel.read(tmp_path / "model.toml")
+    assert again.name == "mine"
+    assert [effect.name for effect in again.effects] == [effect.name for effect in model.effects]
+    assert again.parameters == model.parameters
+    assert belief in again.parameters
+
+
+def test_every_effect_of_the_catalogue_can_be_named(tmp_path: Path) -> None:
+    names = sorted(known_effects())
+    assert {"dry_friction", "air_drag", "angular_drag", "normal_impact"} <= set(names)
+    for name in names:
+        path = tmp_path / f"{name}.toml"
+        path.write_text(f'name = "one"\neffects = ["{name}"]\n')
+        assert PhysicsModel.read(path).effects[0].name == name
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        ("name = ", "not a TOML file"),
+        ('effects = ["air_drag"]', "field 'name' is missing"),
+        ('name = "a"', "field 'effects' is missing"),
+        ('name = "a"\neffects = ["ether"]', "effect 'ether' is not known; the effects are air_drag"),
+        ('name = "a"\neffects = ["air_drag", "air_drag"]', "an effect appears twice"),
+        ('name = "a"\neffects = ["air_drag"]\ncolour = 1', "field 'colour' is not known"),
+        ('name = "a"\neffects = ["air_drag"]\n[parameters.mass]', "parameter 'mass' belongs to none of the effects"),
+        ('name = "a"\neffects = ["air_drag"]\n[parameters.air_drag]\nprior_sd = "x"', "air_drag.prior_sd' is 'x'"),
+        ('name = "a"\neffects = ["air_drag"]\n[parameters.air_drag]\nprior_sd = nan', "give a finite number"),
+        ('name = "a"\neffects = ["air_drag"]\n[parameters.air_drag]\nprior_sd = -1', "sd positive"),
+        ('name = "a"\neffects = ["air_drag"]\n[parameters.air_drag]\ndefault = -1', "outside its support"),
+        ('name = "a"\neffects = ["air_drag"]\n[parameters.air_drag]\nshape = 1', "air_drag.shape' is not known"),
+    ],
+)
+def test_mistakes_name_file_and_field(tmp_path: Path, content: str, message: str) -> None:
+    path = tmp_path / "model.toml"
+    path.write_text(content)
+    with pytest.raises(InputError, match=message) as caught:
+        PhysicsModel.read(path)
+    assert str(path) in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_file_that_is_not_there(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="cannot be read"):
+        PhysicsModel.read(tmp_path / "none.toml")

@@ -1,0 +1,109 @@
+"""Physics models as TOML: the effects by name, and what is believed of each parameter.
+
+::
+
+    name = "base"
+    effects = ["dry_friction", "air_drag", "angular_drag", "normal_impact"]
+
+    [parameters.sliding_friction]        # optional: a table for each parameter whose prior or default differs
+    default = 0.1                        # in the parameter's unit
+    prior_mean = -2.3                    # of the inferred coordinate (for most parameters the logarithm)
+    prior_sd = 1.0
+"""
+
+import importlib
+import json
+import math
+import pkgutil
+import tomllib
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from functools import cache
+from typing import Any
+
+from vrdp_prob.errors import InputError
+from vrdp_prob.models import effects as catalogue
+from vrdp_prob.models.effects.effect import Effect
+from vrdp_prob.models.parameters import Parameter
+
+_NUMBERS = ("default", "prior_mean", "prior_sd")
+
+
+@cache
+def known_effects() -> Mapping[str, type[Effect]]:
+    """All effects by name: every file of `vrdp_prob.models.effects` that defines one."""
+    for module in pkgutil.iter_modules(catalogue.__path__, catalogue.__name__ + "."):
+        importlib.import_module(module.name)
+    return {
+        effect.name: effect for effect in Effect.__subclasses__() if effect.__module__.startswith(__package__ or "")
+    }
+
+
+def text(name: str, effects: Sequence[Effect], parameters: Sequence[Parameter]) -> str:
+    """Content of a model file."""
+    lines = [f"name = {json.dumps(name)}", "effects = ["]
+    lines += [f"    {json.dumps(effect.name)}, # {effect.sentence}" for effect in effects]
+    lines.append("]")
+    for parameter in parameters:
+        lines += [
+            "",
+            f"[parameters.{parameter.name}] # {parameter.description}, in {parameter.unit}",
+            f"default = {parameter.default!r}",
+            f"prior_mean = {parameter.prior.mean!r}",
+            f"prior_sd = {parameter.prior.sd!r}",
+        ]
+    return "\n".join(lines) + "\n"
+
+
+def parse(content: str) -> tuple[str, tuple[Effect, ...], dict[str, Parameter]]:
+    """Name, effects and beliefs of a model file.
+
+    Raises
+    ------
+    InputError
+        With the field, if the content is not a model.
+    """
+    try:
+        document = tomllib.loads(content)
+    except tomllib.TOMLDecodeError as error:
+        raise InputError(f"not a TOML file ({error}); see docs/effects.md for an example.") from error
+    unknown = sorted(set(document) - {"name", "effects", "parameters"})
+    if unknown:
+        raise InputError(f"field '{unknown[0]}' is not known; a model has 'name', 'effects' and 'parameters'.")
+    name, names = document.get("name"), document.get("effects")
+    if not isinstance(name, str) or not name:
+        raise InputError("field 'name' is missing; give the model a name.")
+    if not isinstance(names, list) or not names:
+        raise InputError("field 'effects' is missing; list the names of the model's effects.")
+    effects = tuple(_effect(entry) for entry in names)
+    stated = {parameter.name: parameter for effect in effects for parameter in effect.parameters}
+    tables = document.get("parameters", {})
+    if not isinstance(tables, dict):
+        raise InputError("field 'parameters' must hold one table for each parameter.")
+    return name, effects, {key: _belief(key, table, stated) for key, table in tables.items()}
+
+
+def _effect(name: object) -> Effect:
+    known = known_effects()
+    if not isinstance(name, str) or name not in known:
+        raise InputError(f"effect '{name}' is not known; the effects are {', '.join(sorted(known))}.")
+    return known[name]()
+
+
+def _belief(name: str, table: Any, stated: Mapping[str, Parameter]) -> Parameter:
+    if name not in stated:
+        raise InputError(f"parameter '{name}' belongs to none of the effects; they have {', '.join(sorted(stated))}.")
+    if not isinstance(table, dict):
+        raise InputError(f"field 'parameters.{name}' must be a table with {', '.join(_NUMBERS)}.")
+    for key, value in table.items():
+        if key not in _NUMBERS:
+            raise InputError(f"field 'parameters.{name}.{key}' is not known; use {', '.join(_NUMBERS)}.")
+        if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+            raise InputError(f"field 'parameters.{name}.{key}' is {value!r}; give a finite number.")
+    parameter = stated[name]
+    prior = replace(
+        parameter.prior,
+        mean=float(table.get("prior_mean", parameter.prior.mean)),
+        sd=float(table.get("prior_sd", parameter.prior.sd)),
+    )
+    return replace(parameter, prior=prior, default=float(table.get("default", parameter.default)))

@@ -4,7 +4,7 @@ Source: Vehtari, Simpson, Gelman, Yao and Gabry, Pareto smoothed importance samp
 """
 
 import numpy as np
-from arviz_stats.base import array_stats
+from arviz_stats.base.array import array_stats
 from jaxtyping import Float
 from scipy.special import gammaln
 

@@ -22,7 +22,7 @@ def head_on(noise: float = 0.005, dropout: float = 0.0) -> tuple[Scene, object]:
 @pytest.mark.parametrize("noise", [0.001, 0.01, 0.03])
 def test_noise_is_found_without_a_model(noise: float) -> None:
     _, tracks = head_on(noise)
-    assert noise_scale(tracks) == pytest.approx(noise, rel=0.2)
+    assert noise_scale(tracks) == pytest.approx(noise, rel=0.3)
 
 
 def test_a_contact_gives_mass_ratio_and_restitution() -> None:

@@ -6,6 +6,9 @@ Source: Foreman-Mackey, Hogg, Lang and Goodman, emcee: The MCMC Hammer, PASP 125
 Monte Carlo version of the genetic algorithm differential evolution, Statistics and Computing 16 (2006).
 """
 
+import os
+from concurrent.futures import ThreadPoolExecutor
+
 import emcee
 import numpy as np
 from jaxtyping import Float
@@ -25,6 +28,8 @@ from vrdp_prob.progress import ProgressDisplay, SilentProgress
 
 ENSEMBLES = 4
 STEPS_PER_ROUND = 200
+STEPS_TOGETHER = 20
+"""Steps after which the ensembles, one thread each, wait for one another, so that an interruption is soon noticed."""
 ROUNDS = 6
 """Rounds after which sampling stops even if it has not converged; a number of steps and not a time, so that the same
 seed gives the same draws on every machine."""
@@ -68,11 +73,13 @@ def sample_emcee(
     dimension = len(start.mean)
     walkers = 2 * (dimension + 2 + dimension // 4)
     ensembles = [_Ensemble(density, start, walkers, generator) for _ in range(ENSEMBLES)]
-    with (progress or SilentProgress()).stage("Sampling (emcee)", total=rounds * ENSEMBLES * STEPS_PER_ROUND) as advance:
+    workers = ThreadPoolExecutor(max_workers=min(ENSEMBLES, os.cpu_count() or 1))
+    display = (progress or SilentProgress()).stage("Sampling (emcee)", total=rounds * STEPS_PER_ROUND)
+    with workers, display as advance:
         for count in range(1, rounds + 1):
-            for ensemble in ensembles:
-                ensemble.run(STEPS_PER_ROUND)
-                advance(STEPS_PER_ROUND)
+            for _ in range(STEPS_PER_ROUND // STEPS_TOGETHER):
+                list(workers.map(lambda ensemble: ensemble.run(STEPS_TOGETHER), ensembles))
+                advance(STEPS_TOGETHER)
             chains = np.stack([ensemble.chain() for ensemble in ensembles])
             if count > 1 and _good_enough(chains):
                 break

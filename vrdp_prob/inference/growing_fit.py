@@ -202,6 +202,8 @@ class GrowingFit:
         self.point, self.converged = best.point, best.converged
         self._events |= self._pairs(frame_count)
         self._precision = best.jacobian.T @ best.jacobian
+        diagonal = np.arange(len(active))
+        self._precision[diagonal, diagonal] = np.maximum(np.diag(self._precision), self._coordinates.prior_sd**-2)
         idle = np.flatnonzero(~active)
         self._precision[idle, idle] = self._idle_sd[idle] ** -2
 

@@ -1,20 +1,23 @@
 """A posterior as one netCDF file, written to a temporary name first, and read back without anything else."""
 
 import json
-import os
 import warnings
 from dataclasses import asdict
+from importlib import import_module
 from pathlib import Path
-from tempfile import NamedTemporaryFile
+from pkgutil import iter_modules
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
 from vrdp_prob.errors import InputError
+from vrdp_prob.files import write_atomically
 from vrdp_prob.inference.identifiability import BodyStatus, ParameterStatus, Status
 from vrdp_prob.inference.posterior import Posterior
 from vrdp_prob.inference.samples import Convergence
+from vrdp_prob.models import effects
+from vrdp_prob.models.effects.effect import Effect
 from vrdp_prob.models.physics import PhysicsModel
 from vrdp_prob.scene import Body, Camera, Shape, Tracks, Wall
 
@@ -32,21 +35,9 @@ def write_posterior(posterior: Posterior, path: Path) -> None:
     """
     tree = posterior.data.copy()
     tree.attrs = {"vrdp_prob": json.dumps(_document(posterior)), "format": FORMAT}
-    temporary: Path | None = None
-    try:
-        with NamedTemporaryFile(dir=path.parent, prefix=f".{path.name}.", suffix=".part", delete=False) as file:
-            temporary = Path(file.name)
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            tree.to_netcdf(temporary, engine="h5netcdf")
-        os.replace(temporary, path)
-        temporary = None
-    except OSError as error:
-        reason = error.strerror or error
-        raise InputError(f"{path}: the posterior cannot be written ({reason}); choose another folder.") from error
-    finally:
-        if temporary is not None:
-            temporary.unlink(missing_ok=True)
+    with write_atomically(path) as temporary, warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        tree.to_netcdf(temporary, engine="h5netcdf")
 
 
 def read_posterior(path: Path, tracks: Tracks | None = None) -> Posterior:
@@ -77,7 +68,7 @@ def _document(posterior: Posterior) -> dict[str, Any]:
         "bodies": [asdict(body) for body in tracks.bodies],
         "walls": [asdict(wall) for wall in tracks.walls],
         "camera": None if tracks.camera is None else tracks.camera.to_document(),
-        "model": posterior.model.to_toml(),
+        "model": {"name": posterior.model.name, "effects": [one.name for one in posterior.model.effects]},
         "seed": posterior.seed,
         "status": {name: asdict(status) for name, status in posterior.status.items()},
         "convergence": asdict(posterior.convergence),
@@ -93,7 +84,7 @@ def _posterior(document: dict[str, Any], tree: xr.DataTree, tracks: Tracks | Non
     }
     return Posterior(
         tracks=_tracks(document, tree) if tracks is None else tracks,
-        model=PhysicsModel.from_toml(document["model"]),
+        model=_model(document["model"]),
         seed=document["seed"],
         data=tree,
         status=status,
@@ -101,6 +92,22 @@ def _posterior(document: dict[str, Any], tree: xr.DataTree, tracks: Tracks | Non
         warnings=tuple(document["warnings"]),
         pairs=tuple((first, second) for first, second in document["pairs"]),
     )
+
+
+def _model(document: dict[str, Any]) -> PhysicsModel:
+    """The model of that name with the effects of those names."""
+    known = _known_effects()
+    unknown = [name for name in document["effects"] if name not in known]
+    if unknown:
+        raise ValueError(f"its model has the unknown effect '{unknown[0]}'")
+    return PhysicsModel(document["name"], tuple(known[name]() for name in document["effects"]))
+
+
+def _known_effects() -> dict[str, type[Effect]]:
+    """Every effect in the folder of effects, by name."""
+    for module in iter_modules(effects.__path__, f"{effects.__name__}."):
+        import_module(module.name)
+    return {effect.name: effect for effect in Effect.__subclasses__()}
 
 
 def _parameter_status(document: dict[str, Any]) -> ParameterStatus:

@@ -1,0 +1,152 @@
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+
+from tests.inference.generator import Scene, observe
+from vrdp_prob.errors import InputError
+from vrdp_prob.inference import Posterior, Status, infer
+from vrdp_prob.models.simulator.rollout import simulate
+from vrdp_prob.scene import Shape, Tracks
+
+
+def chain() -> Scene:
+    """A disc hits a resting one, which hits a third; a fourth enters late and meets nobody."""
+    return Scene(
+        (Shape.CYLINDER, Shape.CYLINDER, Shape.CYLINDER, Shape.SPHERE),
+        np.array([[-1.8, 0.0], [-0.3, 0.04], [1.0, 0.2], [-2.0, 2.0]]),
+        np.array([[2.2, 0.0], [0.0, 0.0], [0.0, 0.0], [1.2, 0.1]]),
+        np.array([1.5, 0.8, 1.1, 1.0]),
+        np.array([0.9, 0.95, 0.85, 0.8]),
+        np.full(4, 0.2),
+        np.array([0.4, 0.4, 0.4, 0.05]),
+        release=np.array([0.0, 0.0, 0.0, 0.8]),
+    )
+
+
+@cache
+def chain_posterior(sampler: str = "laplace") -> tuple[Scene, Posterior]:
+    scene = chain()
+    return scene, infer(observe(scene, noise=0.005, dropout=0.05, frames=75, seed=2), sampler=sampler, draws=400)
+
+
+def test_mass_ratios_and_restitutions_are_recovered() -> None:
+    scene, posterior = chain_posterior()
+    assert posterior.pairs == (("0", "1"), ("1", "2"))
+    for pair in posterior.mass_ratios():
+        first, second = (int(name) for name in pair.objects)
+        assert pair.summary.mean == pytest.approx(scene.mass[first] / scene.mass[second], abs=4 * pair.summary.sd)
+        assert pair.summary.sd < 0.1
+    for pair in posterior.restitution_pairs():
+        first, second = (int(name) for name in pair.objects)
+        true = scene.restitution[first] * scene.restitution[second]
+        assert pair.summary.mean == pytest.approx(true, abs=4 * pair.summary.sd)
+
+
+def test_a_model_that_fits_is_not_warned_about_and_its_noise_is_found() -> None:
+    _, posterior = chain_posterior()
+    assert not any("does not explain" in text for text in posterior.warnings)
+    noise = posterior.data["posterior"]["noise_scale"]
+    assert float(noise.mean()) * noise.attrs["reference_m"] == pytest.approx(0.005, rel=0.15)
+
+
+def test_a_body_that_enters_late_and_never_collides_keeps_the_defaults() -> None:
+    _, posterior = chain_posterior()
+    status = posterior.status["3"]
+    assert status.is_default
+    assert posterior.object_summary("3").mass.summary.sd == 0
+    assert any("Object 3 never collides" in text for text in posterior.warnings)
+    assert float(posterior.worlds(1).release_time[0, 3]) == pytest.approx(0.8)
+
+
+def test_status_names_the_partners() -> None:
+    _, posterior = chain_posterior()
+    assert posterior.status["1"].mass.status is Status.RATIO_ONLY
+    assert posterior.status["1"].mass.partners == ("0", "2")
+    assert posterior.object_summary("0").restitution.status == "product_only"
+
+
+def test_draws_are_worlds_that_reproduce_what_was_seen() -> None:
+    _, posterior = chain_posterior()
+    worlds = posterior.worlds(20)
+    assert len(worlds) == 20
+    rollout = simulate(worlds, torch.tensor(posterior.tracks.times), posterior.model)
+    seen = posterior.tracks.seen
+    error = (rollout.trajectory[..., :2].numpy() - posterior.tracks.positions)[:, seen]
+    assert np.sqrt((error**2).mean()) < 0.008
+    assert len(posterior.map_worlds()) == 1
+
+
+def test_the_file_holds_everything(tmp_path: Path) -> None:
+    _, posterior = chain_posterior()
+    path = tmp_path / "posterior.nc"
+    posterior.write(path)
+    again = Posterior.read(path)
+    assert [file.name for file in tmp_path.iterdir()] == ["posterior.nc"]
+    assert set(again.data.children) == {
+        "posterior",
+        "map_estimate",
+        "prior",
+        "sample_stats",
+        "log_likelihood",
+        "observed_data",
+    }
+    for name in ("position", "mass"):
+        np.testing.assert_array_equal(again.data["posterior"][name], posterior.data["posterior"][name])
+    assert again.tracks.bodies == posterior.tracks.bodies
+    np.testing.assert_array_equal(again.tracks.positions, posterior.tracks.positions)
+    assert (again.status, again.convergence, again.warnings, again.pairs, again.seed) == (
+        posterior.status,
+        posterior.convergence,
+        posterior.warnings,
+        posterior.pairs,
+        posterior.seed,
+    )
+    assert again.model == posterior.model
+    torch.testing.assert_close(again.worlds(7).mass, posterior.worlds(7).mass)
+
+
+def test_files_that_are_no_posterior_are_refused(tmp_path: Path) -> None:
+    path = tmp_path / "other.nc"
+    with pytest.raises(InputError, match="cannot be read"):
+        Posterior.read(path)
+    path.write_text("nothing")
+    with pytest.raises(InputError):
+        Posterior.read(path)
+
+
+def test_the_log_likelihood_has_one_value_per_seen_position() -> None:
+    _, posterior = chain_posterior()
+    values = posterior.data["log_likelihood"]["position"]
+    assert (np.isfinite(values.values).all(axis=(0, 1)) == posterior.tracks.seen).all()
+
+
+def test_the_same_seed_gives_the_same_posterior() -> None:
+    tracks = observe(chain(), noise=0.01, frames=30, seed=4)
+    first, second = (infer(tracks, sampler="laplace", draws=50, seed=7) for _ in range(2))
+    np.testing.assert_array_equal(first.data["posterior"]["mass"], second.data["posterior"]["mass"])
+
+
+def test_a_model_that_cannot_fit_is_told_first() -> None:
+    scene = chain()
+    tracks = observe(scene, noise=0.005, frames=75, seed=2)
+    swerved = tracks.positions.copy()
+    swerved[:, 3, 1] += 0.4 * np.sin(4 * tracks.times)
+    bent = Tracks.from_arrays("bent", tracks.bodies, tracks.times, swerved)
+    posterior = infer(bent, sampler="laplace", draws=50)
+    assert posterior.warnings[0].startswith("The model does not explain this motion")
+    assert "object 3" in posterior.warnings[0]
+    _, good = chain_posterior()
+    assert float(posterior.data["posterior"]["noise_scale"].mean()) > 3 * float(
+        good.data["posterior"]["noise_scale"].mean()
+    )
+
+
+def test_unknown_samplers_and_too_few_draws_are_refused() -> None:
+    tracks = observe(chain(), frames=30)
+    with pytest.raises(InputError, match="use one of nuts, emcee, laplace"):
+        infer(tracks, sampler="gibbs")  # type: ignore[arg-type]
+    with pytest.raises(InputError, match="at least 4"):
+        infer(tracks, draws=2)

@@ -113,6 +113,15 @@ def test_material_needs_a_highlight_to_be_metal_and_a_sphere_to_be_surely_rubber
     assert material_probabilities([look(shiny)], Shape.CUBE)["metal"] > 0.9
 
 
+@pytest.mark.parametrize(("light_of_lid", "metal"), [(1.25, False), (0.9, True)])
+def test_a_top_darker_than_the_sides_mirrors(light_of_lid: float, metal: bool) -> None:
+    rng = np.random.default_rng(0)
+    on_lid = np.arange(600) < 200
+    light = np.where(on_lid, light_of_lid, 1.0) * rng.uniform(0.95, 1.05, 600)
+    pixels = np.clip(light[:, None] * 0.7 * np.array(COLORS["cyan"]), 0, 255).astype(np.uint8)
+    assert (material_probabilities([look(pixels, on_lid)], Shape.CUBE)["metal"] > 0.9) is metal
+
+
 def test_shapes_are_sure_only_after_clear_evidence() -> None:
     scores = {Shape.SPHERE: -1.0, Shape.CUBE: -12.0, Shape.CYLINDER: -8.0}
     clear = shape_probabilities(scores, 4)

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from jaxtyping import Float, UInt8
+from jaxtyping import Bool, Float, UInt8
 
 from vrdp_prob.scene.body import Shape
 
@@ -34,6 +34,10 @@ _FLAT_WASHED, _FLAT_BRIGHT = 0.2, 1.75
 """The same for solids with faces, whose faces differ in brightness by themselves."""
 _WASHED_SHARPNESS, _BRIGHT_SHARPNESS = 40.0, 6.0
 _STRONGEST = 4.0
+_FEWEST_ON_FACE = 20
+"""Pixels of a face that its brightness is read from."""
+_DARK_LID, _LID_SHARPNESS = 1.05, 40.0
+"""Brightness of the top over the sides below which a solid mirrors: lit from above, a matt top is the brighter one."""
 _NO_MIRROR = -0.2
 """Log odds of metal for a solid with flat faces that shows no highlight: a face need not reflect a lamp at all."""
 
@@ -52,16 +56,19 @@ class Look:
         How much of the saturation the most washed-out spots lose, 0 to 1.
     bright
         Brightness of the brightest spots over the median's.
+    lid
+        Brightness of a flat top over that of the sides, NaN where not both are in sight.
     """
 
     hue: complex
     saturation: float
     washed: float
     bright: float
+    lid: float = float("nan")
 
 
-def look(pixels: UInt8[np.ndarray, "pixel 3"]) -> Look:
-    """Summarise the RGB pixels of one object in one frame."""
+def look(pixels: UInt8[np.ndarray, "pixel 3"], on_lid: Bool[np.ndarray, "pixel"] | None = None) -> Look:
+    """Summarise the RGB pixels of one object in one frame; `on_lid` tells those of its flat top."""
     values = pixels.astype(float)
     highest, lowest = values.max(axis=1), values.min(axis=1)
     colourful = highest - lowest
@@ -70,11 +77,15 @@ def look(pixels: UInt8[np.ndarray, "pixel 3"]) -> Look:
     middle = float(np.median(saturation))
     brightness = values.mean(axis=1)
     typical = max(float(np.median(brightness)), 1.0)
+    lid = np.nan
+    if on_lid is not None and min(on_lid.sum(), (~on_lid).sum()) >= _FEWEST_ON_FACE:
+        lid = float(np.median(brightness[on_lid]) / max(np.median(brightness[~on_lid]), 1.0))
     return Look(
         hue=complex((colourful * np.exp(1j * np.radians(hue))).sum() / max(colourful.sum(), 1e-9)),
         saturation=middle,
         washed=1 - float(np.percentile(saturation, 2)) / max(middle, 1e-3),
         bright=float(np.percentile(brightness, 99.5)) / typical,
+        lid=lid,
     )
 
 
@@ -93,8 +104,9 @@ def material_probabilities(looks: Sequence[Look], shape: Shape) -> dict[str, flo
     """Probability of metal and rubber from highlights and mirror images.
 
     A sphere always has a spot that mirrors a lamp towards the camera, so a missing highlight speaks for rubber; on flat
-    faces it says next to nothing.
+    faces it says next to nothing. A flat top that is darker than the sides mirrors what is above it.
     """
+    lids = [item.lid for item in looks if np.isfinite(item.lid)]
     washed = float(np.median([item.washed for item in looks]))
     bright = float(np.median([item.bright for item in looks]))
     colourless = float(np.median([item.saturation for item in looks])) < _GRAY_SATURATION
@@ -103,6 +115,7 @@ def material_probabilities(looks: Sequence[Look], shape: Shape) -> dict[str, flo
         [
             0.0 if colourless else _WASHED_SHARPNESS * (washed - least_washed),
             _BRIGHT_SHARPNESS * (bright - least_bright),
+            _LID_SHARPNESS * (_DARK_LID - float(np.median(lids))) if lids else 0.0,
         ],
         -_STRONGEST,
         _STRONGEST,

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import cv2
 import numpy as np
-from jaxtyping import Float, UInt8
+from jaxtyping import Bool, Float, UInt8
 
 from vrdp_prob.errors import InputError
 from vrdp_prob.perception.attributes import (
@@ -17,7 +17,8 @@ from vrdp_prob.perception.attributes import (
 )
 from vrdp_prob.perception.noise import position_covariance
 from vrdp_prob.perception.placing import Sighting, Track
-from vrdp_prob.perception.region import apparent_radius
+from vrdp_prob.perception.region import Window, apparent_radius, paint
+from vrdp_prob.perception.solids import Pose
 from vrdp_prob.perception.tracking import Tracker
 from vrdp_prob.perception.video import DEFAULT_FRAME_RATE, Video, read_frames
 from vrdp_prob.progress import ProgressDisplay
@@ -147,12 +148,14 @@ def _looks(tracker: Tracker, tracks: Sequence[Track]) -> dict[int, list[Look]]:
         best = [frame for frame in ranked if track.sightings[frame].visible >= track.sightings[ranked[0]].visible - 0.1]
         chosen = [best[place] for place in np.linspace(0, len(best) - 1, min(_LOOKS, len(best))).round().astype(int)]
         pixels = [_inner_pixels(tracker, tracks, track, frame) for frame in chosen]
-        looks[track.number] = [look(sample) for sample in pixels if len(sample) >= _FEWEST_PIXELS]
+        looks[track.number] = [look(*sample) for sample in pixels if len(sample[0]) >= _FEWEST_PIXELS]
     return looks
 
 
-def _inner_pixels(tracker: Tracker, tracks: Sequence[Track], track: Track, frame: int) -> UInt8[np.ndarray, "pixel 3"]:
-    """Pixels well inside the picture of a track that no nearer track hides."""
+def _inner_pixels(
+    tracker: Tracker, tracks: Sequence[Track], track: Track, frame: int
+) -> tuple[UInt8[np.ndarray, "pixel 3"], Bool[np.ndarray, "pixel"]]:
+    """Pixels well inside the picture of a track that no nearer track hides, and whether each is on its flat top."""
     sightings: Mapping[int, Sighting] = {
         other.number: other.sightings[frame] for other in tracks if frame in other.sightings
     }
@@ -163,7 +166,18 @@ def _inner_pixels(tracker: Tracker, tracks: Sequence[Track], track: Track, frame
     free = np.pad(window.mask, 1)
     free[1:-1, 1:-1] *= tracker.covered(track, live, sightings)[window.place] == 0
     core = cv2.erode(free, np.ones((2 * margin + 1,) * 2, np.uint8))[1:-1, 1:-1] > 0
-    return tracker.frames[frame][window.place][core]
+    return tracker.frames[frame][window.place][core], _on_lid(tracker, track, pose, window)[core]
+
+
+def _on_lid(tracker: Tracker, track: Track, pose: Pose, window: Window) -> Bool[np.ndarray, "row column"]:
+    """Where in a window the flat top of a track is in sight."""
+    height, width = tracker.frames.shape[1:3]
+    on_lid = np.zeros((height, width), dtype=bool)
+    lid = track.solid.lid(tracker.camera, pose)
+    if lid is not None:
+        face = paint(lid, height, width)
+        on_lid[face.place] = face.mask > 0
+    return on_lid[window.place]
 
 
 def _body(name: str, track: Track, looks: Sequence[Look], radius: float) -> Body:

@@ -83,6 +83,14 @@ class Solid:
         pixels = camera.project(self.rim(camera, pose))
         return np.asarray(cv2.convexHull(pixels.astype(np.float32))[:, 0], dtype=float)
 
+    def lid(self, camera: Camera, pose: Pose) -> Float[np.ndarray, "point 2"] | None:
+        """Outline in pixels of the flat top, convex; a sphere has none."""
+        if self.shape is Shape.SPHERE:
+            return None
+        rim = self.rim(camera, pose)
+        top = camera.project(rim[rim[:, 2] > self.radius])
+        return np.asarray(cv2.convexHull(top.astype(np.float32))[:, 0], dtype=float)
+
     def outline(self, camera: Camera, pose: Pose, count: int) -> "Outline":
         """Points evenly spaced along the outline."""
         rim = self.rim(camera, pose)

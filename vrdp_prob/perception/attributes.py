@@ -111,15 +111,13 @@ def material_probabilities(looks: Sequence[Look], shape: Shape) -> dict[str, flo
     bright = float(np.median([item.bright for item in looks]))
     colourless = float(np.median([item.saturation for item in looks])) < _GRAY_SATURATION
     least_washed, least_bright = (_WASHED, _BRIGHT) if shape is Shape.SPHERE else (_FLAT_WASHED, _FLAT_BRIGHT)
-    parts = np.clip(
-        [
-            0.0 if colourless else _WASHED_SHARPNESS * (washed - least_washed),
-            _BRIGHT_SHARPNESS * (bright - least_bright),
-            _LID_SHARPNESS * (_DARK_LID - float(np.median(lids))) if lids else 0.0,
-        ],
-        -_STRONGEST,
-        _STRONGEST,
-    )
+    signs = [
+        0.0 if colourless else _WASHED_SHARPNESS * (washed - least_washed),
+        _BRIGHT_SHARPNESS * (bright - least_bright),
+    ]
+    if lids:
+        signs.append(_LID_SHARPNESS * (_DARK_LID - float(np.median(lids))))
+    parts = np.clip(signs, -_STRONGEST, _STRONGEST)
     odds = float(parts.sum() if shape is Shape.SPHERE else max(parts.max(), _NO_MIRROR))
     metal = float(1 / (1 + np.exp(-odds)))
     return {"metal": metal, "rubber": 1 - metal}

@@ -135,6 +135,16 @@ def walk(gap, rate, curvature):
 
 
 @compiled
+def touching_walk(gap, rate, curvature):
+    """Largest step of touching bodies: until they may be SLACK deep, or, where they are, until they may close again."""
+    if gap >= -SLACK:
+        return walk(gap + SLACK, rate, curvature)
+    if rate <= 0.0:
+        return 0.0
+    return rate / curvature if curvature > 0.0 else math.inf
+
+
+@compiled
 def disc_disc(pairs, s, reach, curvature):
     """Gap of two discs."""
     dx, dy = value(pairs.local[0], s), value(pairs.local[1], s)
@@ -211,7 +221,7 @@ def box_side(pairs, s, swapped, half_a, half_b, flat_b, face, curvature, corner)
             # Corners that touch: the one that closes fastest counts.
             if least > TOUCHING or rate < corner[1]:
                 corner[0], corner[1], corner[2], corner[3] = gap, rate, sx, sy
-            step = min(step, walk(max(gap, 0.0) + SLACK, rate, curvature))
+            step = min(step, touching_walk(gap, rate, curvature))
         else:
             if gap < least:
                 corner[0], corner[1], corner[2], corner[3] = gap, rate, sx, sy

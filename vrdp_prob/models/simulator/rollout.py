@@ -144,6 +144,8 @@ class _Simulation(torch.autograd.Function):
         return run.forward(inputs)
 
     @staticmethod
-    @torch.autograd.function.once_differentiable
     def backward(ctx: Any, bar: Tensor) -> tuple[Tensor | None, ...]:
+        # Grad mode is on in a backward pass only where somebody wants to differentiate its result.
+        if torch.is_grad_enabled():
+            raise RuntimeError("simulate has a first derivative only; call backward or grad with create_graph=False.")
         return None, *ctx.run.backward(ctx.saved_tensors, bar)

@@ -32,6 +32,7 @@ from vrdp_prob.models.simulator.detection_kernel import (
     box_disc,
     disc_disc,
     plane_bound,
+    touching_walk,
     walk,
 )
 from vrdp_prob.models.simulator.laws_kernel import GROUP_SIZE, compiled
@@ -110,8 +111,10 @@ def certain_step(world, pairs, i, j, duration):
     touching = gap <= TOUCHING
     if world.kind[i, SHAPE] != DISC and world.kind[j, SHAPE] != DISC:
         step = pairs.local[LOOK, CURVATURE]
+    elif touching:
+        step = touching_walk(gap, rate, pairs.local[LOOK, CURVATURE])
     else:
-        step = walk(max(gap, 0.0) + SLACK if touching else gap, rate, pairs.local[LOOK, CURVATURE])
+        step = walk(gap, rate, pairs.local[LOOK, CURVATURE])
     return max(step, CRAWL / duration) if touching else step
 
 

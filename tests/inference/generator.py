@@ -57,7 +57,9 @@ def integrate(scene: Scene, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 def _advance(scene: Scene, state: np.ndarray, now: float, step: float) -> tuple[np.ndarray, float]:
     released = scene.release <= now + 1e-9
     target = _free(scene, state, released, step)
-    touching = [pair for pair in _pairs(released) if _gap(scene, target, *pair)[0] < 0 and _closing(scene, target, pair)]
+    touching = [
+        pair for pair in _pairs(released) if _gap(scene, target, *pair)[0] < 0 and _closing(scene, target, pair)
+    ]
     if not touching:
         return target, now + step
     low, high = 0.0, step

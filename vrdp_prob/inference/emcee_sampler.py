@@ -14,7 +14,7 @@ import numpy as np
 from jaxtyping import Float
 from numpy.random import RandomState
 
-from vrdp_prob.inference.laplace import smoothed_weights
+from vrdp_prob.inference.laplace import DEGREES_OF_FREEDOM, adapted, smoothed_weights
 from vrdp_prob.inference.samples import (
     ESS_GOAL,
     R_HAT_GOAL,
@@ -30,10 +30,10 @@ ENSEMBLES = 4
 STEPS_PER_ROUND = 200
 STEPS_TOGETHER = 20
 """Steps after which the ensembles, one thread each, wait for one another, so that an interruption is soon noticed."""
-ROUNDS = 6
+ROUNDS = 4
 """Rounds after which sampling stops even if it has not converged; a number of steps and not a time, so that the same
 seed gives the same draws on every machine."""
-BURN_IN = 0.4
+BURN_IN = 0.3
 """Share of the steps at the start of every ensemble that is thrown away."""
 START_POOL = 16
 """Importance-sampled candidates per walker from which the starting places are taken."""
@@ -72,21 +72,22 @@ def sample_emcee(
     del draws
     dimension = len(start.mean)
     walkers = 2 * (dimension + 2 + dimension // 4)
+    start, adapting = adapted(density, start, generator, lambda _steps: None)
     ensembles = [_Ensemble(density, start, walkers, generator) for _ in range(ENSEMBLES)]
     workers = ThreadPoolExecutor(max_workers=min(ENSEMBLES, os.cpu_count() or 1))
     display = (progress or SilentProgress()).stage("Sampling (emcee)", total=rounds * STEPS_PER_ROUND)
     with workers, display as advance:
-        for count in range(1, rounds + 1):
+        for _round in range(rounds):
             for _ in range(STEPS_PER_ROUND // STEPS_TOGETHER):
                 list(workers.map(lambda ensemble: ensemble.run(STEPS_TOGETHER), ensembles))
                 advance(STEPS_TOGETHER)
             chains = np.stack([ensemble.chain() for ensemble in ensembles])
-            if count > 1 and _good_enough(chains):
+            if _good_enough(chains):
                 break
     points = start.points(chains)
     log_density = np.stack([ensemble.log_density() for ensemble in ensembles])
     acceptance = np.stack([np.full(log_density.shape[1], ensemble.acceptance) for ensemble in ensembles])
-    evaluations = sum(ensemble.evaluations for ensemble in ensembles)
+    evaluations = adapting + sum(ensemble.evaluations for ensemble in ensembles)
     return Samples(points, log_density, {"acceptance_rate": acceptance}, evaluations=evaluations)
 
 
@@ -96,7 +97,11 @@ class _Ensemble:
     def __init__(self, density: LogDensity, start: Gaussian, walkers: int, generator: np.random.Generator) -> None:
         self._density, self._gaussian = density, start
         self.evaluations = 0
-        moves = [(emcee.moves.DEMove(), 0.9), (emcee.moves.DEMove(gamma0=1.0), 0.1)]
+        moves = [
+            (emcee.moves.MHMove(_independent), 0.5),
+            (emcee.moves.DEMove(), 0.4),
+            (emcee.moves.DEMove(gamma0=1.0), 0.1),
+        ]
         self._sampler = emcee.EnsembleSampler(
             walkers, len(start.mean), self._log_probability, moves=moves, vectorize=True
         )
@@ -136,6 +141,24 @@ class _Ensemble:
 
     def log_density(self) -> Float[np.ndarray, "draw"]:
         return self._sampler.get_log_prob(discard=self._discard()).T.reshape(-1)
+
+
+def _independent(
+    places: Float[np.ndarray, "walker dimension"], random: RandomState
+) -> tuple[Float[np.ndarray, "walker dimension"], Float[np.ndarray, "walker"]]:
+    """Proposals that forget the place, from the Student-t around the MAP, with the log ratio of their densities.
+
+    Where the posterior is nearly Gaussian an accepted proposal is an independent draw; other moves serve the rest.
+    """
+    count, dimension = places.shape
+    chi_square = random.chisquare(DEGREES_OF_FREEDOM, size=count) / DEGREES_OF_FREEDOM
+    proposed = random.standard_normal((count, dimension)) / np.sqrt(chi_square)[:, None]
+
+    def log_density(whitened: Float[np.ndarray, "walker dimension"]) -> Float[np.ndarray, "walker"]:
+        power = (DEGREES_OF_FREEDOM + dimension) / 2
+        return -power * np.log1p((whitened**2).sum(axis=1) / DEGREES_OF_FREEDOM)
+
+    return proposed, log_density(places) - log_density(proposed)
 
 
 def _good_enough(chains: Float[np.ndarray, "chain draw dimension"]) -> bool:

@@ -74,7 +74,7 @@ def noise_scale(tracks: Tracks) -> float:
 
 
 def local_fit(
-    tracks: Tracks, body: int, at: float, start: float, stop: float, noise: float, *, degree: int = 2
+    tracks: Tracks, body: int, at: float, *, start: float, stop: float, noise: float, degree: int = 2
 ) -> LocalFit | None:
     """Fit a polynomial to one body's track between two times (s); None where fewer than 3 frames were seen there."""
     times, positions = tracks.times, tracks.positions[:, body]
@@ -98,7 +98,7 @@ def release_fit(tracks: Tracks, body: int, noise: float, until: float) -> LocalF
     best: LocalFit | None = None
     for span in (3, 5, 8, 12, 18, 25):
         stop = min(float(times[seen[min(span, len(seen) - 1)]]), until)
-        fit = local_fit(tracks, body, start, start, stop, noise)
+        fit = local_fit(tracks, body, start, start=start, stop=stop, noise=noise)
         if fit is None:
             continue
         if best is None or fit.velocity_sd < best.velocity_sd:
@@ -220,7 +220,9 @@ def _kink(tracks: Tracks, body: int, at: float, noise: float) -> _Kink | None:
     prior = np.diag([0, 0, 0, 1, 1]) * (noise / ACCELERATION_SD) ** 2
     covariance = np.linalg.inv(design.T @ design + prior)
     coefficients = covariance @ design.T @ seen
-    misfit = float(((seen - design @ coefficients) ** 2).sum() + np.einsum("ik,ij,jk->", coefficients, prior, coefficients))
+    misfit = float(
+        ((seen - design @ coefficients) ** 2).sum() + np.einsum("ik,ij,jk->", coefficients, prior, coefficients)
+    )
     return _Kink(coefficients[0], coefficients[1], coefficients[2], noise * float(np.sqrt(covariance[2, 2])), misfit)
 
 

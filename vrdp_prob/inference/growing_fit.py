@@ -67,9 +67,14 @@ class GrowingFit:
         self.converged = False
 
     def trust_release_fits(self, deviations: Mapping[int, tuple[float, float]]) -> None:
-        """Take release positions (m) and velocities (m/s) of bodies as known that well until the window reaches them."""
+        """Take release positions (m) and velocities (m/s) as known that well until the window reaches the body."""
         for body, (position_sd, velocity_sd) in deviations.items():
-            for field, sd in (("x", position_sd), ("y", position_sd), ("velocity_x", velocity_sd), ("velocity_y", velocity_sd)):
+            for field, sd in (
+                ("x", position_sd),
+                ("y", position_sd),
+                ("velocity_x", velocity_sd),
+                ("velocity_y", velocity_sd),
+            ):
                 place = self._coordinates.places.get((field, body))
                 if place is not None:
                     self._idle_sd[place] = sd

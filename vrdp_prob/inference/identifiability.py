@@ -116,9 +116,7 @@ def _restitution_status(name: str, graph: Graph, known: set[str]) -> ParameterSt
     if not graph[name]:
         return ParameterStatus(Status.DEFAULT)
     component = _component(name, graph)
-    odd_cycle = any(
-        component[first] % 2 == component[second] % 2 for first in component for second in graph[first]
-    )
+    odd_cycle = any(component[first] % 2 == component[second] % 2 for first in component for second in graph[first])
     if odd_cycle or known & component.keys():
         return ParameterStatus(Status.IDENTIFIED)
     return ParameterStatus(Status.PRODUCT_ONLY, tuple(sorted(graph[name])))

@@ -65,18 +65,18 @@ def infer(
     """
     if sampler not in get_args(SamplerName):
         raise InputError(f"sampler '{sampler}' is not known; use one of {', '.join(get_args(SamplerName))}.")
-    if draws < 4:  # noqa: PLR2004 (one draw for each of four chains)
+    if draws < 4:
         raise InputError(f"draws is {draws}; ask for at least 4.")
     physics = PhysicsModel.base() if model is None else model
     generator = np.random.default_rng(seed)
     fit = fit_map(tracks, physics, generator, progress)
     sample = {"nuts": sample_nuts, "emcee": sample_emcee, "laplace": sample_laplace}[sampler]
     samples = sample(fit.likelihood.log_density, fit.gaussian, draws=draws, generator=generator, progress=progress)
-    return _posterior(fit, samples, sampler, seed, draws, generator)
+    return _posterior(fit, samples, sampler, seed=seed, draws=draws, generator=generator)
 
 
 def _posterior(
-    fit: MapFit, samples: Samples, sampler: str, seed: int, draws: int, generator: np.random.Generator
+    fit: MapFit, samples: Samples, sampler: str, *, seed: int, draws: int, generator: np.random.Generator
 ) -> Posterior:
     tracks = fit.likelihood.tracks
     with torch.no_grad():
@@ -158,9 +158,8 @@ def _warnings(
         sentences.append(convergence.sentence)
     default = [name for name, one in status.items() if one.mass.status is Status.DEFAULT]
     if default:
-        plural = len(default) > 1
-        sentences.append(
-            f"Object{'s' if plural else ''} {', '.join(default)} never collide{'' if plural else 's'} in view: mass and "
-            "restitution are default values, not measured."
+        subject = (
+            f"Objects {', '.join(default)} never collide" if len(default) > 1 else f"Object {default[0]} never collides"
         )
+        sentences.append(f"{subject} in view: mass and restitution are default values, not measured.")
     return sentences

@@ -165,9 +165,7 @@ def _proposals(
     return whitened, constant - (DEGREES_OF_FREEDOM + dimension) / 2 * shape
 
 
-def _resample(
-    weights: Float[np.ndarray, "draw"], count: int, generator: np.random.Generator
-) -> np.ndarray:
+def _resample(weights: Float[np.ndarray, "draw"], count: int, generator: np.random.Generator) -> np.ndarray:
     """Systematic resampling, shuffled."""
     places = (generator.random() + np.arange(count)) / count
     chosen = np.searchsorted(np.cumsum(weights), places).clip(max=len(weights) - 1)

@@ -18,8 +18,8 @@ from vrdp_prob.inference.least_squares import jacobian
 from vrdp_prob.inference.misfit import Misfit, judge
 from vrdp_prob.inference.samples import Gaussian, evaluate
 from vrdp_prob.models.likelihood import Likelihood
-from vrdp_prob.models.physics import PhysicsModel
 from vrdp_prob.models.observation import prior_noise
+from vrdp_prob.models.physics import PhysicsModel
 from vrdp_prob.models.unknowns import ANGLE_NOISE, NOISE, Structure, unknowns
 from vrdp_prob.progress import ProgressDisplay, SilentProgress
 from vrdp_prob.scene import Tracks
@@ -73,7 +73,6 @@ class MapFit:
         return Gaussian.from_precision(self.point, self.precision)
 
 
-
 def fit_map(
     tracks: Tracks,
     model: PhysicsModel,
@@ -99,7 +98,7 @@ def fit_map(
     """
     noise = _noise(tracks)
     contacts = seen_contacts(tracks, noise)
-    growing = _grow(tracks, model, noise, contacts, generator, progress)
+    growing = _grow(tracks, model, noise=noise, contacts=contacts, generator=generator, progress=progress)
     everything = growing.likelihood
     pairs = _pairs(everything, growing.point)
     structure = Structure(
@@ -160,6 +159,7 @@ def _first_contact(tracks: Tracks, body: int, contacts: tuple[SeenContact, ...])
 def _grow(
     tracks: Tracks,
     model: PhysicsModel,
+    *,
     noise: float,
     contacts: tuple[SeenContact, ...],
     generator: np.random.Generator,
@@ -189,16 +189,12 @@ def _windows(tracks: Tracks) -> list[int]:
     return [*ends, count]
 
 
-def _release_sd(
-    tracks: Tracks, body: int, noise: float, contacts: tuple[SeenContact, ...]
-) -> tuple[float, float]:
+def _release_sd(tracks: Tracks, body: int, noise: float, contacts: tuple[SeenContact, ...]) -> tuple[float, float]:
     """Standard deviations of release position (m) and velocity (m/s) of a body as its local fit knows them."""
     return noise, release_fit(tracks, body, noise, _first_contact(tracks, body, contacts)).velocity_sd
 
 
-def _start(
-    likelihood: Likelihood, noise: float, contacts: tuple[SeenContact, ...]
-) -> Float[np.ndarray, "dimension"]:
+def _start(likelihood: Likelihood, noise: float, contacts: tuple[SeenContact, ...]) -> Float[np.ndarray, "dimension"]:
     """Release states of local fits, everything else at the mean of its prior."""
     tracks, coordinates = likelihood.tracks, likelihood.coordinates
     start = coordinates.prior_mean.copy()

@@ -54,8 +54,8 @@ class Misfit:
         return (
             f"The model does not explain this motion: after the best fit positions are still off by "
             f"{self.residual_sd:.3g} m where measurement noise is {self.noise_sd:.3g} m (most for object {self.worst}, "
-            f"{self.worst_sd:.3g} m), and errors persist over about {self.memory:.0f} frames; the intervals were widened "
-            "accordingly, but masses, restitutions and predictions may still be biased."
+            f"{self.worst_sd:.3g} m), and errors persist over about {self.memory:.0f} frames; the intervals were "
+            "widened accordingly, but masses, restitutions and predictions may still be biased."
         )
 
 

@@ -63,7 +63,7 @@ def sample_nuts(
     with (progress or SilentProgress()).stage("Sampling (NUTS)", total=CHAINS * (warm_up + per_chain)) as advance:
         for place in starts:
             seed = int(generator.integers(2**31))
-            whitened, divergent = _chain(potential, place, warm_up, per_chain, seed, advance)
+            whitened, divergent = _chain(potential, place, warm_up=warm_up, draws=per_chain, seed=seed, advance=advance)
             chains.append(whitened)
             divergences += divergent
     whitened_chains = np.stack(chains)
@@ -92,6 +92,7 @@ class _Potential:
 def _chain(
     potential: _Potential,
     place: Float[np.ndarray, "dimension"],
+    *,
     warm_up: int,
     draws: int,
     seed: int,

@@ -19,7 +19,6 @@ from vrdp_prob.models.physics import PhysicsModel
 from vrdp_prob.models.simulator.worlds import Worlds
 from vrdp_prob.scene import Tracks
 
-
 PairFunction = Callable[[np.ndarray, np.ndarray], np.ndarray]
 
 
@@ -36,8 +35,8 @@ class Posterior:
     seed
         Seed of all randomness.
     data
-        Groups `posterior`, `map_estimate`, `prior`, `sample_stats`, `log_likelihood` and `observed_data`; the draws have
-        the axes `chain` and `draw`, then `body` where there is one value per body. SI units, as attributes.
+        Groups `posterior`, `map_estimate`, `prior`, `sample_stats`, `log_likelihood` and `observed_data`; the draws
+        have the axes `chain` and `draw`, then `body` where there is one value per body. SI units, as attributes.
     status
         What the data say about each body's mass and restitution, by id.
     convergence
@@ -111,9 +110,7 @@ class Posterior:
     def restitution_pairs(self) -> tuple[PairSummary, ...]:
         """Restitution (product of both factors, at most 1) of every pair that collides."""
         restitution = self._draws("restitution")
-        return tuple(
-            self._pair_summary(pair, restitution, lambda a, b: np.minimum(a * b, 1.0)) for pair in self.pairs
-        )
+        return tuple(self._pair_summary(pair, restitution, lambda a, b: np.minimum(a * b, 1.0)) for pair in self.pairs)
 
     def write(self, path: Path) -> None:
         """Save as one netCDF file that needs nothing else to be read again; an interruption leaves no half file.

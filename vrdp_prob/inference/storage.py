@@ -3,9 +3,8 @@
 import json
 import warnings
 from dataclasses import asdict
-from importlib import import_module
 from pathlib import Path
-from pkgutil import iter_modules
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
@@ -16,8 +15,6 @@ from vrdp_prob.files import write_atomically
 from vrdp_prob.inference.identifiability import BodyStatus, ParameterStatus, Status
 from vrdp_prob.inference.posterior import Posterior
 from vrdp_prob.inference.samples import Convergence
-from vrdp_prob.models import effects
-from vrdp_prob.models.effects.effect import Effect
 from vrdp_prob.models.physics import PhysicsModel
 from vrdp_prob.scene import Body, Camera, Shape, Tracks, Wall
 
@@ -68,7 +65,7 @@ def _document(posterior: Posterior) -> dict[str, Any]:
         "bodies": [asdict(body) for body in tracks.bodies],
         "walls": [asdict(wall) for wall in tracks.walls],
         "camera": None if tracks.camera is None else tracks.camera.to_document(),
-        "model": {"name": posterior.model.name, "effects": [one.name for one in posterior.model.effects]},
+        "model": _model_text(posterior.model),
         "seed": posterior.seed,
         "status": {name: asdict(status) for name, status in posterior.status.items()},
         "convergence": asdict(posterior.convergence),
@@ -94,20 +91,19 @@ def _posterior(document: dict[str, Any], tree: xr.DataTree, tracks: Tracks | Non
     )
 
 
-def _model(document: dict[str, Any]) -> PhysicsModel:
-    """The model of that name with the effects of those names."""
-    known = _known_effects()
-    unknown = [name for name in document["effects"] if name not in known]
-    if unknown:
-        raise ValueError(f"its model has the unknown effect '{unknown[0]}'")
-    return PhysicsModel(document["name"], tuple(known[name]() for name in document["effects"]))
+def _model_text(model: PhysicsModel) -> str:
+    """The model's file as text."""
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / "model.toml"
+        model.write(path)
+        return path.read_text(encoding="utf-8")
 
 
-def _known_effects() -> dict[str, type[Effect]]:
-    """Every effect in the folder of effects, by name."""
-    for module in iter_modules(effects.__path__, f"{effects.__name__}."):
-        import_module(module.name)
-    return {effect.name: effect for effect in Effect.__subclasses__()}
+def _model(text: str) -> PhysicsModel:
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / "model.toml"
+        path.write_text(text, encoding="utf-8")
+        return PhysicsModel.read(path)
 
 
 def _parameter_status(document: dict[str, Any]) -> ParameterStatus:

@@ -57,6 +57,14 @@ def test_mistakes_name_file_and_field(tmp_path: Path, content: str, message: str
     assert "\n" not in str(caught.value)
 
 
+def test_the_example_of_the_documentation_is_a_model(tmp_path: Path) -> None:
+    text = (Path(__file__).parents[2] / "docs" / "effects.md").read_text(encoding="utf-8")
+    path = tmp_path / "model.toml"
+    path.write_text(text.split("```toml\n")[1].split("```")[0], encoding="utf-8")
+    model = PhysicsModel.read(path)
+    assert [effect.name for effect in model.effects] == [effect.name for effect in PhysicsModel.base().effects]
+
+
 def test_a_file_that_is_not_there(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="cannot be read"):
         PhysicsModel.read(tmp_path / "none.toml")

@@ -21,6 +21,9 @@ from vrdp_prob.scene import Body, Shape
 TIME_STEP = 0.01
 """Grid in s on which the time of a contact is sought."""
 
+LEAST_TIMES = 3.0
+"""Times of the grid at which two bodies are fully in reach when they meet, at least."""
+
 DISTANCE_SD = 0.02
 """Standard deviation in m by which the distance of the centres in a contact differs from the sum of the radii."""
 
@@ -42,6 +45,9 @@ PRIOR_LOG_ODDS = {True: 3.0, False: 1.5}
 Discs that come within 2 cm of contact either touch or miss by less than that: of all lines that a disc can take past
 another, those that touch fill 0.8 m and those that miss so narrowly 0.04 m.
 """
+
+AGAIN_LOG_ODDS = -4.0
+"""Log odds of one more contact of two bodies that have met: they are in reach around every contact anyway."""
 
 SHORTEST_PAUSE = 0.12
 """Time in s between two contacts of the same pair that are told apart."""
@@ -168,9 +174,10 @@ class _Pair:
         apart = place - other_place
         fit = self._distance_fit(apart)
         allowed = fit > -8
-        for contact in taken:
-            if (contact.first, contact.second) == (self.first, self.second):
-                allowed &= np.abs(times - contact.time) > SHORTEST_PAUSE
+        own = [contact.time for contact in taken if (contact.first, contact.second) == (self.first, self.second)]
+        has_met = bool(own)
+        for time in own:
+            allowed &= np.abs(times - time) > SHORTEST_PAUSE
         allowed &= ((kicks[:, :2] - kicks[:, 2:]) * apart).sum(axis=1) > 0
         closing = -((speed - other_speed) * apart).sum(axis=1)
         allowed &= closing > SLOWEST_APPROACH * np.linalg.norm(apart, axis=1)
@@ -179,8 +186,10 @@ class _Pair:
         times, score, fit = times[allowed], (evidence + fit)[allowed], fit[allowed]
         peak = int(score.argmax())
         window = np.abs(times - times[peak]) < SHORTEST_PAUSE
-        average = float(logsumexp(score[window]) - logsumexp(fit))
-        return Contact(self.first, self.second, float(times[peak]), average + PRIOR_LOG_ODDS[self.discs])
+        # a pair that is in reach for a moment only, and hardly, has missed
+        average = float(logsumexp(score[window]) - max(logsumexp(fit), np.log(LEAST_TIMES)))
+        prior = AGAIN_LOG_ODDS if has_met else PRIOR_LOG_ODDS[self.discs]
+        return Contact(self.first, self.second, float(times[peak]), average + prior)
 
     def _kicks(self, one: OneMoreKick, other: OneMoreKick) -> tuple[np.ndarray, np.ndarray]:
         """Log Bayes factor and best kicks (m/s; x and y of the first, then of the second body) at each time."""

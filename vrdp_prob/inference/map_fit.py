@@ -79,7 +79,7 @@ def fit_map(
     generator: np.random.Generator,
     progress: ProgressDisplay | None = None,
     *,
-    climb: bool = False,
+    climb: bool = True,
 ) -> MapFit:
     """Find the most probable values of a video.
 
@@ -109,7 +109,7 @@ def fit_map(
     final = GrowingFit(reduced, start, contacts, generator)
     final.finish()
     misfit = _misfit(reduced, final.point, noise)
-    if not misfit.fits:
+    if not (misfit.fits and misfit.independent):
         final.likelihood = reduced.informed(1 / misfit.memory)
         final.finish()
     point, log_density, converged = _climb(final.likelihood, final.point, LBFGS_ITERATIONS if climb else 0)

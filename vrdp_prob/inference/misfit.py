@@ -24,7 +24,10 @@ class Misfit:
     residual_sd
         Standard deviation (m) of the residuals per axis.
     noise_sd
-        Standard deviation (m) of the measurement noise, from the tracks alone; NaN where they are too short.
+        Standard deviation (m) of the measurement noise: the stated one where there is one, at least that of the
+        tracks' roughness.
+    noise_stated
+        Whether whoever measured the tracks stated their noise. Such noise may be alike in neighbouring frames.
     correlation
         Correlation of the residuals of neighbouring frames.
     memory
@@ -35,6 +38,7 @@ class Misfit:
 
     residual_sd: float
     noise_sd: float
+    noise_stated: bool
     correlation: float
     memory: float
     worst: str
@@ -43,8 +47,13 @@ class Misfit:
     @property
     def fits(self) -> bool:
         """Whether nothing speaks against the model."""
-        large = np.isfinite(self.noise_sd) and self.residual_sd > LARGEST_RATIO * self.noise_sd
-        return not large and self.correlation < LARGEST_CORRELATION
+        small = self.residual_sd <= LARGEST_RATIO * self.noise_sd
+        return small and (self.noise_stated or self.independent)
+
+    @property
+    def independent(self) -> bool:
+        """Whether every frame can count as an observation of its own."""
+        return self.correlation < LARGEST_CORRELATION
 
     @property
     def sentence(self) -> str:
@@ -69,7 +78,12 @@ def judge(tracks: Tracks, predicted: Float[np.ndarray, "time body 2"], noise: fl
     correlations = autocorrelation(residuals)
     memory = float(np.clip(1 + 2 * _first_positive_sum(correlations[1:]), 1, LONGEST_MEMORY))
     first = float(correlations[1]) if len(correlations) > 1 else 0.0
-    return Misfit(overall, noise, first, memory, tracks.bodies[worst].id, float(per_body[worst]))
+    covariance = tracks.position_covariance
+    stated = 0.0 if covariance is None else float(np.sqrt(np.nanmedian(covariance[..., [0, 1], [0, 1]])))
+    noise = max(noise, stated)
+    return Misfit(
+        overall, noise, covariance is not None, first, memory, tracks.bodies[worst].id, float(per_body[worst])
+    )
 
 
 def autocorrelation(residuals: Float[np.ndarray, "time body 2"]) -> Float[np.ndarray, "lag"]:

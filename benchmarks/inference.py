@@ -17,13 +17,13 @@ import numpy as np
 import torch
 
 from vrdp_prob.datasets import load_all
+from vrdp_prob.inference import default_model
 from vrdp_prob.inference.emcee_sampler import sample_emcee
 from vrdp_prob.inference.events import first_contacts
 from vrdp_prob.inference.laplace import sample_laplace
 from vrdp_prob.inference.map_fit import MapFit, fit_map
 from vrdp_prob.inference.nuts_sampler import sample_nuts
 from vrdp_prob.inference.samples import assess
-from vrdp_prob.models.physics import PhysicsModel
 from vrdp_prob.scene import Tracks
 
 DATA = Path(__file__).parents[2] / "shared" / "data" / "clevrer_bullet"
@@ -75,7 +75,7 @@ def check(title: str, value: float | str | None, goal: float | str, *, met: bool
 
 def warm_up(tracks: Tracks) -> None:
     """Compile the simulator outside the measurement."""
-    fit_map(tracks.until(float(tracks.times[10])), PhysicsModel.base(), np.random.default_rng(0))
+    fit_map(tracks.until(float(tracks.times[10])), default_model(), np.random.default_rng(0))
 
 
 def fits(videos: Sequence[Tracks]) -> list[Check]:
@@ -86,7 +86,7 @@ def fits(videos: Sequence[Tracks]) -> list[Check]:
     times, found, missed, invented, errors = [], 0, 0, 0, []
     for tracks in videos:
         begin = time.process_time()
-        fit = fit_map(tracks, PhysicsModel.base(), np.random.default_rng(0))
+        fit = fit_map(tracks, default_model(), np.random.default_rng(0))
         times.append(time.process_time() - begin)
         true, fitted = annotated(tracks), collisions(fit)
         counts = len(true & fitted), len(true - fitted), len(fitted - true)
@@ -124,7 +124,7 @@ def samplers(videos: Sequence[Tracks], names: Sequence[str]) -> list[Check]:
     results: dict[str, list[tuple[float, float]]] = {key: [] for key in names}
     print("video        unknowns  sampler  seconds  draws' ESS  ESS/s  densities  gradients  converged")
     for tracks in videos:
-        fit = fit_map(tracks, PhysicsModel.base(), np.random.default_rng(0))
+        fit = fit_map(tracks, default_model(), np.random.default_rng(0))
         for key in names:
             begin = time.process_time()
             samples = SAMPLERS[key](

@@ -17,6 +17,7 @@ from vrdp_prob.inference.map_fit import MapFit, fit_map
 from vrdp_prob.inference.nuts_sampler import sample_nuts
 from vrdp_prob.inference.posterior import Posterior
 from vrdp_prob.inference.samples import Convergence, Samples, assess
+from vrdp_prob.models.effects.body_friction import BodyFriction
 from vrdp_prob.models.physics import PhysicsModel
 from vrdp_prob.progress import ProgressDisplay
 from vrdp_prob.scene import Tracks
@@ -25,6 +26,11 @@ SamplerName = Literal["nuts", "emcee", "laplace"]
 PRIOR_DRAWS = 500
 BATCH = 500
 """Worlds simulated at once when the draws are looked at again."""
+
+
+def default_model() -> PhysicsModel:
+    """The base model with a friction of its own for every body, which real tables and practice scenes need."""
+    return PhysicsModel.base().with_effect(BodyFriction())
 
 
 def infer(
@@ -46,7 +52,7 @@ def infer(
         `emcee` (ensembles of walkers), `nuts` (Hamiltonian, with gradients) or `laplace` (fast: a Gaussian around the
         MAP, corrected by importance sampling).
     model
-        The physics; the base model where None.
+        The physics; `default_model()` where None.
     seed
         Seed of all randomness: the same seed gives the same posterior.
     draws
@@ -67,7 +73,7 @@ def infer(
         raise InputError(f"sampler '{sampler}' is not known; use one of {', '.join(get_args(SamplerName))}.")
     if draws < 4:
         raise InputError(f"draws is {draws}; ask for at least 4.")
-    physics = PhysicsModel.base() if model is None else model
+    physics = default_model() if model is None else model
     generator = np.random.default_rng(seed)
     fit = fit_map(tracks, physics, generator, progress)
     sample = {"nuts": sample_nuts, "emcee": sample_emcee, "laplace": sample_laplace}[sampler]

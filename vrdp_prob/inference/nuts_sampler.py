@@ -12,12 +12,13 @@ from jaxtyping import Float
 from pyro.infer.mcmc import MCMC, NUTS
 from torch import Tensor
 
-from vrdp_prob.inference.laplace import smoothed_weights
+from vrdp_prob.inference.laplace import adapted, smoothed_weights
 from vrdp_prob.inference.samples import Gaussian, LogDensity, Samples, evaluate
 from vrdp_prob.progress import Advance, ProgressDisplay, SilentProgress
 
 CHAINS = 4
-WARM_UP = 150
+WARM_UP = 60
+"""Steps that only adapt the step size: the mass matrix is the whitening, which weighted draws have already shaped."""
 TREE_DEPTH = 6
 ACCEPTANCE = 0.85
 START_POOL = 200
@@ -56,6 +57,7 @@ def sample_nuts(
     The chains, with the number of divergences.
     """
     per_chain = -(-draws // CHAINS)
+    start, adapting = adapted(density, start, generator, lambda _steps: None)
     potential = _Potential(density, start)
     starts = _starting_points(density, start, generator)
     chains: list[np.ndarray] = []
@@ -69,7 +71,7 @@ def sample_nuts(
     whitened_chains = np.stack(chains)
     points = start.points(whitened_chains)
     log_density = np.stack([evaluate(density, chain) for chain in points])
-    return Samples(points, log_density, divergences=divergences, evaluations=0, gradients=potential.gradients)
+    return Samples(points, log_density, divergences=divergences, evaluations=adapting, gradients=potential.gradients)
 
 
 class _Potential:
@@ -100,7 +102,7 @@ def _chain(
 ) -> tuple[Float[np.ndarray, "draw dimension"], int]:
     kernel = NUTS(
         potential_fn=potential,
-        adapt_mass_matrix=True,
+        adapt_mass_matrix=False,
         full_mass=False,
         max_tree_depth=TREE_DEPTH,
         target_accept_prob=ACCEPTANCE,

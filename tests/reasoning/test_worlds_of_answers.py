@@ -114,3 +114,12 @@ def test_a_posterior_may_be_asked_directly() -> None:
     assert (answer.answer, answer.probability) == (3, pytest.approx(1.0, abs=0.05))
     with pytest.raises(InputError, match="draws is 0; ask for at least 1"):
         ask(posterior, "How many collisions happen?", draws=0)
+
+
+def test_an_answer_says_that_a_simulation_broke_off(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("vrdp_prob.reasoning.stretch.EVENT_LIMIT", 0)
+    discs = (Disc((-1.5, 0.0), (1.8, 0.0)), Disc((1.0, 0.05)))
+    answer = ask(
+        worlds_of(discs, 26), "What will happen next?", choices=["The red object collides with the blue object"]
+    )
+    assert any("broke off early" in note for note in answer.notes)

@@ -65,6 +65,7 @@ class Counterfactual:
         self._last = np.array([float(s.track.times[-1]) for s in seen.seen.smoothers])
         self._reached: Bool[np.ndarray, "draw body"] = np.zeros((seen.draws, count), dtype=bool)
         self._timeline = Timeline(seen.universe, seen.draws, seen.tracks.camera)
+        self._broke_off: Bool[np.ndarray, "draw"] = np.zeros(seen.draws, dtype=bool)
         self._trajectory, self._exists = self._observed_course()
 
     def run(self) -> WorldDraws:
@@ -82,7 +83,12 @@ class Counterfactual:
         self._crossings()
         times = self._seen.tracks.times
         return WorldDraws(
-            times, self._trajectory, self._exists, self._timeline.table, self._timeline.collided | self._touched()
+            times,
+            self._trajectory,
+            self._exists,
+            self._timeline.table,
+            self._timeline.collided | self._touched(),
+            float(self._broke_off.mean()),
         )
 
     def _touched(self) -> Bool[np.ndarray, "draw body"]:
@@ -205,6 +211,7 @@ class Counterfactual:
         times = np.append(frames[own], stop)
         active = np.flatnonzero(self._reached.any(axis=1))
         stretch = advance(self._worlds.select(active.tolist()), state.select(active), times, self._model)
+        self._broke_off[active] |= stretch.broke_off
         self._spread(stretch, active)
         self._record(stretch, active, own, stop)
         after = state.copy()

@@ -112,7 +112,7 @@ def _open_answer(facts: Facts, asked: _Asked) -> Answer:
         entropy=entropy(shares),
         distribution=_distribution(names, shares),
         relies_on_default=_relies_on_default(facts, [run]),
-        notes=_notes([run]),
+        notes=_notes(facts, [run]),
     )
 
 
@@ -148,7 +148,7 @@ def _choice_answer(facts: Facts, asked: _Asked) -> Answer:
         distribution=_distribution(tuple(names), shares),
         choices=choices,
         relies_on_default=_relies_on_default(facts, runs),
-        notes=_notes(runs),
+        notes=_notes(facts, runs),
     )
 
 
@@ -184,11 +184,13 @@ def _relies_on_default(facts: Facts, runs: list[Run]) -> tuple[str, ...]:
     return tuple(body.id for body in facts.bodies if body.id in found)
 
 
-def _notes(runs: list[Run]) -> tuple[str, ...]:
+def _notes(facts: Facts, runs: list[Run]) -> tuple[str, ...]:
     notes: dict[str, None] = {}
     for run in runs:
         if run.reasons:
             share = max(1 - float(run.valid.mean()), 0.001)
             reasons = "; ".join(dict.fromkeys(run.reasons))
             notes[f"In {share:.1%} of the draws the question makes no sense ({reasons}); the others answer it."] = None
+        for world in sorted(run.looked_at, key=str):
+            notes.update(dict.fromkeys(facts.limits(world)))
     return tuple(notes)

@@ -88,6 +88,10 @@ class Facts(Protocol):
         """Objects of default mass or restitution that decide what happens after the video (`future`) or in a change."""
         ...
 
+    def limits(self, world: "str | tuple[Change, int]") -> tuple[str, ...]:
+        """What limits the simulation of that world, in sentences."""
+        ...
+
 
 def attribute_values(name: str, bodies: tuple[Body, ...]) -> tuple[str, ...]:
     """The values that an attribute can have in a video, the data set's own first."""
@@ -173,6 +177,11 @@ class TableFacts:
         return self.changed.get((change, body)) or EventTable.empty(self.video.universe, self.draws)
 
     def relies_on_default(self, world: str | tuple[Change, int]) -> tuple[str, ...]:
+        """Nothing: the tables are given."""
+        del world
+        return ()
+
+    def limits(self, world: str | tuple[Change, int]) -> tuple[str, ...]:
         """Nothing: the tables are given."""
         del world
         return ()

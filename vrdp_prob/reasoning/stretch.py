@@ -9,6 +9,7 @@ from jaxtyping import Bool, Float, Int
 
 from vrdp_prob.models.physics import PhysicsModel
 from vrdp_prob.models.simulator.events import RolloutEventKind
+from vrdp_prob.models.simulator.outcome import Outcome
 from vrdp_prob.models.simulator.rollout import simulate
 from vrdp_prob.models.simulator.worlds import Worlds
 
@@ -91,6 +92,8 @@ class Stretch:
         Whether a body is present and released.
     contacts
         Contacts of bodies; of an unbroken series of contacts of the same pair the first.
+    broke_off
+        Draws whose simulation broke off (see `Outcome`); bodies are where they were then.
     """
 
     times: Float[np.ndarray, "time"]
@@ -100,6 +103,7 @@ class Stretch:
     spin: Float[np.ndarray, "draw time body"]
     exists: Bool[np.ndarray, "draw time body"]
     contacts: Meeting
+    broke_off: Bool[np.ndarray, "draw"]
 
     def meetings(self) -> Iterator[Meeting]:
         """First contacts of all draws, then second contacts, and so on: every draw in order of time."""
@@ -156,6 +160,7 @@ def advance(worlds: Worlds, state: State, times: Float[np.ndarray, "time"], mode
             np.asarray(events.second[order], dtype=np.int64),
             np.asarray(events.point[order], dtype=float),
         ),
+        np.array([outcome not in (Outcome.OK, Outcome.OVERLAP) for outcome in rollout.outcome]),
     )
 
 

@@ -102,6 +102,8 @@ class WorldDraws:
         What happens.
     collided
         Bodies whose course was decided by a simulated contact.
+    broke_off
+        Share of the draws whose simulation broke off.
     """
 
     times: Float[np.ndarray, "frame"]
@@ -109,3 +111,4 @@ class WorldDraws:
     exists: Bool[np.ndarray, "draw frame body"]
     events: EventTable
     collided: Bool[np.ndarray, "draw body"]
+    broke_off: float

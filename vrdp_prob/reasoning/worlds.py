@@ -169,13 +169,22 @@ class PosteriorWorlds:
 
     def relies_on_default(self, world: str | tuple[Change, int]) -> tuple[str, ...]:
         """Objects of default mass or restitution whose collisions decide what happens in a simulated world."""
-        collided = (self.future if isinstance(world, str) else self.counterfactual(*world)).collided
-        share = collided.mean(axis=0)
+        share = self._world(world).collided.mean(axis=0)
         return tuple(
             body.id
             for body, part in zip(self.bodies, share, strict=True)
             if part > RELEVANT_SHARE and self._is_default(body.id)
         )
+
+    def limits(self, world: str | tuple[Change, int]) -> tuple[str, ...]:
+        """What limits a simulated world, in sentences."""
+        share = self._world(world).broke_off
+        if share == 0:
+            return ()
+        return (f"In {max(share, 0.001):.1%} of the draws the simulation of a world broke off early.",)
+
+    def _world(self, world: str | tuple[Change, int]) -> WorldDraws:
+        return self.future if isinstance(world, str) else self.counterfactual(*world)
 
     def turning(self, body: int, time: float) -> tuple[Float[np.ndarray, "draw"], Float[np.ndarray, "draw"]]:
         """Angle (rad) and spin (rad/s) of a body in every draw.
@@ -250,4 +259,5 @@ class PosteriorWorlds:
             timeline.note_meeting(meeting, late)
         timeline.note_crossings(stretch.times, stretch.position, stretch.exists, np.ones_like(timeline.collided))
         trajectory = np.concatenate([stretch.position, stretch.angle[..., None]], axis=-1)
-        return WorldDraws(stretch.times, trajectory, stretch.exists, timeline.table, timeline.collided)
+        broke_off = float(stretch.broke_off.mean())
+        return WorldDraws(stretch.times, trajectory, stretch.exists, timeline.table, timeline.collided, broke_off)

@@ -22,6 +22,8 @@ from vrdp_prob.scene import Choice, Question, Tracks
 
 UNUSABLE_INPUT = 2
 FAILURE = 1
+INTERRUPTED = 130
+"""What the command-line library makes of Ctrl-C."""
 DEFAULT_SAMPLER: SamplerName = "emcee"
 
 app = typer.Typer(
@@ -184,14 +186,20 @@ def run(arguments: list[str]) -> int:
     except InputError as error:
         return _refuse(str(error))
     except (KeyboardInterrupt, typer.Abort):
-        print("vrdp-prob: interrupted; nothing half-written was left behind.", file=sys.stderr)
-        return FAILURE
+        return _interrupted()
     except Exception as error:
         # usage errors of the command-line library, whose classes moved between its versions
         if not hasattr(error, "format_message"):
             raise
         return _refuse(f"{error.format_message().rstrip('.')}; see vrdp-prob --help.")
+    if result == INTERRUPTED:
+        return _interrupted()
     return result if isinstance(result, int) else 0
+
+
+def _interrupted() -> int:
+    print("vrdp-prob: interrupted; nothing half-written was left behind.", file=sys.stderr)
+    return FAILURE
 
 
 def _refuse(message: str) -> int:

@@ -7,7 +7,7 @@ from test_seen import CHAIN
 
 from vrdp_prob.errors import InputError
 from vrdp_prob.inference import Status
-from vrdp_prob.reasoning import Change, PosteriorWorlds, ask
+from vrdp_prob.reasoning import Change, PosteriorWorlds, ask, infer
 
 DRAWS = 30
 
@@ -123,3 +123,16 @@ def test_an_answer_says_that_a_simulation_broke_off(monkeypatch: pytest.MonkeyPa
         worlds_of(discs, 26), "What will happen next?", choices=["The red object collides with the blue object"]
     )
     assert any("broke off early" in note for note in answer.notes)
+
+
+@pytest.mark.slow
+def test_an_inferred_posterior_answers() -> None:
+    discs = (Disc((-1.5, 0.0), (1.6, 0.0)), Disc((0.0, 0.05)), Disc((0.9, 0.15)))
+    posterior = infer(tracks_of(discs, 60), sampler="laplace", draws=100)
+    assert posterior.ask("How many collisions happen?").answer == 2
+    answer = posterior.ask(
+        "If the red object is removed, which event will not happen?",
+        choices=["The blue object collides with the green object"],
+    )
+    assert answer.choices[0].probability > 0.9
+    assert posterior.all_worlds is posterior.all_worlds

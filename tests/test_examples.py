@@ -1,0 +1,44 @@
+"""The examples run as they stand."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+EXAMPLES = Path(__file__).parents[1] / "examples"
+
+
+def run_example(name: str, folder: Path) -> str:
+    """Run a script in an empty folder; return what it prints."""
+    command = [sys.executable, str(EXAMPLES / name)]
+    environment = os.environ | {"OMP_NUM_THREADS": "1"}
+    finished = subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, check=False)
+    assert finished.returncode == 0, finished.stderr
+    assert finished.stderr == ""
+    return finished.stdout
+
+
+def test_ask_a_question(tmp_path: Path) -> None:
+    printed = run_example("ask_a_question.py", tmp_path)
+    assert "How many collisions happen?" in printed
+    assert printed.count("%") >= 3
+
+
+def test_report_on_a_video(tmp_path: Path) -> None:
+    printed = run_example("report_on_a_video.py", tmp_path)
+    paths = [tmp_path / line for line in printed.splitlines()]
+    assert [path.name for path in paths] == ["report.html", "report.json", "posterior.nc"]
+    assert all(path.stat().st_size > 1000 for path in paths)
+
+
+def test_your_own_tracks(tmp_path: Path) -> None:
+    printed = run_example("your_own_tracks.py", tmp_path)
+    mean = float(printed.split("mass of B: ")[1].split(" kg")[0])
+    assert mean == pytest.approx(0.036, rel=0.02)
+
+
+def test_every_example_is_run() -> None:
+    scripts = {path.name for path in EXAMPLES.glob("*.py")}
+    assert scripts == {"ask_a_question.py", "report_on_a_video.py", "your_own_tracks.py"}

@@ -1,7 +1,8 @@
 """Accuracy and Brier score of answers on the practice scenes, by type of question.
 
     python benchmarks/questions.py [--scenes A:B] [--input tracks|videos|truth] [--parameters inferred|true]
-                                   [--sampler laplace|emcee|nuts] [--draws N] [--misses] [--json FILE]
+                                   [--sampler laplace|emcee|nuts] [--defaults fixed|prior]
+                                   [--draws N] [--english] [--misses] [--json FILE]
 
 `--input truth` fills the event tables from the truth files: programs, operations and language without any physics.
 `--parameters true` takes masses and restitutions from the truth files: the ceiling of what better inference can reach.
@@ -92,6 +93,7 @@ def _arguments() -> argparse.Namespace:
     parser.add_argument("--input", choices=("tracks", "videos", "truth"), default="tracks")
     parser.add_argument("--parameters", choices=("inferred", "true"), default="inferred")
     parser.add_argument("--sampler", choices=("laplace", "emcee", "nuts"), default="laplace")
+    parser.add_argument("--defaults", choices=("fixed", "prior"), default="fixed", help="objects that never collided")
     parser.add_argument("--draws", type=int, default=400)
     parser.add_argument(
         "--english", action="store_true", help="parse the English, leave the programs of the file aside"
@@ -108,7 +110,8 @@ def _facts(scene: int, arguments: argparse.Namespace) -> Facts:
     tracks = load(DATA / "videos" / f"{name}.mp4") if arguments.input == "videos" else load(DATA, video=name)
     if arguments.parameters == "true":
         return PosteriorWorlds(TruePosterior(tracks, DATA / "truth"), draws=arguments.draws)
-    return PosteriorWorlds(infer(tracks, sampler=arguments.sampler), draws=arguments.draws)
+    posterior = infer(tracks, sampler=arguments.sampler)
+    return PosteriorWorlds(posterior, draws=arguments.draws, defaults=arguments.defaults)
 
 
 def _kind(question: Question) -> str:

@@ -136,3 +136,13 @@ def test_an_inferred_posterior_answers() -> None:
     )
     assert answer.choices[0].probability > 0.9
     assert posterior.all_worlds is posterior.all_worlds
+
+
+def test_defaults_drawn_from_the_prior_widen_what_is_simulated() -> None:
+    discs = (Disc((-1.5, 0.0), (1.8, 0.0)), Disc((1.0, 0.05)))
+    posterior = KnownPosterior(tracks_of(discs, 26), discs, statuses=(Status.DEFAULT, Status.IDENTIFIED))
+    spread = {}
+    for defaults in ("fixed", "prior"):
+        worlds = PosteriorWorlds(posterior, draws=100, defaults=defaults)
+        spread[defaults] = worlds.future.trajectory[:, -1, 1, 0].std()
+    assert spread["prior"] > 1.2 * spread["fixed"]

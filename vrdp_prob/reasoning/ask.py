@@ -9,6 +9,7 @@ from vrdp_prob.inference import Posterior, SamplerName
 from vrdp_prob.models.physics import PhysicsModel
 from vrdp_prob.progress import ProgressDisplay
 from vrdp_prob.reasoning.answer import Answer
+from vrdp_prob.reasoning.defaults import Defaults
 from vrdp_prob.reasoning.executor import ChoiceInput, answer_question
 from vrdp_prob.reasoning.facts import Facts
 from vrdp_prob.reasoning.worlds import DRAWS, PosteriorLike, PosteriorWorlds
@@ -21,6 +22,7 @@ def ask(
     *,
     choices: Sequence[ChoiceInput] = (),
     draws: int = DRAWS,
+    defaults: Defaults = "fixed",
     progress: ProgressDisplay | None = None,
 ) -> Answer:
     """Answer a question about a video with probabilities.
@@ -35,6 +37,9 @@ def ask(
         Options of a multiple-choice question, in English or as programs.
     draws
         Number of posterior draws to use, where `known` is a posterior.
+    defaults
+        Whether objects that never collided have default mass and restitution (`fixed`) or values drawn from the prior
+        (`prior`), where `known` is a posterior.
     progress
         Who follows the simulation, where `known` is a posterior.
 
@@ -44,10 +49,10 @@ def ask(
         If the question is not understood, names an object that is not there or that two objects fit, or needs choices
         and has none.
     """
-    if isinstance(known, AskablePosterior):
+    if isinstance(known, AskablePosterior) and (draws, defaults) == (DRAWS, "fixed"):
         facts: Facts = known.all_worlds
     elif isinstance(known, PosteriorLike):
-        facts = PosteriorWorlds(known, draws=draws, progress=progress)
+        facts = PosteriorWorlds(known, draws=draws, defaults=defaults, progress=progress)
     else:
         facts = known
     return answer_question(facts, question, choices=choices)

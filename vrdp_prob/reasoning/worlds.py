@@ -19,6 +19,7 @@ from vrdp_prob.models.simulator.rollout import Rollout, simulate
 from vrdp_prob.models.simulator.worlds import Worlds
 from vrdp_prob.progress import ProgressDisplay, SilentProgress
 from vrdp_prob.reasoning.counterfactual import Counterfactual
+from vrdp_prob.reasoning.defaults import DEFAULT, Defaults, with_defaults
 from vrdp_prob.reasoning.events import EventTable
 from vrdp_prob.reasoning.facts import Motion, draw_attributes
 from vrdp_prob.reasoning.friction import OwnFriction, apply_friction, own_friction, with_friction_ratio
@@ -37,8 +38,6 @@ FUTURE_FRAMES = 58
 
 RELEVANT_SHARE = 0.01
 """An object counts as one that an answer depends on if it collides in this share of the draws."""
-
-DEFAULT = "default"
 
 
 @runtime_checkable
@@ -90,18 +89,33 @@ class PosteriorWorlds:
         The posterior of one video.
     draws
         Number of posterior draws to use.
+    defaults
+        Whether an object that never collided has default mass and restitution (`fixed`), or values drawn from the prior
+        (`prior`).
     progress
         Who follows the simulation of each world.
+
+    Raises
+    ------
+    InputError
+        If there is no draw, or `defaults` is neither.
     """
 
     def __init__(
-        self, posterior: PosteriorLike, *, draws: int = DRAWS, progress: ProgressDisplay | None = None
+        self,
+        posterior: PosteriorLike,
+        *,
+        draws: int = DRAWS,
+        defaults: Defaults = "fixed",
+        progress: ProgressDisplay | None = None,
     ) -> None:
         if draws < 1:
             raise InputError(f"draws is {draws}; ask for at least 1.")
         self.posterior = posterior
         self._progress = progress or SilentProgress()
-        self._drawn = posterior.worlds(draws)
+        statuses = [(str(status.mass.status), str(status.restitution.status)) for status in self._statuses()]
+        generator = np.random.default_rng((posterior.seed, 7))
+        self._drawn = with_defaults(posterior.worlds(draws), statuses, defaults, generator)
         self._seen = SeenVideo(posterior.tracks, len(self._drawn), posterior.seed)
         self._changed: dict[tuple[Change, int], WorldDraws] = {}
 
@@ -231,6 +245,9 @@ class PosteriorWorlds:
         if self._friction is None:
             return self._drawn
         return apply_friction(self._extended[0], self._friction.log_ratio)
+
+    def _statuses(self) -> list[BodyStatus]:
+        return [self.posterior.status[body.id] for body in self.bodies]
 
     def _is_default(self, body: str) -> bool:
         status = self.posterior.status[body]

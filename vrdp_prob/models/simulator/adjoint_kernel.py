@@ -118,7 +118,7 @@ def read_frames(world, adjoint, group, begin, end, times, states_bar):
         share = share_of(world, group, times[frame])
         for slot in range(GROUP_SIZE):
             body = group * GROUP_SIZE + slot
-            if world.phase[body, ALIVE] != 0.0:
+            if world.phase[body, ALIVE] != 0.0 and not world.kind[body, FIXED]:
                 bar = states_bar[frame, body]
                 evaluate_rate(world.polynomial[group], slot, share, world.clock[group, LENGTH], rate)
                 shift = read(adjoint, group, slot, share, bar, rate)
@@ -132,10 +132,12 @@ def read(adjoint, group, slot, share, bar, rate):
     shift = 0.0
     for c in range(STATE_SIZE):
         shift += bar[c] * rate[c]
-        factor = bar[c]
-        for power in range(DENSE.shape[0]):
-            adjoint.polynomial[group, power, slot, c] += factor
-            factor *= share
+    factor = 1.0
+    for power in range(DENSE.shape[0]):
+        out = adjoint.polynomial[group, power, slot]
+        for c in range(STATE_SIZE):
+            out[c] += factor * bar[c]
+        factor *= share
     return shift
 
 
@@ -145,11 +147,15 @@ def reverse_step(world, adjoint, group, t, h):
     for slot in range(GROUP_SIZE):
         for c in range(STATE_SIZE):
             adjoint.state[group, slot, c] = adjoint.polynomial[group, 0, slot, c]
-            for stage in range(STAGES):
-                total = 0.0
-                for power in range(1, DENSE.shape[0]):
-                    total += DENSE[power, stage] * adjoint.polynomial[group, power, slot, c]
-                adjoint.stages[stage, slot, c] = h * total
+        for stage in range(STAGES):
+            out = adjoint.stages[stage, slot]
+            for c in range(STATE_SIZE):
+                out[c] = 0.0
+            for power in range(1, DENSE.shape[0]):
+                weight = h * DENSE[power, stage]
+                if weight != 0.0:
+                    for c in range(STATE_SIZE):
+                        out[c] += weight * adjoint.polynomial[group, power, slot, c]
     compute_stages(world, group, t, h, 0, STAGES)
     before = adjoint.local[VALUE_A]
     for stage in range(STAGES - 1, -1, -1):
@@ -175,8 +181,11 @@ def reverse_step(world, adjoint, group, t, h):
             )
             for c in range(STATE_SIZE):
                 adjoint.state[group, slot, c] += before[c]
-                for earlier in range(stage):
-                    adjoint.stages[earlier, slot, c] += h * WEIGHTS[stage, earlier] * before[c]
+            for earlier in range(stage):
+                weight = h * WEIGHTS[stage, earlier]
+                if weight != 0.0:
+                    for c in range(STATE_SIZE):
+                        adjoint.stages[earlier, slot, c] += weight * before[c]
 
 
 @compiled

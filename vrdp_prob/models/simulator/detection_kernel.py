@@ -121,7 +121,7 @@ def bound(coefficients, order):
 @compiled
 def plane_bound(path, order):
     """Bound on the length of the difference vector or of a derivative of it, on [0, 1]."""
-    return math.hypot(bound(path[0], order), bound(path[1], order))
+    return math.sqrt(bound(path[0], order) ** 2 + bound(path[1], order) ** 2)
 
 
 @compiled
@@ -148,7 +148,7 @@ def touching_walk(gap, rate, curvature):
 def disc_disc(pairs, s, reach, curvature):
     """Gap of two discs."""
     dx, dy = value(pairs.local[0], s), value(pairs.local[1], s)
-    distance = math.hypot(dx, dy)
+    distance = math.sqrt(dx * dx + dy * dy)
     rate = (dx * slope(pairs.local[0], s) + dy * slope(pairs.local[1], s)) / max(distance, 1e-300)
     set_look(pairs, distance - reach, rate, curvature)
     set_feature(pairs, 0, 0.0, 0.0, 1.0)
@@ -172,7 +172,7 @@ def box_disc(pairs, s, half, flat, radius, box_is_second, curvature):
     if outside_x > 0.0 and outside_y > 0.0:
         kind = 0
         px, py = math.copysign(half, x), math.copysign(half_y, y)
-        distance = math.hypot(x - px, y - py)
+        distance = math.sqrt((x - px) ** 2 + (y - py) ** 2)
         nx, ny = (x - px) / distance, (y - py) / distance
         set_feature(pairs, 0, math.copysign(1.0, x), 0.0 if flat else math.copysign(1.0, y), 0.0)
     elif flat and outside_x > 0.0:

@@ -81,7 +81,7 @@ def _motion_source(effects: Sequence[Effect], layout: Layout) -> str:
     inputs = _Inputs(layout)
     time = inputs.recorder.input("t")
     state, constants = inputs.array("y", len(STATE)), inputs.array("body", len(layout.constants))
-    phase = inputs.array("phase", 5)
+    phase = inputs.array("phase", 4)
     body = inputs.view(state, constants, (phase[1], phase[2]))
     outputs = derivative(effects, time, body, Phase(phase[0], phase[3]), inputs.shared)
     arguments = "t, y, phase, body, shared"

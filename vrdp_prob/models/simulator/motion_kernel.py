@@ -11,6 +11,7 @@ import numpy as np
 from vrdp_prob.models.simulator.laws_kernel import GROUP_SIZE, SLIPS, STATE_SIZE, compiled, external, motion
 from vrdp_prob.models.simulator.tableau import DENSE, ERRORS, NODES, WEIGHTS
 from vrdp_prob.models.simulator.world_kernel import (
+    ALIVE,
     CONTINUES,
     ENDING,
     ENDING_BODY,
@@ -18,7 +19,6 @@ from vrdp_prob.models.simulator.world_kernel import (
     LENGTH,
     MOVING,
     ORIGIN,
-    PHASE_SIZE,
     REFERENCE_X,
     REFERENCE_Y,
     RESTING,
@@ -28,6 +28,7 @@ from vrdp_prob.models.simulator.world_kernel import (
     SPIN_STOPS,
     STEP,
     STOPS,
+    TRAVEL,
     UNTIL,
     evaluate,
     hold,
@@ -63,11 +64,14 @@ def derivatives(world, group, t, stage):
 def stage_state(world, group, stage, h):
     """State at which a stage is evaluated, into the work row."""
     for slot in range(GROUP_SIZE):
+        out = world.stages[STAGES, slot]
         for c in range(STATE_SIZE):
-            total = 0.0
-            for earlier in range(stage):
-                total += WEIGHTS[stage, earlier] * world.stages[earlier, slot, c]
-            world.stages[STAGES, slot, c] = world.polynomial[group, 0, slot, c] + h * total
+            out[c] = world.polynomial[group, 0, slot, c]
+        for earlier in range(stage):
+            weight = h * WEIGHTS[stage, earlier]
+            if weight != 0.0:
+                for c in range(STATE_SIZE):
+                    out[c] += weight * world.stages[earlier, slot, c]
 
 
 @compiled
@@ -86,8 +90,9 @@ def step_error(stages, h):
         for c in range(STATE_SIZE):
             third, fifth = 0.0, 0.0
             for stage in range(12):
-                third += ERRORS[0, stage] * stages[stage, slot, c]
-                fifth += ERRORS[1, stage] * stages[stage, slot, c]
+                if ERRORS[1, stage] != 0.0:
+                    third += ERRORS[0, stage] * stages[stage, slot, c]
+                    fifth += ERRORS[1, stage] * stages[stage, slot, c]
             scale = math.sqrt(fifth * fifth + 0.01 * third * third)
             if not math.isfinite(scale):
                 return math.inf
@@ -101,11 +106,26 @@ def set_polynomial(world, group, h):
     """Turn the stages of a step into the polynomial of its motion."""
     for power in range(1, DENSE.shape[0]):
         for slot in range(GROUP_SIZE):
+            out = world.polynomial[group, power, slot]
             for c in range(STATE_SIZE):
-                total = 0.0
-                for stage in range(STAGES):
-                    total += DENSE[power, stage] * world.stages[stage, slot, c]
-                world.polynomial[group, power, slot, c] = h * total
+                out[c] = 0.0
+            for stage in range(STAGES):
+                weight = h * DENSE[power, stage]
+                if weight != 0.0:
+                    for c in range(STATE_SIZE):
+                        out[c] += weight * world.stages[stage, slot, c]
+    note_travel(world, group)
+
+
+@compiled
+def note_travel(world, group):
+    """Bound how far each body of a group comes from where its piece begins."""
+    for slot in range(GROUP_SIZE):
+        x, y = 0.0, 0.0
+        for power in range(1, DENSE.shape[0]):
+            x += abs(world.polynomial[group, power, slot, 0])
+            y += abs(world.polynomial[group, power, slot, 1])
+        world.phase[group * GROUP_SIZE + slot, TRAVEL] = math.hypot(x, y)
 
 
 @compiled
@@ -150,7 +170,7 @@ def vanishing_share(polynomial, slot, phase, of_spin):
 def settle(world, body, t, y):
     """Set the phase of a body from its state; a resting body stays while friction can hold it."""
     phase = world.phase[body]
-    for c in range(PHASE_SIZE - 1):
+    for c in range(ALIVE):
         phase[c] = 0.0
     if world.kind[body, FIXED]:
         return

@@ -45,6 +45,7 @@ from vrdp_prob.models.simulator.world_kernel import (
     SHAPE,
     SPIN_SENSE,
     SQUARE,
+    TRAVEL,
     UNTIL,
     WALL,
 )
@@ -52,7 +53,7 @@ from vrdp_prob.models.simulator.world_kernel import (
 PRESSING_TIME = 0.02
 """Time in s after a contact within which the same two bodies count as pressing on each other when they meet again."""
 CLEARING = 1e-3
-"""Time in s between two looks at bodies that overlap."""
+"""Shortest time in s between two looks at bodies that overlap."""
 
 
 @compiled
@@ -60,6 +61,28 @@ def outer_radius(world, body):
     """Radius of a circle around the body's centre that holds it."""
     radius = world.body[body, RADIUS]
     return radius * math.sqrt(2.0) if world.kind[body, SHAPE] == SQUARE else radius
+
+
+@compiled
+def distance_of_pieces(world, i, j):
+    """Lower bound on the distance of two centres over their whole pieces."""
+    group_i, group_j = i // GROUP_SIZE, j // GROUP_SIZE
+    first = world.polynomial[group_i, 0, i - group_i * GROUP_SIZE]
+    second = world.polynomial[group_j, 0, j - group_j * GROUP_SIZE]
+    return (
+        math.sqrt((first[0] - second[0]) ** 2 + (first[1] - second[1]) ** 2)
+        - world.phase[i, TRAVEL]
+        - world.phase[j, TRAVEL]
+    )
+
+
+@compiled
+def passing_distance(path):
+    """Lower bound on the distance of two centres on the overlap: straight motion, less what acceleration can change."""
+    x, y, vx, vy = path[0, 0], path[1, 0], path[0, 1], path[1, 1]
+    square = vx * vx + vy * vy
+    s = min(1.0, max(0.0, -(x * vx + y * vy) / square)) if square > 0.0 else 0.0
+    return math.sqrt((x + s * vx) ** 2 + (y + s * vy) ** 2) - 0.5 * plane_bound(path, 2)
 
 
 @compiled
@@ -125,14 +148,20 @@ def search(world, pairs, i, j, t, end):
     duration = end - t
     if not duration > 0.0:
         return
-    set_path(world, pairs, i, j, t, duration)
+    # Too far apart to meet, whatever the way: by the whole pieces, then by the overlap of both.
     reach = outer_radius(world, i) + outer_radius(world, j)
-    # Too far apart to meet, whatever the way.
-    if math.hypot(pairs.local[0, 0], pairs.local[1, 0]) - plane_bound(pairs.local, 1) > reach:
-        pairs.table[i, j, OVERLAPPING] = 0
+    if distance_of_pieces(world, i, j) > reach:
+        pairs.table[i, j, OVERLAPPING] = 0.0
+        return
+    set_path(world, pairs, i, j, t, duration)
+    if passing_distance(pairs.local) > reach:
+        pairs.table[i, j, OVERLAPPING] = 0.0
         return
     curvature = np.zeros(2)
     set_curvature(world, pairs, i, j, curvature)
+    turning = outer_radius(world, i) * bound(pairs.local[ANGLE_FIRST], 1)
+    turning += outer_radius(world, j) * bound(pairs.local[ANGLE_FIRST + 1], 1)
+    fastest = plane_bound(pairs.local, 1) + turning
     s = 0.0
     while s <= 1.0:
         code = look(world, pairs, i, j, s, curvature)
@@ -141,7 +170,7 @@ def search(world, pairs, i, j, t, end):
             if gap >= 0.0:
                 pairs.table[i, j, OVERLAPPING] = 0
             else:
-                s += CLEARING / duration
+                s += max(-gap / fastest, CLEARING / duration)
             continue
         if gap <= TOUCHING and (rate < -SLOW or (gap <= -SLACK and rate < 0.0)):
             pairs.table[i, j, CONTACT_TIME] = t + s * duration

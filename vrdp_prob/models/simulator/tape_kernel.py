@@ -9,7 +9,16 @@ from typing import NamedTuple
 import numpy as np
 
 from vrdp_prob.models.simulator.laws_kernel import GROUP_SIZE, STATE_SIZE, compiled
-from vrdp_prob.models.simulator.world_kernel import ALIVE, LENGTH, ORIGIN, PHASE_SIZE, evaluate, evaluate_at, share_of
+from vrdp_prob.models.simulator.world_kernel import (
+    ALIVE,
+    FIXED,
+    LENGTH,
+    ORIGIN,
+    PHASE_SIZE,
+    evaluate,
+    evaluate_at,
+    share_of,
+)
 
 # Kinds of rows.
 PIECE, CONTINUE, RELEASE, STOP, SPIN_STOP, CONTACT = 0, 1, 2, 3, 4, 5
@@ -99,7 +108,8 @@ def write_frames(tape, world, group, until):
     row = tape.place[group, ROW]
     for slot in range(GROUP_SIZE):
         body = group * GROUP_SIZE + slot
-        if world.phase[body, ALIVE] == 0.0:
+        # What cannot move shows its state from the start.
+        if world.phase[body, ALIVE] == 0.0 or world.kind[body, FIXED]:
             continue
         frame = tape.place[body, FRAME]
         tape.integers[row, FRAME_BEGIN] = frame

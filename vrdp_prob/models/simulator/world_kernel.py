@@ -19,8 +19,8 @@ DISC, SQUARE, WALL = 0, 1, 2
 SHAPE, FIXED, PRESENT = 0, 1, 2
 RADIUS = 4
 RELEASE_TIME = STATE_SIZE
-MOVING, REFERENCE_X, REFERENCE_Y, SPIN_SENSE, ALIVE = 0, 1, 2, 3, 4
-PHASE_SIZE = 5
+MOVING, REFERENCE_X, REFERENCE_Y, SPIN_SENSE, ALIVE, TRAVEL = 0, 1, 2, 3, 4, 5
+PHASE_SIZE = 6
 RESTING, SLIDING, SLIPPING = 0.0, 1.0, 2.0
 ORIGIN, LENGTH, UNTIL, STEP, ENDING, ENDING_BODY = 0, 1, 2, 3, 4, 5
 CONTINUES, STOPS, SPIN_STOPS, LASTS = 0.0, 1.0, 2.0, 3.0
@@ -36,7 +36,7 @@ class World(NamedTuple):
     body: np.ndarray  # [body, constant]
     shared: np.ndarray  # [parameter]
     start: np.ndarray  # [body, (state at release, release time in s)]
-    phase: np.ndarray  # [body, (moving, reference x, reference y, spin sense, alive)]
+    phase: np.ndarray  # [body, (moving, reference x, reference y, spin sense, alive, bound on the way)]
     clock: np.ndarray  # [group, (origin, length, end of validity, next step, how it ends, for which body)], s
     polynomial: np.ndarray  # [group, power, slot, state]
     stages: np.ndarray  # [stage and one for work, slot, state]
@@ -63,20 +63,22 @@ def new_world(kind, body, shared, start):
 def evaluate(polynomial, slot, share, out):
     """State of one body at a share of its piece."""
     for c in range(STATE_SIZE):
-        total = 0.0
-        for power in range(polynomial.shape[0] - 1, -1, -1):
-            total = total * share + polynomial[power, slot, c]
-        out[c] = total
+        out[c] = polynomial[DENSE.shape[0] - 1, slot, c]
+    for power in range(DENSE.shape[0] - 2, -1, -1):
+        for c in range(STATE_SIZE):
+            out[c] = out[c] * share + polynomial[power, slot, c]
 
 
 @compiled
 def evaluate_rate(polynomial, slot, share, length, out):
     """Time derivative of the state of one body at a share of its piece."""
     for c in range(STATE_SIZE):
-        total = 0.0
-        for power in range(polynomial.shape[0] - 1, 0, -1):
-            total = total * share + power * polynomial[power, slot, c]
-        out[c] = total / length
+        out[c] = 0.0
+    for power in range(DENSE.shape[0] - 1, 0, -1):
+        for c in range(STATE_SIZE):
+            out[c] = out[c] * share + power * polynomial[power, slot, c]
+    for c in range(STATE_SIZE):
+        out[c] /= length
 
 
 @compiled
@@ -114,3 +116,5 @@ def hold(world, group, t):
         for slot in range(GROUP_SIZE):
             for c in range(STATE_SIZE):
                 world.polynomial[group, power, slot, c] = 0.0
+    for slot in range(GROUP_SIZE):
+        world.phase[group * GROUP_SIZE + slot, TRAVEL] = 0.0

@@ -100,7 +100,10 @@ def _arguments() -> argparse.Namespace:
     )
     parser.add_argument("--misses", action="store_true", help="print every wrong answer to standard error")
     parser.add_argument("--json", type=Path)
-    return parser.parse_args()
+    arguments = parser.parse_args()
+    if arguments.parameters == "true" and arguments.input == "videos":
+        parser.error("--parameters true needs --input tracks: objects found in a video have names of their own")
+    return arguments
 
 
 def _facts(scene: int, arguments: argparse.Namespace) -> Facts:

@@ -7,7 +7,8 @@
 import numpy as np
 from numba import njit
 
-from vrdp_prob.models.simulator.adjoint_kernel import Adjoint, reverse_world
+from vrdp_prob.models.simulator.adjoint_events_kernel import reverse_world
+from vrdp_prob.models.simulator.adjoint_kernel import Adjoint
 from vrdp_prob.models.simulator.detection_kernel import new_pairs
 from vrdp_prob.models.simulator.laws_kernel import GROUP_SIZE, STATE_SIZE, compiled
 from vrdp_prob.models.simulator.motion_kernel import STAGES

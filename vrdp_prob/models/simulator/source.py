@@ -23,7 +23,7 @@ from vrdp_prob.models.simulator.laws import STATE, Layout, law_source
 CACHE_VARIABLE = "VRDP_PROB_CACHE"
 """Environment variable that names another folder for compiled kernels."""
 
-_KERNELS = ("world", "motion", "detection", "search", "tape", "rollout", "adjoint", "batch")
+_KERNELS = ("world", "motion", "detection", "search", "tape", "rollout", "adjoint", "adjoint_events", "batch")
 _HEADER = '"""Assembled by vrdp_prob.models.simulator.source; do not edit."""\n\n'
 
 

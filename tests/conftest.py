@@ -1,16 +1,15 @@
 """Shapes in annotations are checked at run time, in every module that is not compiled."""
 
-import pkgutil
 from pathlib import Path
 
 import pytest
 from jaxtyping import install_import_hook
 
-PACKAGE = Path(__file__).parents[1] / "vrdp_prob"
-MODULES = [module.name for module in pkgutil.walk_packages([str(PACKAGE)], "vrdp_prob.") if not module.ispkg]
-CHECKED = [name for name in MODULES if not name.endswith("_kernel") and not name.endswith("__main__")]
+ROOT = Path(__file__).parents[1]
+MODULES = [".".join(path.relative_to(ROOT).with_suffix("").parts) for path in sorted(ROOT.glob("vrdp_prob/**/*.py"))]
+CHECKED = [name for name in MODULES if not name.endswith(("_kernel", "__init__"))]
 
-install_import_hook(CHECKED, "beartype.beartype")
+install_import_hook(CHECKED, "shape_checker.check")
 
 SHARED_DATA = Path(__file__).parents[2] / "shared" / "data"
 

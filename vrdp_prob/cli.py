@@ -1,4 +1,4 @@
-"""The command line: `vrdp-prob report`, `ask`, `demo` and `calibrate-camera`.
+"""The command line: `vrdp-prob report`, `ask`, `demo`, `calibrate-camera` and `compile`.
 
 Exit code 0: done; 2: input that cannot be used (one line says what, where, and how to mend it); 1: anything else.
 """
@@ -6,14 +6,15 @@ Exit code 0: done; 2: input that cannot be used (one line says what, where, and 
 import json
 import sys
 from pathlib import Path
-from typing import Annotated, cast, get_args
+from typing import Annotated, get_args
 
 import typer
 
 from vrdp_prob.datasets import load, load_all, read_questions, video_files
 from vrdp_prob.errors import InputError
-from vrdp_prob.inference import SamplerName
+from vrdp_prob.inference import SamplerName, default_model
 from vrdp_prob.models.physics import PhysicsModel
+from vrdp_prob.models.simulator.rollout import compile_model
 from vrdp_prob.progress import progress_display
 from vrdp_prob.reasoning import Answer, ask, infer
 from vrdp_prob.report.pipeline import Report
@@ -76,7 +77,7 @@ def report(
             directory=out if len(videos) == 1 else out / tracks.video,
             video_file=files.get(tracks.video),
             model=physics,
-            sampler=cast(SamplerName, sampler),
+            sampler=sampler,
             seed=seed,
             progress=progress,
         )
@@ -104,7 +105,7 @@ def ask_question(
         raise InputError('the question is empty; ask one, for example "What will happen next?" with --choice options.')
     asked = Question(question, choices=tuple(Choice(number, text) for number, text in enumerate(choice or ())))
     tracks = load(path, video=video, camera=camera, progress=progress)
-    posterior = infer(tracks, sampler=cast(SamplerName, sampler), model=_model(model), seed=seed, progress=progress)
+    posterior = infer(tracks, sampler=sampler, model=_model(model), seed=seed, progress=progress)
     answer = ask(posterior, asked, progress=progress)
     if as_json:
         print(json.dumps(answer.to_document(), allow_nan=False))
@@ -152,6 +153,12 @@ def calibrate_camera(
     camera.write(out)
     if not quiet:
         print(f"{out}: reprojection error {camera.pixel_sd:.2f} pixels per coordinate", file=sys.stderr)
+
+
+@app.command(name="compile")
+def compile_simulator(model: Model = None) -> None:
+    """Compile the simulator now, once per machine and model, rather than in the first run."""
+    compile_model(default_model() if model is None else _model(model))
 
 
 def demo_folder() -> Path:

@@ -49,8 +49,9 @@ def test_energy_never_grows(shapes: tuple[object, ...]) -> None:
     worlds = random_worlds(20, shapes, seed=5, walls=True)
     rollout = simulate(worlds, FRAMES)
     growth = energy(worlds, rollout).diff(dim=1).max()
-    # A hop of pressing bodies may gain HOP^2 / 2 times their effective mass.
-    assert growth <= 1e-10 or growth <= 50 * HOP**2 / 2 * worlds.mass.max()
+    # A hop of pressing bodies may gain the energy of their rebound, and some hops may lie between two frames.
+    hop = HOP * worlds.radius.max()
+    assert growth <= 1e-10 or growth <= 5 * hop**2 / 2 * worlds.mass.max()
 
 
 @given(seed=st.integers(0, 2**32 - 1))

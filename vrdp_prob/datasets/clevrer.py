@@ -141,7 +141,7 @@ def _unwrapped(angles: np.ndarray) -> np.ndarray:
     return result
 
 
-def _question(place: str, entry: Document) -> Question:
+def _question(place: str, entry: Any) -> Question:
     try:
         text = entry["question"]
         kind = entry.get("question_type")

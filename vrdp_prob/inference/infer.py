@@ -36,7 +36,7 @@ def default_model() -> PhysicsModel:
 def infer(
     tracks: Tracks,
     *,
-    sampler: SamplerName = "emcee",
+    sampler: str = "emcee",
     model: PhysicsModel | None = None,
     seed: int = 0,
     draws: int = 1000,

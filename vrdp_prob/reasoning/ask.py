@@ -5,7 +5,7 @@ from dataclasses import dataclass, fields
 from functools import cached_property
 
 from vrdp_prob import inference
-from vrdp_prob.inference import Posterior, SamplerName
+from vrdp_prob.inference import Posterior
 from vrdp_prob.models.physics import PhysicsModel
 from vrdp_prob.progress import ProgressDisplay
 from vrdp_prob.reasoning.answer import Answer
@@ -80,7 +80,7 @@ class AskablePosterior(Posterior):
 def infer(
     tracks: Tracks,
     *,
-    sampler: SamplerName = "emcee",
+    sampler: str = "emcee",
     model: PhysicsModel | None = None,
     seed: int = 0,
     draws: int = 1000,

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 from jaxtyping import Bool, Float
@@ -46,6 +46,7 @@ class Motion:
         return np.asarray(places - nearer_before, dtype=int)
 
 
+@runtime_checkable
 class Facts(Protocol):
     """A video as the operations see it; every table has the same draws."""
 

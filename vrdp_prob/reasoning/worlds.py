@@ -74,6 +74,7 @@ class PosteriorLike(Protocol):
         ...
 
 
+@runtime_checkable
 class StatusByBody(Protocol):
     """A mapping from the id of a body to its status."""
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from vrdp_prob.files import check_writable
-from vrdp_prob.inference import Posterior, SamplerName, infer
+from vrdp_prob.inference import Posterior, infer
 from vrdp_prob.models.physics import PhysicsModel
 from vrdp_prob.perception.video import read_frames
 from vrdp_prob.progress import ProgressDisplay, SilentProgress
@@ -50,7 +50,7 @@ def report(
     directory: Path | str,
     questions: Sequence[Question | str] = (),
     video_file: Path | str | None = None,
-    sampler: SamplerName = "emcee",
+    sampler: str = "emcee",
     model: PhysicsModel | None = None,
     seed: int = 0,
     progress: ProgressDisplay | None = None,

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
 from vrdp_prob.errors import InputError
 from vrdp_prob.files import write_atomically
@@ -139,12 +139,13 @@ class Camera:
         jacobian: Float[np.ndarray, "*points 2 2"] = np.linalg.inv(forward)
         return jacobian
 
-    def in_view(self, positions: Float[np.ndarray, "*points 2"], height: float = REST_HEIGHT) -> np.ndarray:
+    def in_view(
+        self, positions: Float[np.ndarray, "*points 2"], height: float = REST_HEIGHT
+    ) -> Bool[np.ndarray, "*points"]:
         """Whether the points (x, y) at a height (m) appear inside the picture; boolean array with axes `*points`."""
         points = np.concatenate([positions, np.full((*positions.shape[:-1], 1), height)], axis=-1)
         homogeneous = points @ self.projection[:, :3].T + self.projection[:, 3]
         depth = homogeneous[..., 2]
         with np.errstate(divide="ignore", invalid="ignore"):
             u, v = homogeneous[..., 0] / depth, homogeneous[..., 1] / depth
-        inside: np.ndarray = (depth > 0) & (u >= 0) & (u <= self.width) & (v >= 0) & (v <= self.height)
-        return inside
+        return np.asarray((depth > 0) & (u >= 0) & (u <= self.width) & (v >= 0) & (v <= self.height))

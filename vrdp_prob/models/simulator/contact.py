@@ -11,18 +11,18 @@ from typing import TYPE_CHECKING
 
 from vrdp_prob.models.effects.effect import BodyView, ContactView
 from vrdp_prob.models.simulator.formula import Scalar
-from vrdp_prob.models.simulator.mathematics import cos, length, maximum, sin, where
+from vrdp_prob.models.simulator.mathematics import cos, length, maximum, minimum, sin, where
 
 if TYPE_CHECKING:
     from vrdp_prob.models.effects.effect import Effect
 
 
-HOP = 1e-3
-"""Slowest rebound in m/s of two bodies that press on each other.
+HOP = 0.05
+"""Slowest rebound of two bodies that press on each other, in radii (of the smaller) per second.
 
-They would meet infinitely often in finite time. They hop by less than a micrometre instead, which pushes as a lasting
-contact would, and may gain HOP^2 / 2 times their effective mass in energy. Bodies press when they meet again within
-`PRESSING_TIME` of `search_kernel.py`; all other contacts follow the restitution exactly.
+They would meet infinitely often in finite time. They hop by about a thousandth of their radius instead, which pushes as
+a lasting contact would, and may gain the energy of that hop. Bodies press when they meet again within `PRESSING_TIME`
+of `search_kernel.py`; all other contacts follow the restitution exactly.
 """
 
 
@@ -157,7 +157,7 @@ def contact(
     for effect in effects:
         restitution = effect.restitution(closing, restitution, a, b, parameters)
     rebound = restitution * closing
-    rebound = where(pressing > 0.5, maximum(rebound, HOP), rebound)
+    rebound = where(pressing > 0.5, maximum(rebound, HOP * minimum(a.radius, b.radius)), rebound)
     impulse = (closing + rebound) / arms.inverse_mass(normal)
     change_a, change_b = arms.after(normal, impulse)
     sliding = arms.relative_speed(tangent)

@@ -11,11 +11,13 @@ from jaxtyping import Bool, Float, Int
 from torch import Tensor
 
 from vrdp_prob.errors import InputError
+from vrdp_prob.models.parameters import Scope
 from vrdp_prob.models.physics import PhysicsModel
 from vrdp_prob.models.simulator.arrays import KernelArrays, kernel_arrays
 from vrdp_prob.models.simulator.events import EventTable, Tapes
 from vrdp_prob.models.simulator.outcome import Outcome
 from vrdp_prob.models.simulator.worlds import Worlds
+from vrdp_prob.scene import Shape
 
 EVENT_LIMIT = 10_000
 """Events of one world after which its simulation breaks off, unless the caller says otherwise."""
@@ -149,3 +151,37 @@ class _Simulation(torch.autograd.Function):
         if torch.is_grad_enabled():
             raise RuntimeError("simulate has a first derivative only; call backward or grad with create_graph=False.")
         return None, *ctx.run.backward(ctx.saved_tensors, bar)
+
+
+def compile_model(model: PhysicsModel | None = None) -> None:
+    """Compile the kernel of a model and its derivative now rather than in the first simulation.
+
+    The compiled code is kept in the user's cache, so this takes its half a minute once per machine and set of effects.
+
+    Parameters
+    ----------
+    model
+        The physics, the base model where none is given.
+    """
+    physics = PhysicsModel.base() if model is None else model
+    one = torch.ones(1, 1, dtype=torch.float64)
+    own = [parameter for parameter in physics.parameters if parameter.scope is Scope.BODY]
+    shared = [parameter for parameter in physics.parameters if parameter.scope is Scope.SHARED]
+    worlds = Worlds(
+        shapes=(Shape.CUBE,),
+        position=torch.zeros(1, 1, 2, dtype=torch.float64),
+        velocity=torch.ones(1, 1, 2, dtype=torch.float64, requires_grad=True),
+        angle=0 * one,
+        spin=one,
+        release_time=0 * one,
+        mass=one,
+        restitution=one,
+        radius=one,
+        present=torch.ones(1, 1, dtype=torch.bool),
+        parameters={
+            **{parameter.name: parameter.default * one for parameter in own},
+            **{parameter.name: parameter.default * one[0] for parameter in shared},
+        },
+    )
+    rollout = simulate(worlds, torch.tensor([0.0, 0.1], dtype=torch.float64), physics)
+    torch.autograd.grad(rollout.trajectory.sum(), worlds.velocity)

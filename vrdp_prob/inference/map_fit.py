@@ -229,7 +229,7 @@ def _pairs(likelihood: Likelihood, point: Float[np.ndarray, "dimension"]) -> set
 
 def _carry(
     source: Likelihood, point: Float[np.ndarray, "dimension"], target: Likelihood
-) -> Float[np.ndarray, "dimension"]:
+) -> Float[np.ndarray, "target_dimension"]:
     """The same values in the vector of another structure."""
     places = source.coordinates.places
     entries = target.coordinates.entries

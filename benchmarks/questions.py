@@ -18,8 +18,8 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
-from clevrer_truth import true_facts
-from true_posterior import TruePosterior
+from _clevrer_truth import true_facts
+from _true_posterior import TruePosterior
 
 from vrdp_prob.datasets import load, read_questions
 from vrdp_prob.errors import InputError

@@ -8,7 +8,7 @@ from jaxtyping import Bool, UInt8
 
 from vrdp_prob.perception.appearance import Appearance, Evidence
 from vrdp_prob.perception.placing import Placer
-from vrdp_prob.perception.region import Gain, apparent_radius, climb, paint, polygon_area
+from vrdp_prob.perception.region import Gain, Window, apparent_radius, climb, paint, polygon_area
 from vrdp_prob.perception.solids import Pose, Solid
 from vrdp_prob.scene.body import Shape
 
@@ -161,13 +161,10 @@ def _fills(
     explained: UInt8[np.ndarray, "height width"],
 ) -> bool:
     """Whether the solid's picture and the patch cover each other and enough of it shows."""
-    polygon = solid.polygon(placer.camera, pose)
-    window = paint(polygon, *wanted.shape)
-    free = (window.mask > 0) & (explained[window.place] == 0)
-    visible = int(free.sum())
-    if visible < _LEAST_VISIBLE * polygon_area(polygon):
+    window, free, shown = _visible(placer, solid, pose, explained)
+    if shown < _LEAST_VISIBLE:
         return False
-    filled = (wanted[window.place] & free).sum() / visible
+    filled = (wanted[window.place] & free).sum() / free.sum()
     covered = (patch[window.place] & (window.mask > 0)).sum() / patch.sum()
     return bool(filled >= _LEAST_FILLED and covered >= _LEAST_FILLED)
 
@@ -212,10 +209,15 @@ def _dark_share(
     explained: UInt8[np.ndarray, "height width"],
 ) -> float:
     """Share of the solid's visible picture that is dark; 0 where too little shows."""
+    window, free, shown = _visible(placer, solid, pose, explained)
+    return float((dark[window.place] & free).sum() / free.sum()) if shown >= _DARK_VISIBLE else 0.0
+
+
+def _visible(
+    placer: Placer, solid: Solid, pose: Pose, explained: UInt8[np.ndarray, "height width"]
+) -> tuple[Window, Bool[np.ndarray, "row column"], float]:
+    """A solid's window, its pixels there that nothing else explains, and their share of its whole picture."""
     polygon = solid.polygon(placer.camera, pose)
-    window = paint(polygon, *dark.shape)
+    window = paint(polygon, *explained.shape)
     free = (window.mask > 0) & (explained[window.place] == 0)
-    visible = int(free.sum())
-    if visible < _DARK_VISIBLE * polygon_area(polygon):
-        return 0.0
-    return float((dark[window.place] & free).sum() / visible)
+    return window, free, float(free.sum() / polygon_area(polygon))

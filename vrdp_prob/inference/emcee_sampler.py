@@ -81,10 +81,9 @@ def sample_emcee(
             for _ in range(STEPS_PER_ROUND // STEPS_TOGETHER):
                 list(workers.map(lambda ensemble: ensemble.run(STEPS_TOGETHER), ensembles))
                 advance(STEPS_TOGETHER)
-            chains = np.stack([ensemble.chain() for ensemble in ensembles])
-            if _good_enough(chains):
+            points = start.points(np.stack([ensemble.chain() for ensemble in ensembles]))
+            if _good_enough(points):
                 break
-    points = start.points(chains)
     log_density = np.stack([ensemble.log_density() for ensemble in ensembles])
     acceptance = np.stack([np.full(log_density.shape[1], ensemble.acceptance) for ensemble in ensembles])
     evaluations = adapting + sum(ensemble.evaluations for ensemble in ensembles)
@@ -161,6 +160,6 @@ def _independent(
     return proposed, log_density(places) - log_density(proposed)
 
 
-def _good_enough(chains: Float[np.ndarray, "chain draw dimension"]) -> bool:
-    r_hat, ess = chain_statistics(chains)
+def _good_enough(points: Float[np.ndarray, "chain draw dimension"]) -> bool:
+    r_hat, ess = chain_statistics(points)
     return r_hat <= R_HAT_GOAL and ess >= 1.25 * ESS_GOAL

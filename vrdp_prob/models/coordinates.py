@@ -27,7 +27,7 @@ class Coordinate:
     owner
         Body (or wall) that it belongs to; None where it is shared by the video.
     transform
-        What the vector holds: the quantity or its logarithm.
+        What the vector holds: the quantity, or (roughly) its logarithm.
     prior
         Prior in the vector's units.
     scale
@@ -110,8 +110,7 @@ class Coordinates:
             return values
         owners, places = (torch.tensor(column) for column in zip(*columns, strict=True))
         sampled = points[:, places]
-        logarithmic = self.entries[int(places[0])].transform is Transform.LOG
-        return values.index_copy(1, owners, sampled.exp() if logarithmic else sampled)
+        return values.index_copy(1, owners, self.entries[int(places[0])].transform.from_coordinate(sampled))
 
     def prior_residuals(self, points: Float[Tensor, "point dimension"]) -> Float[Tensor, "point residual"]:
         """Numbers whose half sum of squares is the negative log prior (up to a constant): normal terms, then edges."""

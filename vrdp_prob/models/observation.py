@@ -11,7 +11,7 @@ NOISE_SHARE_OF_RADIUS = 0.05
 """Prior median of the position noise as a share of the bodies' radius, where nobody measured it."""
 NOISE_WITHOUT_RADIUS = 0.01
 """Prior median of the position noise in m where no radius is known either."""
-ANGLE_NOISE = 0.02
+ANGLE_SD = 0.02
 """Prior median of the angle noise in rad."""
 NOISE_LOG_SD = 2.0
 """Prior standard deviation of the log noise scale: two orders of magnitude either way."""
@@ -59,7 +59,7 @@ class Observations:
         angle_frame, angle_body = np.nonzero(angle_seen)
         angles = tracks.angles
         angle = np.zeros(0) if angles is None else angles[angle_frame, angle_body]
-        return cls(frame, body, position, whitening, reference, angle_frame, angle_body, angle, ANGLE_NOISE)
+        return cls(frame, body, position, whitening, reference, angle_frame, angle_body, angle, ANGLE_SD)
 
     @property
     def angle_bodies(self) -> tuple[int, ...]:

@@ -162,7 +162,7 @@ def _stays(tracks: Tracks, body: int, noise: float, chosen: Bool[np.ndarray, "ti
     sd = _position_sd(tracks, body, noise)[chosen, None]
     scatter = float((((places - np.average(places, axis=0, weights=sd[:, 0] ** -2)) / sd) ** 2).sum())
     turning = 0.0 if tracks.angles is None else float(np.std(_finite(tracks.angles[chosen, body])))
-    return scatter <= freedom + REST_TEST * np.sqrt(2 * freedom) and turning <= STILL_ANGLE_SD
+    return bool(scatter <= freedom + REST_TEST * np.sqrt(2 * freedom)) and turning <= STILL_ANGLE_SD
 
 
 def _position_sd(tracks: Tracks, body: int, noise: float) -> Float[np.ndarray, "time"]:

@@ -130,11 +130,12 @@ def _chain(
 def _starting_points(
     density: LogDensity, start: Gaussian, generator: np.random.Generator
 ) -> list[Float[np.ndarray, "dimension"]]:
-    """Different starting points of good log density, in whitened coordinates."""
+    """Different starting points, drawn by importance, in whitened coordinates."""
     pool = generator.standard_normal((START_POOL, len(start.mean)))
     values = evaluate(density, start.points(pool))
     if np.isfinite(values).sum() < CHAINS:
         return [0.1 * place for place in pool[:CHAINS]]
     weights, _ = smoothed_weights(values + (pool**2).sum(axis=1) / 2)
-    best = np.argsort(-weights)[:CHAINS]
-    return [pool[index] for index in best]
+    flattened = weights**0.5
+    chosen = generator.choice(START_POOL, size=CHAINS, replace=False, p=flattened / flattened.sum())
+    return [pool[index] for index in chosen]

@@ -14,7 +14,7 @@ from vrdp_prob.inference.continuation import continued
 from vrdp_prob.inference.identifiability import BodyStatus
 from vrdp_prob.inference.samples import Convergence
 from vrdp_prob.inference.summaries import ObjectSummary, PairSummary, ParameterSummary, Summary
-from vrdp_prob.models.likelihood import worlds_of
+from vrdp_prob.models.scenery import Scenery
 from vrdp_prob.models.parameters import WALL_RESTITUTION
 from vrdp_prob.models.physics import PhysicsModel
 from vrdp_prob.models.simulator.worlds import Worlds
@@ -161,7 +161,7 @@ class Posterior:
         return PairSummary(pair, Summary.of(combine(first, second)))
 
     def _worlds(self, draws: xr.Dataset) -> Worlds:
-        return worlds_of(self.tracks, self.model, quantities(draws))
+        return Scenery.of(self.tracks).worlds(self.model, quantities(draws))
 
 
 def quantities(draws: xr.Dataset) -> dict[str, Float[Tensor, "world owner"]]:

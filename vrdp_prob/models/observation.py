@@ -3,7 +3,9 @@
 from dataclasses import dataclass
 
 import numpy as np
+import torch
 from jaxtyping import Bool, Float, Int
+from torch import Tensor
 
 from vrdp_prob.scene import Shape, Tracks
 
@@ -81,13 +83,14 @@ class Observations:
             self.angle_reference,
         )
 
-    def position_residuals(
-        self, trajectory: Float[np.ndarray, "world time body 3"]
-    ) -> Float[np.ndarray, "world observation 2"]:
-        """Whitened differences of predicted and seen positions (unit variance at noise scale 1)."""
-        difference = trajectory[:, self.frame, self.body, :2] - self.position
-        residuals: Float[np.ndarray, "world observation 2"] = np.einsum("oij,woj->woi", self.whitening, difference)
-        return residuals
+    def position_places(self, body_count: int) -> Int[Tensor, "coordinate"]:
+        """Places of the seen coordinates (x and y in turn) in a flattened trajectory [time, body, (x, y, angle)]."""
+        first = 3 * (self.frame * body_count + self.body)
+        return torch.from_numpy(np.stack([first, first + 1], axis=1).ravel())
+
+    def angle_places(self, body_count: int) -> Int[Tensor, "angle"]:
+        """Places of the measured angles in a flattened trajectory."""
+        return torch.from_numpy(3 * (self.angle_frame * body_count + self.angle_body) + 2)
 
 
 def prior_noise(tracks: Tracks) -> float:

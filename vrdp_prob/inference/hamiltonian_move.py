@@ -18,8 +18,8 @@ STEP_SPREAD = 0.2
 """Relative half width in which the step lengths of the walkers lie."""
 ACCEPTANCE = 0.8
 """Acceptance that tuning aims at (Neal advises 0.65 and more; kinks at contacts make caution pay)."""
-DIVERGENCE = 50.0
-"""Error in energy from which on a trajectory is given up."""
+FARTHEST = 30.0
+"""Whitened coordinate beyond which there is no support, so that no wild world is simulated."""
 TUNING_RATE = 0.7
 """Change of the log step per unit of excess acceptance."""
 
@@ -56,17 +56,20 @@ class HamiltonianMove(emcee.moves.Move):  # type: ignore[misc]  # emcee has no t
         length = self.step * (1 + STEP_SPREAD * random.uniform(-1, 1, size=(walkers, 1)))
         place, momentum = state.coords.copy(), random.standard_normal((walkers, dimension))
         energy = (momentum**2).sum(axis=1) / 2 - state.log_prob
-        fine = np.ones(walkers, dtype=bool)
-        _, gradient = self._density_and_gradient(place)
+        log_density, gradient = self._density_and_gradient(place)
         for _ in range(steps):
-            momentum = momentum + length / 2 * gradient
-            # A walker that has gone astray waits where it came from, so that no wild world is simulated for it.
-            place = np.where(fine[:, None], place + length * momentum, state.coords)
-            log_density, gradient = self._density_and_gradient(place)
-            momentum = momentum + length / 2 * gradient
-            gain = energy - (momentum**2).sum(axis=1) / 2 + log_density
-            fine &= gain > -DIVERGENCE
-        accepted = fine & (np.log(random.uniform(size=walkers)) < gain)
+            half = momentum + length / 2 * gradient
+            ahead = place + length * half
+            near = np.abs(ahead).max(axis=1) < FARTHEST
+            values, slopes = self._density_and_gradient(np.where(near[:, None], ahead, place))
+            # Where there is no support ahead the walker turns round, which keeps the trajectory reversible.
+            goes = near & np.isfinite(values)
+            momentum = np.where(goes[:, None], half + length / 2 * slopes, -momentum)
+            place = np.where(goes[:, None], ahead, place)
+            log_density = np.where(goes, values, log_density)
+            gradient = np.where(goes[:, None], slopes, gradient)
+        gain = energy - (momentum**2).sum(axis=1) / 2 + log_density
+        accepted = np.log(random.uniform(size=walkers)) < gain
         return self.update(state, emcee.State(place, log_prob=log_density), accepted), accepted
 
     def tune(self, state: emcee.State, accepted: Bool[np.ndarray, "walker"]) -> None:

@@ -123,9 +123,9 @@ class Posterior:
         return tuple(self._pair_summary(pair, mass, np.divide) for pair in self.pairs)
 
     def restitution_pairs(self) -> tuple[PairSummary, ...]:
-        """Restitution (product of both factors, at most 1) of every pair that collides."""
+        """Restitution (product of both factors) of every pair that collides."""
         restitution = self._draws("restitution")
-        return tuple(self._pair_summary(pair, restitution, lambda a, b: np.minimum(a * b, 1.0)) for pair in self.pairs)
+        return tuple(self._pair_summary(pair, restitution, np.multiply) for pair in self.pairs)
 
     def write(self, path: Path) -> None:
         """Save as one netCDF file that needs nothing else to be read again; an interruption leaves no half file.

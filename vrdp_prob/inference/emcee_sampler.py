@@ -17,12 +17,12 @@ import numpy as np
 from jaxtyping import Float
 from numpy.random import RandomState
 
+from vrdp_prob.inference.curved_gaussian import CurvedGaussian
 from vrdp_prob.inference.hamiltonian_move import HamiltonianMove
 from vrdp_prob.inference.laplace import DEGREES_OF_FREEDOM, adapted, smoothed_weights
 from vrdp_prob.inference.samples import (
     ESS_GOAL,
     R_HAT_GOAL,
-    Gaussian,
     LogDensity,
     Samples,
     chain_statistics,
@@ -46,7 +46,7 @@ START_POOL = 16
 
 def sample_emcee(
     density: LogDensity,
-    start: Gaussian,
+    start: CurvedGaussian,
     *,
     draws: int,
     generator: np.random.Generator,
@@ -77,7 +77,7 @@ def sample_emcee(
     """
     del draws
     start, adapting = adapted(density, start, generator, lambda _steps: None)
-    walkers = 2 * (len(start.mean) + 1)
+    walkers = 2 * (start.dimension + 1)
     ensembles = [_Ensemble(density, start, walkers, generator) for _ in range(ENSEMBLES)]
     workers = ThreadPoolExecutor(max_workers=min(ENSEMBLES, os.cpu_count() or 1))
     display = (progress or SilentProgress()).stage("Sampling (emcee)", total=WARM_UP + rounds * STEPS_PER_ROUND)
@@ -111,7 +111,7 @@ def sample_emcee(
 class _Ensemble:
     """One emcee ensemble in whitened coordinates."""
 
-    def __init__(self, density: LogDensity, start: Gaussian, walkers: int, generator: np.random.Generator) -> None:
+    def __init__(self, density: LogDensity, start: CurvedGaussian, walkers: int, generator: np.random.Generator) -> None:
         self._density, self._gaussian = density, start
         self.evaluations = self.gradients = 0
         moves = [
@@ -121,7 +121,7 @@ class _Ensemble:
             (emcee.moves.DEMove(gamma0=1.0), 0.1),
         ]
         self._sampler = emcee.EnsembleSampler(
-            walkers, len(start.mean), self._log_probability, moves=moves, vectorize=True
+            walkers, start.dimension, self._log_probability, moves=moves, vectorize=True
         )
         state = RandomState(int(generator.integers(2**31))).get_state()
         places = self._starting_places(walkers, generator)
@@ -136,12 +136,11 @@ class _Ensemble:
     ) -> tuple[Float[np.ndarray, "walker"], Float[np.ndarray, "walker dimension"]]:
         self.evaluations += len(whitened)
         self.gradients += len(whitened)
-        values, gradient = evaluate_with_gradient(self._density, self._gaussian.points(whitened))
-        return values, gradient @ self._gaussian.root
+        return evaluate_with_gradient(lambda places: self._density(self._gaussian.mapped(places)), whitened)
 
     def _starting_places(self, walkers: int, generator: np.random.Generator) -> Float[np.ndarray, "walker dimension"]:
         """Different points with support, drawn by importance from the Gaussian."""
-        pool = generator.standard_normal((START_POOL * walkers, len(self._gaussian.mean)))
+        pool = generator.standard_normal((START_POOL * walkers, self._gaussian.dimension))
         values = self._log_probability(pool)
         weights, _ = smoothed_weights(values + (pool**2).sum(axis=1) / 2)
         supported = np.flatnonzero(np.isfinite(values))

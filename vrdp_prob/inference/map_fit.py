@@ -5,12 +5,14 @@ L-BFGS on the exact gradient and Levenberg-Marquardt on the residuals climb the 
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import torch
 from jaxtyping import Bool, Float
 from scipy.optimize import minimize as scipy_minimize
 
+from vrdp_prob.inference.curved_gaussian import CurvedGaussian
 from vrdp_prob.inference.events import first_contacts
 from vrdp_prob.inference.free_flight import SeenContact, noise_scale, release_fit, seen_contacts
 from vrdp_prob.inference.growing_fit import GrowingFit
@@ -73,10 +75,10 @@ class MapFit:
     misfit: Misfit
     evaluations: int
 
-    @property
-    def gaussian(self) -> Gaussian:
-        """Gaussian with the MAP as its mean and the Gauss-Newton covariance."""
-        return Gaussian.from_precision(self.point, self.precision)
+    @cached_property
+    def gaussian(self) -> CurvedGaussian:
+        """Gaussian with the MAP as its mean and the Gauss-Newton covariance, bent as the posterior's ridges are."""
+        return CurvedGaussian.around(Gaussian.from_precision(self.point, self.precision), self.likelihood.residuals)
 
 
 def fit_map(

@@ -204,6 +204,13 @@ def test_unusable_question_files(folder: Path, capsys: pytest.CaptureFixture[str
     assert message in refused(capsys, "report", folder, "--questions", folder / "questions.json")
 
 
+@pytest.mark.parametrize("command", [("report",), ("ask", "How many collisions happen?")])
+def test_a_table_of_another_name(folder: Path, capsys: pytest.CaptureFixture[str], command: tuple[str, ...]) -> None:
+    (folder / "tracks.csv").rename(folder / "run_1.csv")
+    line = refused(capsys, command[0], folder / "run_1.csv", *command[1:])
+    assert "must be named tracks.csv" in line
+
+
 def test_an_output_folder_that_cannot_be_written(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (folder / "taken").write_text("a file is in the way")
     line = refused(capsys, "report", folder, "--out", folder / "taken", "--sampler", "laplace")
@@ -213,6 +220,7 @@ def test_an_output_folder_that_cannot_be_written(folder: Path, capsys: pytest.Ca
 def test_unusable_options(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert "sampler 'gibbs' is not known" in refused(capsys, "report", folder, "--sampler", "gibbs")
     assert "--seed" in refused(capsys, "report", folder, "--seed", "many")
+    assert "--seed" in refused(capsys, "report", folder, "--seed", "-1")
     assert "No such option" in refused(capsys, "report", folder, "--colour")
     assert "INPUT" in refused(capsys, "report")
 

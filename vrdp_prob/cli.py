@@ -38,7 +38,7 @@ app = typer.Typer(
 Input = Annotated[Path, typer.Argument(metavar="INPUT", help="A video, a tracks folder, or a CLEVRER annotation file.")]
 Model = Annotated[Path | None, typer.Option(metavar="FILE.toml", help="Physics model; the base model by default.")]
 Sampler = Annotated[str, typer.Option(metavar="|".join(SAMPLERS), help="How the posterior is drawn.")]
-Seed = Annotated[int, typer.Option(help="Same seed, same numbers.")]
+Seed = Annotated[int, typer.Option(min=0, help="Same seed, same numbers.")]
 Quiet = Annotated[bool, typer.Option("--quiet", help="No progress bars, no closing lines.")]
 CameraOption = Annotated[
     str | None,

@@ -12,8 +12,10 @@ import pytest
 
 from vrdp_prob import cli
 from vrdp_prob.progress import Advance
+from vrdp_prob.reasoning import Answer, ChoiceAnswer
+from vrdp_prob.reasoning.answer import monte_carlo_error
 from vrdp_prob.report import pipeline, schema
-from vrdp_prob.scene import Camera
+from vrdp_prob.scene import Camera, QuestionType
 
 TRACKS_HEADER = "video,object,time,x,y"
 OBJECTS = "video,object,shape,radius,material,color\nv,1,sphere,0.2,metal,red\nv,2,cylinder,0.2,rubber,blue\n"
@@ -93,6 +95,57 @@ def test_ask_prints_exactly_one_document(folder: Path, capsys: pytest.CaptureFix
     document = json.loads(capsys.readouterr().out)
     assert document["answer"] == "blue"
     jsonschema.validate(document, schema("report")["properties"]["answers"]["items"])
+
+
+def answer(**fields: object) -> Answer:
+    """An answer of 400 effective draws to an open question."""
+    basis = {
+        "question_id": None,
+        "question": "How many collisions happen?",
+        "question_type": QuestionType.DESCRIPTIVE,
+        "answer": 2,
+        "probability": 0.6,
+        "mc_error": monte_carlo_error(0.6, 400),
+        "entropy": 0.0,
+        "distribution": {"2": 0.6, "1": 0.3, "3": 0.1},
+    }
+    return Answer(**(basis | fields))
+
+
+@pytest.mark.parametrize(
+    ("given", "lines"),
+    [
+        (answer(), ["  60 % ± 2     2", "  30 % ± 2     1", "  10 % ± 2     3"]),
+        (
+            answer(probability=1.0, mc_error=monte_carlo_error(1.0, 400), distribution={"2": 1.0}),
+            ["> 99 %         2"],
+        ),
+        (answer(probability=1.0, mc_error=0.0, distribution={"2": 1.0}), [" 100 %         2"]),
+        (
+            answer(choices=(ChoiceAnswer(0, "A and B collide", 0.25, 0.004),), notes=("The end is near.",)),
+            ["  25 % ± 0.4   A and B collide", "note: The end is near."],
+        ),
+        (
+            answer(probability=1.0, mc_error=0.0, distribution={"2": 1.0}, relies_on_default=("3", "4")),
+            [
+                " 100 %         2",
+                "note: Rests on default values of objects 3 and 4, which this video does not determine.",
+            ],
+        ),
+    ],
+)
+def test_an_answer_is_printed_with_its_error(
+    folder: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+    *,
+    given: Answer,
+    lines: list[str],
+) -> None:
+    monkeypatch.setattr(cli, "infer", lambda *_arguments, **_options: None)
+    monkeypatch.setattr(cli, "ask", lambda *_arguments, **_options: given)
+    assert cli.run(["ask", str(folder), given.question]) == 0
+    assert capsys.readouterr().out.splitlines() == lines
 
 
 def test_the_same_seed_gives_the_same_answer(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:

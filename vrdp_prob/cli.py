@@ -4,6 +4,7 @@ Exit code 0: done; 2: input that cannot be used (one line says what, where, and 
 """
 
 import json
+import math
 import sys
 from pathlib import Path
 from typing import Annotated
@@ -21,6 +22,7 @@ from vrdp_prob.reasoning import Answer, ask, infer
 from vrdp_prob.reasoning.checking import check_question
 from vrdp_prob.report.pipeline import Report, check_questions
 from vrdp_prob.report.pipeline import report as write_report
+from vrdp_prob.report.wording import listed, percent, percent_error
 from vrdp_prob.scene import Choice, Question
 
 UNUSABLE_INPUT = 2
@@ -256,9 +258,22 @@ def _tell(written: Report) -> None:
 
 
 def _answer_lines(answer: Answer) -> list[str]:
+    """The answer in the report's words, one line for each choice or value, then what limits it."""
     if answer.choices:
-        lines = [f"{choice.probability:6.1%} ± {choice.mc_error:.1%}  {choice.choice}" for choice in answer.choices]
+        shares = [(choice.probability, choice.mc_error, choice.choice) for choice in answer.choices]
     else:
         ordered = sorted(answer.distribution.items(), key=lambda item: -item[1])
-        lines = [f"{probability:6.1%}  {value}" for value, probability in ordered]
-    return lines + [f"note: {note}" for note in answer.notes]
+        shares = [(share, _error_of(share, answer), value) for value, share in ordered]
+    lines = [f"{percent(share, error):>6} {percent_error(share, error):<7} {text}" for share, error, text in shares]
+    notes = list(answer.notes)
+    if answer.relies_on_default:
+        who = f"object{'s' * (len(answer.relies_on_default) > 1)} {listed(answer.relies_on_default)}"
+        notes.insert(0, f"Rests on default values of {who}, which this video does not determine.")
+    return lines + [f"note: {note}" for note in notes]
+
+
+def _error_of(share: float, answer: Answer) -> float:
+    """Monte Carlo error of the share of one value, from that of the most probable one: both are of the same draws."""
+    if not 0 < answer.probability < 1:
+        return answer.mc_error
+    return answer.mc_error * math.sqrt(share * (1 - share) / (answer.probability * (1 - answer.probability)))

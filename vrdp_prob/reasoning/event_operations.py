@@ -117,7 +117,8 @@ def filter_ancestor(run: Run, chosen: EventSet, event: EventRef) -> EventSet:
 def unique(run: Run, chosen: EventSet) -> EventRef:
     """The only event of a set; draws in which two events fit leave the question."""
     count = chosen.mask.sum(axis=1)
-    run.require(count <= 1, f"several events fit 'the {chosen.phrase}'; say which by naming the objects.")
+    several = f"several events fit 'the {chosen.phrase}'"
+    run.require(count <= 1, f"{several}; say which by naming the objects.", [(count > 1, several)])
     return _ref(chosen, chosen.mask.argmax(axis=1), count == 1, chosen.phrase)
 
 

@@ -10,6 +10,7 @@ from vrdp_prob.errors import InputError
 from vrdp_prob.reasoning.answer import Answer, ChoiceAnswer, entropy, monte_carlo_error
 from vrdp_prob.reasoning.facts import Facts
 from vrdp_prob.reasoning.language import parse_choice, parse_question
+from vrdp_prob.reasoning.notes import gap_notes
 from vrdp_prob.reasoning.program import ANSWERS, ENTRIES, Program, check, needs_choices, question_type
 from vrdp_prob.reasoning.run import Run
 from vrdp_prob.reasoning.values import Count, Label, Truth, Value
@@ -148,7 +149,7 @@ def _choice_answer(facts: Facts, asked: _Asked) -> Answer:
         distribution=_distribution(tuple(names), shares),
         choices=choices,
         relies_on_default=_relies_on_default(facts, runs),
-        notes=_notes(facts, runs),
+        notes=_notes(facts, runs, [choice.text for choice, _ in asked.options]),
     )
 
 
@@ -184,13 +185,6 @@ def _relies_on_default(facts: Facts, runs: list[Run]) -> tuple[str, ...]:
     return tuple(body.id for body in facts.bodies if body.id in found)
 
 
-def _notes(facts: Facts, runs: list[Run]) -> tuple[str, ...]:
-    notes: dict[str, None] = {}
-    for run in runs:
-        if run.reasons:
-            share = max(1 - float(run.valid.mean()), 0.001)
-            reasons = "; ".join(dict.fromkeys(run.reasons))
-            notes[f"In {share:.1%} of the draws the question makes no sense ({reasons}); the others answer it."] = None
-        for world in sorted(run.looked_at, key=str):
-            notes.update(dict.fromkeys(facts.limits(world)))
-    return tuple(notes)
+def _notes(facts: Facts, runs: Sequence[Run], choices: Sequence[str] = ()) -> tuple[str, ...]:
+    limits = (facts.limits(world) for run in runs for world in sorted(run.looked_at, key=str))
+    return (*gap_notes(runs, choices), *dict.fromkeys(limit for of_world in limits for limit in of_world))

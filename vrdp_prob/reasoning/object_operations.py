@@ -1,15 +1,14 @@
 """Operations on objects: all objects, filters by attribute and motion, the only one, interventions on one."""
 
 import numpy as np
-from jaxtyping import Bool
+from jaxtyping import Bool, Int
 
+from vrdp_prob.reasoning.naming import likely_name, number_word, uncertainties
 from vrdp_prob.reasoning.operations import operation
 from vrdp_prob.reasoning.run import Run
 from vrdp_prob.reasoning.tokens import ANY_FRAME, SHAPES
 from vrdp_prob.reasoning.values import Change, Moment, ObjectRef, ObjectSet, Word, noun_phrase
 from vrdp_prob.scene.body import COLORS, MATERIALS
-
-COUNT_WORDS = {2: "two", 3: "three", 4: "four", 5: "five", 6: "six"}
 
 
 @operation("objects", gives=ObjectSet)
@@ -70,7 +69,12 @@ def filter_never_moving(run: Run, chosen: ObjectSet, any_frame: Word) -> ObjectS
 def unique(run: Run, chosen: ObjectSet) -> ObjectRef:
     """The only object of a set; draws in which it does not have exactly one leave the question."""
     count = chosen.mask.sum(axis=1)
-    run.require(count == 1, _why_not_one(run, chosen, count))
+    run.require(
+        count == 1,
+        _refusal(run, chosen, count),
+        _clauses(chosen, count),
+        uncertainties(run.facts, chosen.mask[run.valid], chosen.words),
+    )
     return ObjectRef(chosen.mask.argmax(axis=1), chosen.words)
 
 
@@ -103,23 +107,19 @@ def _motion_at(run: Run, moment: Moment) -> tuple[Bool[np.ndarray, "draw body"],
     return in_view, moving
 
 
-def _why_not_one(run: Run, chosen: ObjectSet, count: np.ndarray) -> str:
-    phrase = noun_phrase(chosen.words)
-    if np.mean(count == 0) >= np.mean(count > 1):
-        names = ", ".join(_name(run, place) for place in range(len(run.facts.bodies)))
+def _refusal(run: Run, chosen: ObjectSet, count: Int[np.ndarray, "draw"]) -> str:
+    """Why hardly a draw has exactly one object, by what is the matter in most of those that still make sense."""
+    phrase, valid = noun_phrase(chosen.words), run.valid
+    if np.sum(count[valid] == 0) >= np.sum(count[valid] > 1):
+        names = ", ".join(likely_name(run.facts, place) for place in range(len(run.facts.bodies)))
         return f"there is no {phrase} in the video; its objects are: {names}."
-    most = int(np.bincount(count[count > 1]).argmax())
-    fitting = np.flatnonzero(chosen.mask[np.flatnonzero(count == most)[0]])
-    names = ", ".join(_name(run, place) for place in fitting.tolist())
-    number = COUNT_WORDS.get(most, str(most))
-    return f"{number} objects fit 'the {phrase}' ({names}); say which by its color, material or shape."
+    most = int(np.bincount(count[valid & (count > 1)]).argmax())
+    fitting = np.flatnonzero(chosen.mask[np.flatnonzero(valid & (count == most))[0]])
+    names = ", ".join(likely_name(run.facts, place) for place in fitting.tolist())
+    return f"{number_word(most)} objects fit 'the {phrase}' ({names}); say which by its color, material or shape."
 
 
-def _name(run: Run, place: int) -> str:
-    """An object by its most probable attributes; by its id where it has no colour."""
-    words = []
-    for attribute in ("color", "material", "shape"):
-        label = run.facts.attribute(attribute)[place]
-        words.append(label.names[int(np.bincount(label.index).argmax())])
-    described = " ".join(word for word in words if word)
-    return described if words[0] else f"{described} {run.facts.bodies[place].id}"
+def _clauses(chosen: ObjectSet, count: Int[np.ndarray, "draw"]) -> list[tuple[Bool[np.ndarray, "draw"], str]]:
+    several = sorted(set(count[count > 1].tolist()))
+    none = (count == 0, f"there is no {noun_phrase(chosen.words)}")
+    return [none, *((count == number, f"there are {number_word(number)}") for number in several)]

@@ -23,6 +23,7 @@ from vrdp_prob.reasoning.defaults import DEFAULT, Defaults, with_defaults
 from vrdp_prob.reasoning.events import EventTable
 from vrdp_prob.reasoning.facts import Motion, draw_attributes
 from vrdp_prob.reasoning.friction import OwnFriction, apply_friction, own_friction, with_friction_ratio
+from vrdp_prob.reasoning.notes import share_words
 from vrdp_prob.reasoning.refit import state_at_end
 from vrdp_prob.reasoning.seen import SeenVideo
 from vrdp_prob.reasoning.stretch import advance
@@ -196,7 +197,7 @@ class PosteriorWorlds:
         share = self._world(world).broke_off
         if share == 0:
             return ()
-        return (f"In {max(share, 0.001):.1%} of the draws the simulation of a world broke off early.",)
+        return (f"In {share_words(share)} of the draws the simulation of a world broke off early.",)
 
     def _world(self, world: str | tuple[Change, int]) -> WorldDraws:
         return self.future if isinstance(world, str) else self.counterfactual(*world)

@@ -102,6 +102,8 @@ def two_cubes(*events: Event, future: Sequence[Event] = ()) -> TableFacts:
 
 def test_a_note_tells_apart_why_draws_are_left_out() -> None:
     answer = ask(two_cubes(*STORY), "What is the color of the rubber cube?")
+    assert answer.valid_share == pytest.approx(0.5, abs=0.02)
+    assert answer.to_document()["valid_share"] == answer.valid_share
     shares = re.findall(r"(\d+) %", answer.notes[0])
     assert re.sub(r"\d+ %", "N %", answer.notes[0]) == (
         "The material of the red cube is uncertain (N % rubber). "
@@ -124,6 +126,7 @@ def test_a_note_names_the_choice_that_it_is_about() -> None:
     choices = ("The sphere collides with the cylinder", "The rubber cube and the cylinder collide")
     answer = ask(facts, "What will happen next?", choices=choices)
     assert len(answer.notes) == 1
+    assert answer.valid_share == pytest.approx(0.5, abs=0.02)
     assert f"; “{choices[1]}” is judged from the other 5" in answer.notes[0]
     asked = "Which event will not happen without the rubber cube?"
     assert "; every choice is judged from the other 5" in ask(facts, asked, choices=choices).notes[0]

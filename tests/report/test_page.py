@@ -87,6 +87,16 @@ def test_questions_stand_in_the_order_of_doubt(page):
     assert entropies == sorted(entropies, reverse=True)
 
 
+def test_a_small_share_of_the_draws_is_shown(content):
+    open_answer, choices = content.answers[2], content.answers[3]
+    few = [replace(item, answer=replace(item.answer, valid_share=0.53)) for item in (open_answer, choices)]
+    text = Outline(render(replace(content, answers=tuple(few)))).text
+    assert "at least as open as 80 to 20, or answered from less than 90 % of the draws" in text
+    assert "no (from 53 % of the draws)" in text
+    assert ", from 53 % of the draws)" in text
+    assert "of the draws)" not in Outline(render(content)).text
+
+
 def test_hypotheses_have_a_way_to_the_player(page):
     worlds = [
         attributes["data-world"]

@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 from vrdp_prob.inference.samples import Convergence
-from vrdp_prob.report.summary import answer_words, by_doubt, summary
+from vrdp_prob.report.summary import answer_words, by_doubt, is_doubtful, summary
 
 
 def test_paragraph_says_what_there_is_and_what_happened(content):
@@ -27,6 +27,19 @@ def test_paragraph_without_warnings_questions_or_worlds(content):
 def test_most_ambiguous_question_comes_first(content):
     entropies = [item.answer.entropy for item in by_doubt(content.answers)]
     assert entropies == sorted(entropies, reverse=True)
+
+
+def test_an_answer_from_half_of_the_draws_is_doubtful(content):
+    sure = content.answers[2]
+    assert not is_doubtful(sure.answer)
+    half = replace(sure, answer=replace(sure.answer, valid_share=0.53))
+    assert is_doubtful(half.answer)
+    assert not is_doubtful(replace(sure.answer, valid_share=0.97))
+    answers = (*content.answers[:2], half, *content.answers[3:])
+    doubtful = [item for item in by_doubt(answers) if is_doubtful(item.answer)]
+    assert by_doubt(answers)[: len(doubtful)] == doubtful
+    assert doubtful[-1] is half
+    assert "five are doubtful" in " ".join(summary(replace(content, answers=answers)))
 
 
 def test_answers_in_words(content):

@@ -54,6 +54,8 @@ class Answer:
         Objects of default mass or restitution that the answer depends on.
     notes
         What else limits the answer, in sentences.
+    valid_share
+        Share of the draws that the answer is from: those in which the question makes sense, with all its choices.
     """
 
     question_id: int | str | None
@@ -67,6 +69,7 @@ class Answer:
     choices: tuple[ChoiceAnswer, ...] = ()
     relies_on_default: tuple[str, ...] = ()
     notes: tuple[str, ...] = field(default=())
+    valid_share: float = 1.0
 
     def to_document(self) -> dict[str, object]:
         """The answer as an item of `answers` in report.json."""
@@ -91,6 +94,7 @@ class Answer:
             ],
             "relies_on_default": list(self.relies_on_default),
             "notes": list(self.notes),
+            "valid_share": self.valid_share,
         }
 
 

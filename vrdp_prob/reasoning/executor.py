@@ -114,6 +114,7 @@ def _open_answer(facts: Facts, asked: _Asked) -> Answer:
         distribution=_distribution(names, shares),
         relies_on_default=_relies_on_default(facts, [run]),
         notes=_notes(facts, [run]),
+        valid_share=float(run.valid.mean()),
     )
 
 
@@ -150,6 +151,7 @@ def _choice_answer(facts: Facts, asked: _Asked) -> Answer:
         choices=choices,
         relies_on_default=_relies_on_default(facts, runs),
         notes=_notes(facts, runs, [choice.text for choice, _ in asked.options]),
+        valid_share=float(valid.mean()),
     )
 
 

@@ -15,6 +15,7 @@ from vrdp_prob.report.figures import FIGURE_DRAWS, log_axis, still_figure, unit_
 from vrdp_prob.report.footage import still_uri
 from vrdp_prob.report.payload import player_data
 from vrdp_prob.report.summary import (
+    SMALL_VALID_SHARE,
     TYPE_WORDS,
     answer_words,
     by_doubt,
@@ -128,7 +129,7 @@ def _script_json(value: Any) -> Markup:
 def _questions(content: ReportContent) -> dict[str, Any]:
     ordered = by_doubt(content.answers)
     parts = (
-        ("Doubtful", "at least as open as 80 to 20", [item for item in ordered if is_doubtful(item.answer)]),
+        ("Doubtful", _doubt_words(content), [item for item in ordered if is_doubtful(item.answer)]),
         ("Clear", "", [item for item in ordered if not is_doubtful(item.answer)]),
     )
     return {
@@ -138,6 +139,13 @@ def _questions(content: ReportContent) -> dict[str, Any]:
             if items
         ]
     }
+
+
+def _doubt_words(content: ReportContent) -> str:
+    words = "at least as open as 80 to 20"
+    if any(item.answer.valid_share < SMALL_VALID_SHARE for item in content.answers):
+        words += f", or answered from less than {percent(SMALL_VALID_SHARE)} of the draws"
+    return words
 
 
 def _question(item: AnswerContent, content: ReportContent) -> dict[str, Any]:
@@ -159,6 +167,7 @@ def _question(item: AnswerContent, content: ReportContent) -> dict[str, Any]:
         "multiple": bool(answer.choices),
         "probability": percent(answer.probability, answer.mc_error),
         "error": percent_error(answer.probability, answer.mc_error),
+        "base": f"from {percent(answer.valid_share)} of the draws" if answer.valid_share < 1 else "",
         "bars": _bars(answer),
         "notes": notes,
         "world": None if world is None else world.key,

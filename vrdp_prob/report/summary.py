@@ -15,14 +15,18 @@ DOUBTFUL_ENTROPY = 0.5
 """Entropy in nats from which on an answer is called doubtful: that of a yes or no at 80 to 20."""
 
 
+SMALL_VALID_SHARE = 0.9
+"""Share of the draws below which an answer is called doubtful: in the others its question makes no sense."""
+
+
 def is_doubtful(answer: Answer) -> bool:
-    """Whether an answer is to be read as a distribution rather than as an answer."""
-    return answer.entropy >= DOUBTFUL_ENTROPY
+    """Whether an answer is open, or comes from too few of the draws to stand for all of them."""
+    return answer.entropy >= DOUBTFUL_ENTROPY or answer.valid_share < SMALL_VALID_SHARE
 
 
 def by_doubt(answers: tuple[AnswerContent, ...]) -> list[AnswerContent]:
-    """Answers with the most ambiguous (largest entropy) first; equal ones stay in the order asked."""
-    return sorted(answers, key=lambda item: -item.answer.entropy)
+    """Doubtful answers first, among them the most ambiguous (largest entropy); equal ones stay in the order asked."""
+    return sorted(answers, key=lambda item: (not is_doubtful(item.answer), -item.answer.entropy))
 
 
 def summary(content: ReportContent) -> list[str]:

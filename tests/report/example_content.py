@@ -348,5 +348,12 @@ def with_question(content: ReportContent, text: str) -> ReportContent:
     return replace(content, answers=(_asked(content.answers[0], text), *content.answers[1:]))
 
 
+def with_unsure_material(content: ReportContent) -> ReportContent:
+    """The same content with an object that is rubber with a probability of 55 %."""
+    bodies = list(content.tracks.bodies)
+    bodies[1] = replace(bodies[1], attribute_probabilities={"material": {"rubber": 0.55, "metal": 0.45}})
+    return replace(content, tracks=replace(content.tracks, bodies=tuple(bodies)))
+
+
 def _asked(item: AnswerContent, text: str) -> AnswerContent:
     return replace(item, answer=replace(item.answer, question=text))

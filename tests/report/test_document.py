@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import jsonschema
 import pytest
+from example_content import with_unsure_material
 
 from vrdp_prob.inference.samples import Convergence
 from vrdp_prob.inference.summaries import PairSummary, Summary
@@ -20,6 +21,14 @@ def test_follows_the_schema(content, plain_content):
 def test_answers_stay_in_the_order_asked(content):
     ids = [answer["question_id"] for answer in to_document(content)["answers"]]
     assert ids == [item.answer.question_id for item in content.answers]
+
+
+def test_an_uncertain_attribute_is_stated_with_its_probabilities(content):
+    document = to_document(with_unsure_material(content))
+    jsonschema.validate(document, schema("report"))
+    assert document["objects"][1]["material"] == "rubber"
+    assert document["objects"][1]["attribute_probabilities"] == {"material": {"rubber": 0.55, "metal": 0.45}}
+    assert document["objects"][0]["attribute_probabilities"] == {}
 
 
 def test_undefined_diagnostics_become_null(content):

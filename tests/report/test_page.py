@@ -6,7 +6,7 @@ from dataclasses import replace
 from html.parser import HTMLParser
 
 import pytest
-from example_content import with_question
+from example_content import with_question, with_unsure_material
 
 from vrdp_prob.report import render
 from vrdp_prob.report.payload import player_data
@@ -95,6 +95,12 @@ def test_a_small_share_of_the_draws_is_shown(content):
     assert "no (from 53 % of the draws)" in text
     assert ", from 53 % of the draws)" in text
     assert "of the draws)" not in Outline(render(content)).text
+
+
+def test_an_uncertain_attribute_is_shown(content, page):
+    said = "purple cube (material 55 % rubber, 45 % metal)"
+    assert said in Outline(render(with_unsure_material(content))).text
+    assert "% rubber" not in Outline(page).text
 
 
 def test_hypotheses_have_a_way_to_the_player(page):

@@ -29,6 +29,9 @@ def to_document(content: ReportContent) -> dict[str, Any]:
                 "shape": str(body.shape),
                 "color": body.color,
                 "material": body.material,
+                "attribute_probabilities": {
+                    name: dict(values) for name, values in body.attribute_probabilities.items()
+                },
                 "mass": learned.mass.to_document(),
                 "restitution": learned.restitution.to_document(),
             }

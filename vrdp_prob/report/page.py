@@ -35,6 +35,7 @@ from vrdp_prob.report.wording import (
     seconds,
     sentence,
     tags,
+    uncertain_attributes,
     world_label,
 )
 
@@ -74,6 +75,7 @@ def _objects(content: ReportContent) -> list[dict[str, Any]]:
             "tag": tag[body.id],
             "color": color_of(body, index),
             "shape": str(body.shape),
+            "doubts": uncertain_attributes(body),
         }
         for index, body in enumerate(content.tracks.bodies)
     ]

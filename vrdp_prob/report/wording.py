@@ -47,6 +47,17 @@ def tags(bodies: Sequence[Body]) -> dict[str, str]:
     }
 
 
+def uncertain_attributes(body: Body) -> str:
+    """What a body may look like where that is not certain: 'material 55 % rubber, 45 % metal'; else empty."""
+    doubts = []
+    for attribute, values in body.attribute_probabilities.items():
+        ranked = sorted(values.items(), key=lambda item: -item[1])
+        if ranked[0][1] < 0.995:
+            shown = ", ".join(f"{percent(share)} {value}" for value, share in ranked if share >= 0.005)
+            doubts.append(f"{attribute} {shown}")
+    return "; ".join(doubts)
+
+
 def color_of(body: Body, index: int) -> str:
     """Name of the colour (of the style sheet) that a body is drawn in."""
     return body.color if body.color in COLORS else NEUTRAL_COLORS[index % len(NEUTRAL_COLORS)]

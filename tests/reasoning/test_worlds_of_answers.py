@@ -9,7 +9,9 @@ from test_seen import CHAIN
 
 from vrdp_prob.errors import InputError
 from vrdp_prob.inference import Status
+from vrdp_prob.models.parameters import RESTITUTION
 from vrdp_prob.reasoning import Change, PosteriorWorlds, ask, infer
+from vrdp_prob.reasoning.defaults import prior_restitutions
 from vrdp_prob.scene import Shape, Tracks
 
 DRAWS = 30
@@ -149,6 +151,15 @@ def test_defaults_drawn_from_the_prior_widen_what_is_simulated() -> None:
         worlds = PosteriorWorlds(posterior, draws=100, defaults=defaults)
         spread[defaults] = worlds.future.trajectory[:, -1, 1, 0].std()
     assert spread["prior"] > 1.2 * spread["fixed"]
+
+
+def test_restitutions_from_the_prior_give_no_energy() -> None:
+    count = 20_000
+    plain = np.exp(RESTITUTION.prior.sample(np.random.default_rng(3), (count,)))
+    assert (plain > 1).any()
+    drawn = prior_restitutions(count, np.random.default_rng(3)).numpy()
+    assert (drawn <= 1).all()
+    assert drawn[plain <= 1] == pytest.approx(plain[plain <= 1])
 
 
 def test_a_cube_that_no_change_reaches_turns_as_it_was_seen() -> None:

@@ -9,6 +9,8 @@ from typing import Literal
 
 import numpy as np
 import torch
+from jaxtyping import Float
+from torch import Tensor
 
 from vrdp_prob.errors import InputError
 from vrdp_prob.models.parameters import MASS, RESTITUTION
@@ -31,7 +33,8 @@ def with_defaults(
     statuses
         Status of mass and restitution of each body.
     defaults
-        `fixed` leaves the defaults, `prior` draws from the prior: the mass around its default, by the prior's spread.
+        `fixed` leaves the defaults, `prior` draws from the prior: the mass around its default, by the prior's spread;
+        the restitution where it is at most 1.
     generator
         Source of the draws.
 
@@ -48,8 +51,31 @@ def with_defaults(
     for body, (of_mass, of_restitution) in enumerate(statuses):
         if of_mass == DEFAULT:
             spread = MASS.prior.sd * generator.standard_normal(len(worlds))
-            mass[:, body] *= torch.from_numpy(np.exp(spread)).to(mass)
+            mass[:, body] *= MASS.transform.from_coordinate(torch.from_numpy(spread)).to(mass)
         if of_restitution == DEFAULT:
-            drawn = np.exp(RESTITUTION.prior.sample(generator, (len(worlds),)))
-            restitution[:, body] = torch.from_numpy(drawn).to(restitution)
+            restitution[:, body] = prior_restitutions(len(worlds), generator).to(restitution)
     return replace(worlds, mass=mass, restitution=restitution)
+
+
+def prior_restitutions(count: int, generator: np.random.Generator) -> Float[Tensor, "draw"]:
+    """Restitution factors from their prior, held to at most 1.
+
+    The prior has a soft edge, for the sake of the samplers: about one draw in a thousand lies above 1, where collisions
+    would give energy. These are drawn again.
+
+    Parameters
+    ----------
+    count
+        How many.
+    generator
+        Source of the draws.
+    """
+
+    def draw(size: int) -> Float[Tensor, "draw"]:
+        coordinates = RESTITUTION.prior.sample(generator, (size,))
+        return RESTITUTION.transform.from_coordinate(torch.from_numpy(coordinates))
+
+    drawn = draw(count)
+    while (above := drawn > 1).any():
+        drawn[above] = draw(int(above.sum()))
+    return drawn

@@ -139,12 +139,19 @@ def test_names_cannot_end_the_script_that_holds_them(content):
 def test_page_without_camera_worlds_or_questions(plain_content):
     text = Outline(render(plain_content)).text
     assert "The plane from above." in text
+    assert "as the camera sees it" not in text
     bare = Outline(
         render(replace(plain_content, worlds=(), answers=(), warnings=(), mass_ratios=(), restitution_pairs=()))
     )
     assert "Watch it" not in bare.text
     assert "Questions" not in bare.text
     assert "No limit was found" in bare.text
+
+
+def test_the_figure_without_footage_says_from_where_it_is_seen(content):
+    text = Outline(render(replace(content, footage=None))).text
+    assert "The plane as the camera sees it." in text
+    assert "from above" not in text
 
 
 def test_page_of_a_fit_that_has_not_converged_does_not_claim_otherwise(content):

@@ -50,7 +50,7 @@ class TrackFigure:
 
 @dataclass(frozen=True)
 class StillFigure:
-    """The still with the tracks and rollouts over it, or the plane from above where there is no camera."""
+    """Tracks and rollouts as the camera sees them, or from above where there is no camera."""
 
     width: int
     height: int

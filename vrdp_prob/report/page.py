@@ -85,7 +85,10 @@ def _opening(content: ReportContent) -> dict[str, Any]:
     footage = _seen_by_camera(content)
     draws = max((min(world.draws, FIGURE_DRAWS) for world in content.worlds[:2]), default=0)
     future = content.world(WorldKind.FUTURE)
-    caption = f"The frame at {seconds(footage.time)}. " if footage is not None else "The plane from above. "
+    if footage is not None:
+        caption = f"The frame at {seconds(footage.time)}. "
+    else:
+        caption = "The plane from above. " if content.tracks.camera is None else "The plane as the camera sees it. "
     caption += "Dots: measured positions."
     if draws:
         caption += f" Lines: {draws} posterior draws"

@@ -6,7 +6,7 @@ import numpy as np
 
 from vrdp_prob.inference.samples import Convergence
 from vrdp_prob.inference.summaries import ObjectSummary, PairSummary, ParameterSummary, Summary
-from vrdp_prob.reasoning.answer import Answer, ChoiceAnswer
+from vrdp_prob.reasoning.answer import Answer, ChoiceAnswer, monte_carlo_error
 from vrdp_prob.report.content import (
     AnswerContent,
     Collisions,
@@ -162,7 +162,9 @@ def _shares(table: Collisions, draws: int) -> tuple[PairShare, ...]:
     found = []
     for pair in np.unique(table.bodies, axis=0):
         times = table.time[(table.bodies == pair).all(axis=1)]
-        found.append(PairShare((int(pair[0]), int(pair[1])), len(times) / draws, float(np.median(times))))
+        share = len(times) / draws
+        bodies = (int(pair[0]), int(pair[1]))
+        found.append(PairShare(bodies, share, float(np.median(times)), monte_carlo_error(share, draws)))
     return tuple(sorted(found, key=lambda met: met.time))
 
 

@@ -54,6 +54,13 @@ def test_worlds_say_when_bodies_appear(content):
     assert removed["label"] == "Without the purple cube"
 
 
+def test_shares_carry_the_error_of_their_draws(content):
+    shares = [pair["share"] for world in player_data(content)["worlds"] for pair in world["pairs"]]
+    assert "> 93 %" in shares  # all of 30 draws
+    assert "> 99 %" not in shares
+    assert any("±" in share for share in shares)
+
+
 def test_collisions_are_in_order_of_time(content):
     for world in player_data(content)["worlds"]:
         times = world["collisions"]["time"]

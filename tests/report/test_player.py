@@ -144,8 +144,8 @@ def test_video_shows_under_the_rollouts_where_there_is_one(opened):
 def test_collisions_are_listed_and_lead_to_their_time(opened):
     rows = opened.run("[...document.querySelectorAll('.pairs button')].map((row) => row.ariaLabel)")
     assert rows == [
-        "gray cylinder and cyan sphere collide with probability > 99 %, at about 2.4 s; go there",
-        "purple cube and gray cylinder collide with probability > 99 %, at about 2.8 s; go there",
+        "gray cylinder and cyan sphere collide with probability > 93 %, at about 2.4 s; go there",
+        "purple cube and gray cylinder collide with probability > 93 %, at about 2.8 s; go there",
     ]
     opened.run("document.querySelector('.pairs button').click()")
     assert opened.run(f"{part('label')}.textContent").startswith("2.4")

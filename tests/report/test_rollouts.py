@@ -1,8 +1,10 @@
 """What the player shows of the worlds that answers come from."""
 
 import numpy as np
+import pytest
 from example_content import make_tracks
 
+from vrdp_prob.reasoning.answer import monte_carlo_error
 from vrdp_prob.reasoning.events import EventTable
 from vrdp_prob.report.rollouts import collisions, measured_course, pair_shares
 from vrdp_prob.scene import Camera, Event, EventKind
@@ -32,8 +34,9 @@ def test_collisions_stand_midway_between_their_bodies():
 def test_shares_count_draws():
     hit = EventKind.COLLISION
     draws = [[Event(1.0, hit, ("b", "c")), Event(2.0, hit, ("a", "b"))], [Event(1.5, hit, ("b", "c"))], [], []]
-    shares = pair_shares(EventTable.from_events("abc", draws))
+    shares = pair_shares(EventTable.from_events("abc", draws), effective_draws=2.0)
     assert [(met.bodies, met.share, met.time) for met in shares] == [((1, 2), 0.5, 1.25), ((0, 1), 0.25, 2.0)]
+    assert [met.error for met in shares] == pytest.approx([0.25, monte_carlo_error(0.25, 2.0)])
 
 
 def test_world_without_collisions():

@@ -5,6 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from vrdp_prob.inference.summaries import ParameterSummary, Summary
+from vrdp_prob.reasoning.answer import monte_carlo_error
 from vrdp_prob.report.wording import (
     counted,
     interval_words,
@@ -60,6 +61,16 @@ def test_long_ids_become_letters():
 def test_percent_is_certain_only_where_the_probability_is(probability):
     assert (percent(probability) in ("0 %", "100 %")) == (probability in (0, 1))
     assert percent(probability, 0.01) not in ("0 %", "100 %")
+
+
+def test_few_draws_are_not_nearly_certain():
+    assert [percent(1.0, monte_carlo_error(1.0, draws)) for draws in (3, 30, 400, 4000)] == [
+        "> 55 %",
+        "> 93 %",
+        "> 99 %",
+        "> 99 %",
+    ]
+    assert percent(0.0, monte_carlo_error(0.0, 30)) == "< 7 %"
 
 
 def test_percent_errors():

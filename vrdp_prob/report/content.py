@@ -73,14 +73,18 @@ class PairShare:
     bodies
         Their indices, the smaller one first.
     share
-        Share of all draws that answers come from, not only of those shown.
+        Share of the draws that this world was simulated in: of all draws that answers come from where a question asks
+        about it, else of those shown.
     time
         Median time in s.
+    error
+        Monte Carlo standard error of the share.
     """
 
     bodies: tuple[int, int]
     share: float
     time: float
+    error: float
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ from jaxtyping import Float, Int
 
 from vrdp_prob.report.content import ReportContent, WorldContent
 from vrdp_prob.report.footage import film_data
-from vrdp_prob.report.wording import color_of, names, percent, tags, world_group, world_label
+from vrdp_prob.report.wording import color_of, names, percent, percent_error, tags, world_group, world_label
 from vrdp_prob.scene import Camera
 
 _STEPS = 16000
@@ -99,7 +99,11 @@ def _world(world: WorldContent, content: ReportContent, reach: float) -> dict[st
         "first": first.tolist(),
         "until": until.tolist(),
         "pairs": [
-            {"bodies": list(pair.bodies), "share": percent(pair.share, 1e-3), "time": round(pair.time, 4)}
+            {
+                "bodies": list(pair.bodies),
+                "share": f"{percent(pair.share, pair.error)} {percent_error(pair.share, pair.error)}".strip(),
+                "time": round(pair.time, 4),
+            }
             for pair in world.pairs
         ],
         "collisions": {

@@ -5,6 +5,7 @@ from collections.abc import Collection
 import numpy as np
 from jaxtyping import Float
 
+from vrdp_prob.reasoning.answer import monte_carlo_error
 from vrdp_prob.reasoning.events import EventTable
 from vrdp_prob.reasoning.timeline import WorldDraws
 from vrdp_prob.reasoning.values import Change
@@ -39,11 +40,13 @@ def player_worlds(
     first = _factual(many or few, count)
     shown = [first] if first is not None else []
     key = str(WorldKind.FUTURE)
-    shown.append(_simulated(_source(key, few, asked, many).future, count, WorldKind.FUTURE))
+    source = _source(key, few, asked, many)
+    shown.append(_simulated(source.future, source.effective_draws, count, WorldKind.FUTURE))
     for change, kind in _KINDS.items():
         for place, body in enumerate(few.bodies):
-            world = _source(f"{kind}:{body.id}", few, asked, many).counterfactual(change, place)
-            shown.append(_simulated(world, count, kind, body.id))
+            source = _source(f"{kind}:{body.id}", few, asked, many)
+            world = source.counterfactual(change, place)
+            shown.append(_simulated(world, source.effective_draws, count, kind, body.id))
     return tuple(shown)
 
 
@@ -66,11 +69,13 @@ def _factual(worlds: PosteriorWorlds, count: int) -> WorldContent | None:
         rollout.trajectory.numpy()[draws][:, frames].astype(float),
         rollout.exists.numpy()[draws][:, frames],
         collisions(worlds.events().select(draws), tracks.times, measured_course(tracks)[None]),
-        pair_shares(worlds.events()),
+        pair_shares(worlds.events(), worlds.effective_draws),
     )
 
 
-def _simulated(world: WorldDraws, count: int, kind: WorldKind, body: str | None = None) -> WorldContent:
+def _simulated(
+    world: WorldDraws, effective_draws: float, count: int, kind: WorldKind, body: str | None = None
+) -> WorldContent:
     draws, frames = _evenly(len(world.trajectory), count), _evenly(len(world.times), MOST_FRAMES)
     return WorldContent(
         kind,
@@ -79,17 +84,26 @@ def _simulated(world: WorldDraws, count: int, kind: WorldKind, body: str | None 
         world.trajectory[draws][:, frames],
         world.exists[draws][:, frames],
         collisions(world.events.select(draws), world.times, world.trajectory[draws][..., :2]),
-        pair_shares(world.events),
+        pair_shares(world.events, effective_draws),
     )
 
 
-def pair_shares(events: EventTable) -> tuple[PairShare, ...]:
-    """The pairs that collide in some draw, in the order of their median times."""
+def pair_shares(events: EventTable, effective_draws: float) -> tuple[PairShare, ...]:
+    """The pairs that collide in some draw, in the order of their median times.
+
+    Parameters
+    ----------
+    events
+        What happens in each draw.
+    effective_draws
+        Number of independent draws that these are worth.
+    """
     met = []
     for place, pair in enumerate(events.universe.pairs):
         happens = events.happens[:, place]
         if happens.any():
-            met.append(PairShare(pair, float(happens.mean()), float(np.median(events.time[happens, place]))))
+            share, time = float(happens.mean()), float(np.median(events.time[happens, place]))
+            met.append(PairShare(pair, share, time, monte_carlo_error(share, effective_draws)))
     return tuple(sorted(met, key=lambda one: one.time))
 
 

@@ -59,7 +59,7 @@ def _collisions(content: ReportContent) -> list[str]:
         if met.share >= CERTAIN_SHARE:
             sure.append(f"the {first} with the {second} at {seconds(met.time)}")
         elif met.share > RARE_SHARE:
-            unsure.append(f"the {first} with the {second} ({percent(met.share)})")
+            unsure.append(f"the {first} with the {second} ({percent(met.share, met.error)})")
     told = sentence(f"{counted(len(sure), 'collision')} happened{': ' + listed(sure) if sure else ''}.")
     return [told, f"Whether others happened is not certain: {listed(unsure)}."] if unsure else [told]
 

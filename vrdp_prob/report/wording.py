@@ -109,12 +109,16 @@ def sentence(text: str) -> str:
 
 
 def percent(probability: float, error: float = 0.0) -> str:
-    """A probability in per cent; certain only where it is, and its Monte Carlo error is nothing."""
+    """A probability in per cent; certain only where it is, and its Monte Carlo error is nothing.
+
+    A share of (nearly) no or all draws is given as a bound three errors away, which for 30 draws is 93 %, not 99 %.
+    """
     if probability in (0, 1) and error == 0:
         return f"{100 * probability:.0f} %"
+    bound = min(max(1, math.ceil(300 * error)), 99)
     if probability <= 0.005:
-        return "< 1 %"
-    return "> 99 %" if probability >= 0.995 else f"{100 * probability:.0f} %"
+        return f"< {bound} %"
+    return f"> {100 - bound} %" if probability >= 0.995 else f"{100 * probability:.0f} %"
 
 
 def percent_error(probability: float, error: float) -> str:

@@ -10,6 +10,7 @@ __version__ = "0.1.0"
 
 from vrdp_prob.datasets import load, load_all
 from vrdp_prob.errors import InputError
+from vrdp_prob.inference import Posterior
 from vrdp_prob.models.physics import PhysicsModel
 from vrdp_prob.reasoning import Answer, AskablePosterior, ask, infer
 from vrdp_prob.report.pipeline import Report, report
@@ -23,6 +24,7 @@ __all__ = [
     "Event",
     "InputError",
     "PhysicsModel",
+    "Posterior",
     "Question",
     "Report",
     "Tracks",

@@ -61,7 +61,7 @@ def test_write_then_read_gives_the_same(tmp_path: Path) -> None:
     tracks = Tracks.from_arrays(
         "v", bodies, times, positions, angles=angles, walls=(Wall(0, 0, 1, 0, 0.5),), camera=Camera.clevrer()
     )
-    write_folder(tmp_path, [tracks])
+    write_folder(str(tmp_path), [tracks])
     again = load(tmp_path)
     np.testing.assert_allclose(again.positions, positions, rtol=1e-8)
     np.testing.assert_allclose(again.angles, angles, rtol=1e-8)

@@ -14,8 +14,8 @@ from vrdp_prob.models.physics import PhysicsModel
 def test_write_then_read_gives_the_same(tmp_path: Path) -> None:
     belief = replace(SLIDING_FRICTION, default=0.25, prior=replace(SLIDING_FRICTION.prior, sd=0.3))
     model = PhysicsModel("mine", PhysicsModel.base().effects, {"sliding_friction": belief})
-    model.write(tmp_path / "model.toml")
-    again = PhysicsModel.read(tmp_path / "model.toml")
+    model.write(str(tmp_path / "model.toml"))
+    again = PhysicsModel.read(str(tmp_path / "model.toml"))
     assert again.name == "mine"
     assert [effect.name for effect in again.effects] == [effect.name for effect in model.effects]
     assert again.parameters == model.parameters

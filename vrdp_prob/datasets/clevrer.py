@@ -21,7 +21,7 @@ FRAME_RATE = 25.0
 Document = Mapping[str, Any]
 
 
-def read_json(path: Path) -> Any:
+def read_json(path: Path | str) -> Any:
     """Content of a JSON file.
 
     Raises
@@ -30,7 +30,7 @@ def read_json(path: Path) -> Any:
         If the file cannot be read or is not JSON.
     """
     try:
-        return json.loads(path.read_text(encoding="utf-8"))
+        return json.loads(Path(path).read_text(encoding="utf-8"))
     except OSError as error:
         raise InputError(f"{path}: the file cannot be read ({error.strerror}); check the path.") from error
     except ValueError as error:
@@ -44,7 +44,7 @@ def annotated_video(path: Path) -> str:
     return Path(str(name)).stem if name else path.stem
 
 
-def read_annotation(path: Path, *, camera: Camera | None = None) -> Tracks:
+def read_annotation(path: Path | str, *, camera: Camera | None = None) -> Tracks:
     """Tracks of a CLEVRER annotation file.
 
     Parameters
@@ -97,7 +97,7 @@ def read_annotation(path: Path, *, camera: Camera | None = None) -> Tracks:
     )
 
 
-def read_questions(path: Path) -> dict[str, list[Question]]:
+def read_questions(path: Path | str) -> dict[str, list[Question]]:
     """Questions of a CLEVRER question file by the stem of their video's file name.
 
     Raises
@@ -121,7 +121,7 @@ def read_questions(path: Path) -> dict[str, list[Question]]:
     return questions
 
 
-def _body(path: Path, entry: Document) -> Body:
+def _body(path: Path | str, entry: Document) -> Body:
     identity = str(entry["object_id"])
     try:
         shape = Shape(entry["shape"])

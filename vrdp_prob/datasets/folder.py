@@ -39,7 +39,9 @@ def video_names(folder: Path) -> list[str]:
     return list(_read_measurements(folder / "tracks.csv"))
 
 
-def read_folder(folder: Path, *, videos: Sequence[str] | None = None, camera: Camera | None = None) -> list[Tracks]:
+def read_folder(
+    folder: Path | str, *, videos: Sequence[str] | None = None, camera: Camera | None = None
+) -> list[Tracks]:
     """Tracks of the videos of a folder.
 
     Parameters
@@ -56,6 +58,7 @@ def read_folder(folder: Path, *, videos: Sequence[str] | None = None, camera: Ca
     InputError
         With file, row and column, if a table is unusable or a named video is not there.
     """
+    folder = Path(folder)
     measurements = _read_measurements(folder / "tracks.csv")
     if not measurements:
         raise InputError(f"{folder / 'tracks.csv'}: there are 0 objects; give tracks of at least one.")
@@ -73,7 +76,7 @@ def read_folder(folder: Path, *, videos: Sequence[str] | None = None, camera: Ca
     ]
 
 
-def write_folder(folder: Path, videos: Iterable[Tracks]) -> None:
+def write_folder(folder: Path | str, videos: Iterable[Tracks]) -> None:
     """Write tracks as a tracks folder that `read_folder` reads; the camera of the first video becomes `camera.json`.
 
     Raises
@@ -81,7 +84,7 @@ def write_folder(folder: Path, videos: Iterable[Tracks]) -> None:
     InputError
         If the folder cannot be written.
     """
-    videos = list(videos)
+    folder, videos = Path(folder), list(videos)
     with_angle = any(tracks.angles is not None for tracks in videos)
     track_rows: list[Sequence[object]] = [TRACK_COLUMNS + (("angle",) if with_angle else ())]
     object_rows: list[Sequence[object]] = [(*OBJECT_COLUMNS, "mass", "inertia", "material", "color")]

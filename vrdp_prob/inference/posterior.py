@@ -1,8 +1,9 @@
 """The posterior of one video: draws with names and units, what they can be trusted for, and worlds made of them."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 import torch
@@ -20,6 +21,7 @@ from vrdp_prob.models.scenery import Scenery
 from vrdp_prob.models.simulator.worlds import Worlds
 from vrdp_prob.scene import Tracks
 
+Kind = TypeVar("Kind", bound="Posterior")
 PairFunction = Callable[[np.ndarray, np.ndarray], np.ndarray]
 
 
@@ -127,7 +129,7 @@ class Posterior:
         restitution = self._draws("restitution")
         return tuple(self._pair_summary(pair, restitution, np.multiply) for pair in self.pairs)
 
-    def write(self, path: Path) -> None:
+    def write(self, path: Path | str) -> None:
         """Save as one netCDF file that needs nothing else to be read again; an interruption leaves no half file.
 
         Raises
@@ -137,11 +139,18 @@ class Posterior:
         """
         from vrdp_prob.inference.storage import write_posterior  # noqa: PLC0415 (storage knows this class)
 
-        write_posterior(self, path)
+        write_posterior(self, Path(path))
 
     @classmethod
-    def read(cls, path: Path, tracks: Tracks | None = None) -> "Posterior":
-        """Open what `write` saved.
+    def read(cls: "type[Kind]", path: Path | str, tracks: Tracks | None = None) -> "Kind":
+        """Open what `write` saved; `AskablePosterior.read` gives one that can be asked.
+
+        Parameters
+        ----------
+        path
+            The file.
+        tracks
+            In place of the tracks in the file.
 
         Raises
         ------
@@ -150,7 +159,8 @@ class Posterior:
         """
         from vrdp_prob.inference.storage import read_posterior  # noqa: PLC0415 (storage knows this class)
 
-        return read_posterior(path, tracks)
+        saved = read_posterior(Path(path), tracks)
+        return cls(**{entry.name: getattr(saved, entry.name) for entry in fields(Posterior)})
 
     def _draws(self, name: str) -> Float[np.ndarray, "chain draw *axes"]:
         values: np.ndarray = self.data["posterior"][name].transpose("chain", "draw", ...).values

@@ -60,7 +60,7 @@ class PhysicsModel:
         return PhysicsModel(f"{self.name}+{effect.name}", (*self.effects, effect), self.beliefs)
 
     @classmethod
-    def read(cls, path: Path) -> "PhysicsModel":
+    def read(cls, path: Path | str) -> "PhysicsModel":
         """Read a model file that `write` wrote, or that a person did.
 
         Raises
@@ -69,13 +69,13 @@ class PhysicsModel:
             With file and field, if the file cannot be read or is not a model.
         """
         try:
-            return cls(*model_file.parse(path.read_text(encoding="utf-8")))
+            return cls(*model_file.parse(Path(path).read_text(encoding="utf-8")))
         except OSError as error:
             raise InputError(f"{path}: the model file cannot be read ({error.strerror}); check the path.") from error
         except (InputError, UnicodeDecodeError) as error:
             raise InputError(f"{path}: {error}") from error
 
-    def write(self, path: Path) -> None:
+    def write(self, path: Path | str) -> None:
         """Write the model as a TOML file.
 
         Raises

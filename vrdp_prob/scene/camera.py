@@ -66,7 +66,7 @@ class Camera:
         return cls(np.array(_CLEVRER_PROJECTION), width=480, height=320, frame_rate=25.0)
 
     @classmethod
-    def read(cls, path: Path) -> "Camera":
+    def read(cls, path: Path | str) -> "Camera":
         """Read a camera file (JSON with `projection`, `width`, `height`, optionally `fps` and `pixel_sd`).
 
         Raises
@@ -75,7 +75,7 @@ class Camera:
             If the file cannot be read, is not such a document, or its matrix is unusable.
         """
         try:
-            document = json.loads(path.read_text(encoding="utf-8"))
+            document = json.loads(Path(path).read_text(encoding="utf-8"))
             projection = np.array(document["projection"], dtype=float)
             width, height = int(document["width"]), int(document["height"])
             frame_rate = float(document["fps"]) if document.get("fps") else None
@@ -103,7 +103,7 @@ class Camera:
             "projection": self.projection.tolist(),
         }
 
-    def write(self, path: Path) -> None:
+    def write(self, path: Path | str) -> None:
         """Write a camera file that `Camera.read` reads.
 
         Raises

@@ -1,5 +1,6 @@
 """The command line as a user meets it: exit codes, one sentence for a mistake, nothing half-written."""
 
+import errno
 import json
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -12,7 +13,7 @@ import pytest
 
 from vrdp_prob import cli
 from vrdp_prob.progress import Advance
-from vrdp_prob.reasoning import Answer, ChoiceAnswer
+from vrdp_prob.reasoning import Answer, AskablePosterior, ChoiceAnswer
 from vrdp_prob.reasoning.answer import monte_carlo_error
 from vrdp_prob.report import pipeline, schema
 from vrdp_prob.scene import Camera, QuestionType
@@ -87,6 +88,8 @@ def test_report_writes_its_three_files(folder: Path, tmp_path: Path, capsys: pyt
     jsonschema.validate(document, schema("report"))
     assert [answer["answer"] for answer in document["answers"]] == [1, []]
     assert document["objects"][0]["mass"]["status"] == "ratio_only"
+    saved = AskablePosterior.read(str(out / "posterior.nc"))
+    assert saved.ask("How many collisions happen?").to_document() | {"question_id": 0} == document["answers"][0]
 
 
 def test_ask_prints_exactly_one_document(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -115,7 +118,7 @@ def answer(**fields: object) -> Answer:
 @pytest.mark.parametrize(
     ("given", "lines"),
     [
-        (answer(), ["  60 % ± 2     2", "  30 % ± 2     1", "  10 % ± 2     3"]),
+        (answer(), ["  60 % ± 2     2", "  30 % ± 2     1", "  10 % ± 1     3"]),
         (
             answer(probability=1.0, mc_error=monte_carlo_error(1.0, 400), distribution={"2": 1.0}),
             ["> 99 %         2"],
@@ -359,6 +362,25 @@ def test_unusable_options(folder: Path, capsys: pytest.CaptureFixture[str]) -> N
     assert "--seed" in refused(capsys, "report", folder, "--seed", "-1")
     assert "No such option" in refused(capsys, "report", folder, "--colour")
     assert "INPUT" in refused(capsys, "report")
+
+
+@pytest.mark.parametrize("failing", ["fill_file", "write_report"])
+def test_a_report_that_cannot_be_written_leaves_the_old_one(
+    folder: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, failing: str
+) -> None:
+    def fail(*_arguments: object) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    out = folder / "out"
+    out.mkdir()
+    for name in ("posterior.nc", "report.html", "report.json"):
+        (out / name).write_text("old")
+    monkeypatch.setattr(pipeline, failing, fail)
+    line = refused(capsys, "report", folder, "--out", out, "--sampler", "laplace", "--quiet")
+    assert "posterior.nc: the file cannot be written (No space left on device)" in line
+    assert {path.name: path.read_text() for path in out.iterdir()} == dict.fromkeys(
+        ("posterior.nc", "report.html", "report.json"), "old"
+    )
 
 
 class Interrupting:

@@ -1,5 +1,7 @@
 """Files are there whole or not at all."""
 
+import errno
+import os
 from pathlib import Path
 
 import pytest
@@ -34,3 +36,16 @@ def test_a_folder_that_cannot_be_made(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("in the way")
     with pytest.raises(InputError, match="the folder cannot be written"), write_atomically(tmp_path / "file" / "a.txt"):
         pass
+
+
+def test_a_folder_in_the_way(tmp_path: Path) -> None:
+    (tmp_path / "a.txt").mkdir()
+    with pytest.raises(InputError, match="a folder has its name"), write_atomically(tmp_path / "a.txt"):
+        pytest.fail("the work began")
+
+
+def test_a_full_disk_is_one_sentence(tmp_path: Path) -> None:
+    message = r"a\.txt: the file cannot be written \(No space left"
+    with pytest.raises(InputError, match=message), write_atomically(tmp_path / "a.txt"):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+    assert list(tmp_path.iterdir()) == []

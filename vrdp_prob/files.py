@@ -25,15 +25,17 @@ def check_writable(folder: Path) -> None:
 
 
 @contextmanager
-def write_atomically(path: Path) -> Iterator[Path]:
+def write_atomically(path: Path | str) -> Iterator[Path]:
     """Give a temporary path beside `path`, which takes the name `path` when the block ends without an exception.
 
     Raises
     ------
     InputError
-        If the folder cannot be made or written.
+        If the folder cannot be made or written, a folder has the file's name, or the disk is full.
     """
-    temporary: Path | None = None
+    path, temporary = Path(path), None
+    if path.is_dir():
+        raise InputError(f"{path}: the file cannot be written, a folder has its name; choose another place.")
     try:
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
@@ -47,7 +49,10 @@ def write_atomically(path: Path) -> Iterator[Path]:
         yield temporary
         temporary.chmod(0o644)
         temporary.replace(path)
-    except BaseException:
+    except BaseException as error:
         if temporary is not None:
             temporary.unlink(missing_ok=True)
+        if isinstance(error, OSError):
+            reason = error.strerror or error
+            raise InputError(f"{path}: the file cannot be written ({reason}); choose another place.") from error
         raise

@@ -4,7 +4,6 @@ import json
 import warnings
 from dataclasses import asdict
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
@@ -15,6 +14,7 @@ from vrdp_prob.files import write_atomically
 from vrdp_prob.inference.identifiability import BodyStatus, ParameterStatus, Status
 from vrdp_prob.inference.posterior import Posterior
 from vrdp_prob.inference.samples import Convergence
+from vrdp_prob.models import model_file
 from vrdp_prob.models.physics import PhysicsModel
 from vrdp_prob.scene import Body, Camera, Shape, Tracks, Wall
 
@@ -28,13 +28,27 @@ def write_posterior(posterior: Posterior, path: Path) -> None:
     Raises
     ------
     InputError
+        If the file cannot be written: the folder, or a full disk.
+    """
+    with write_atomically(path) as temporary:
+        fill_file(posterior, temporary)
+
+
+def fill_file(posterior: Posterior, path: Path) -> None:
+    """Write a posterior straight into a file, for those who see to its being whole themselves.
+
+    Raises
+    ------
+    OSError
         If the file cannot be written.
     """
     tree = posterior.data.copy()
     tree.attrs = {"vrdp_prob": json.dumps(_document(posterior)), "format": FORMAT}
-    with write_atomically(path) as temporary, warnings.catch_warnings():
+    with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        tree.to_netcdf(temporary, engine="h5netcdf")
+        # in memory first: on a full disk the HDF5 library would go on to fail whenever it frees an object
+        content = tree.to_netcdf(engine="h5netcdf")
+    path.write_bytes(content)
 
 
 def read_posterior(path: Path, tracks: Tracks | None = None) -> Posterior:
@@ -59,13 +73,13 @@ def read_posterior(path: Path, tracks: Tracks | None = None) -> Posterior:
 
 def _document(posterior: Posterior) -> dict[str, Any]:
     """What the file holds beside the arrays."""
-    tracks = posterior.tracks
+    tracks, model = posterior.tracks, posterior.model
     return {
         "video": tracks.video,
         "bodies": [asdict(body) for body in tracks.bodies],
         "walls": [asdict(wall) for wall in tracks.walls],
         "camera": None if tracks.camera is None else tracks.camera.to_document(),
-        "model": _model_text(posterior.model),
+        "model": model_file.text(model.name, model.effects, model.parameters),
         "seed": posterior.seed,
         "status": {name: asdict(status) for name, status in posterior.status.items()},
         "convergence": asdict(posterior.convergence),
@@ -81,7 +95,7 @@ def _posterior(document: dict[str, Any], tree: xr.DataTree, tracks: Tracks | Non
     }
     return Posterior(
         tracks=_tracks(document, tree) if tracks is None else tracks,
-        model=_model(document["model"]),
+        model=PhysicsModel(*model_file.parse(document["model"])),
         seed=document["seed"],
         data=tree,
         status=status,
@@ -89,21 +103,6 @@ def _posterior(document: dict[str, Any], tree: xr.DataTree, tracks: Tracks | Non
         warnings=tuple(document["warnings"]),
         pairs=tuple((first, second) for first, second in document["pairs"]),
     )
-
-
-def _model_text(model: PhysicsModel) -> str:
-    """The model's file as text."""
-    with TemporaryDirectory() as folder:
-        path = Path(folder) / "model.toml"
-        model.write(path)
-        return path.read_text(encoding="utf-8")
-
-
-def _model(text: str) -> PhysicsModel:
-    with TemporaryDirectory() as folder:
-        path = Path(folder) / "model.toml"
-        path.write_text(text, encoding="utf-8")
-        return PhysicsModel.read(path)
 
 
 def _parameter_status(document: dict[str, Any]) -> ParameterStatus:

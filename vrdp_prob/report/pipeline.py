@@ -5,8 +5,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from vrdp_prob.errors import InputError
-from vrdp_prob.files import check_writable
+from vrdp_prob.files import check_writable, write_atomically
 from vrdp_prob.inference import Posterior, infer
+from vrdp_prob.inference.storage import fill_file
 from vrdp_prob.models.physics import PhysicsModel
 from vrdp_prob.perception.video import read_frames
 from vrdp_prob.progress import ProgressDisplay, SilentProgress
@@ -98,9 +99,11 @@ def report(
     with progress.stage("Report") as advance:
         frames = None if video_file is None else read_frames(Path(video_file)).frames
         content = build(posterior, answers, worlds=worlds, frames=frames)
-        written = write_report(content, directory)
-        posterior.write(directory / "posterior.nc")
-    return Report(posterior, tuple(answers), content, (written.page, written.document, directory / "posterior.nc"))
+        saved = directory / "posterior.nc"
+        with write_atomically(saved) as new_posterior:
+            fill_file(posterior, new_posterior)
+            written = write_report(content, directory)
+    return Report(posterior, tuple(answers), content, (written.page, written.document, saved))
 
 
 def check_questions(questions: Sequence[Question | str], *, tracks: Tracks | None = None) -> None:

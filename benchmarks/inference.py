@@ -17,17 +17,13 @@ import numpy as np
 import torch
 
 from vrdp_prob.datasets import load_all
-from vrdp_prob.inference import default_model
-from vrdp_prob.inference.emcee_sampler import sample_emcee
+from vrdp_prob.inference import SAMPLERS, default_model
 from vrdp_prob.inference.events import first_contacts
-from vrdp_prob.inference.laplace import sample_laplace
 from vrdp_prob.inference.map_fit import MapFit, fit_map
-from vrdp_prob.inference.nuts_sampler import sample_nuts
 from vrdp_prob.inference.samples import assess
 from vrdp_prob.scene import Tracks
 
 DATA = Path(__file__).parents[2] / "shared" / "data" / "clevrer_bullet"
-SAMPLERS = {"emcee": sample_emcee, "nuts": sample_nuts, "laplace": sample_laplace}
 GOALS = {"map": 5.0, "emcee": 60.0, "nuts": 60.0, "laplace": 10.0}
 """Seconds."""
 DRAWS = 1000

@@ -6,13 +6,13 @@ Exit code 0: done; 2: input that cannot be used (one line says what, where, and 
 import json
 import sys
 from pathlib import Path
-from typing import Annotated, get_args
+from typing import Annotated
 
 import typer
 
 from vrdp_prob.datasets import load, load_all, read_questions, video_files
 from vrdp_prob.errors import InputError
-from vrdp_prob.inference import SamplerName, default_model
+from vrdp_prob.inference import SAMPLERS, default_model
 from vrdp_prob.models.physics import PhysicsModel
 from vrdp_prob.models.simulator.rollout import compile_model
 from vrdp_prob.progress import progress_display
@@ -25,7 +25,7 @@ UNUSABLE_INPUT = 2
 FAILURE = 1
 INTERRUPTED = 130
 """What the command-line library makes of Ctrl-C."""
-DEFAULT_SAMPLER: SamplerName = "emcee"
+DEFAULT_SAMPLER = "emcee"
 
 app = typer.Typer(
     help="Fit a rigid-body simulator to a video and answer questions about it with probabilities.",
@@ -37,7 +37,7 @@ app = typer.Typer(
 
 Input = Annotated[Path, typer.Argument(metavar="INPUT", help="A video, a tracks folder, or a CLEVRER annotation file.")]
 Model = Annotated[Path | None, typer.Option(metavar="FILE.toml", help="Physics model; the base model by default.")]
-Sampler = Annotated[str, typer.Option(metavar="|".join(get_args(SamplerName)), help="How the posterior is drawn.")]
+Sampler = Annotated[str, typer.Option(metavar="|".join(SAMPLERS), help="How the posterior is drawn.")]
 Seed = Annotated[int, typer.Option(help="Same seed, same numbers.")]
 Quiet = Annotated[bool, typer.Option("--quiet", help="No progress bars, no closing lines.")]
 CameraOption = Annotated[

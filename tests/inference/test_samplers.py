@@ -5,6 +5,7 @@ import pytest
 import torch
 from scipy.stats import norm
 
+from vrdp_prob.inference.curved_gaussian import CurvedGaussian
 from vrdp_prob.inference.emcee_sampler import sample_emcee
 from vrdp_prob.inference.laplace import sample_laplace, smoothed_weights
 from vrdp_prob.inference.nuts_sampler import sample_nuts
@@ -33,9 +34,9 @@ class SkewedRidge:
         return self.root[:, 0] * (digamma - np.log(4))
 
     @property
-    def start(self) -> Gaussian:
+    def start(self) -> CurvedGaussian:
         scales = np.array([0.5] + [1.0] * (DIMENSION - 1))
-        return Gaussian(np.zeros(DIMENSION), self.root * scales)
+        return CurvedGaussian.straight(Gaussian(np.zeros(DIMENSION), self.root * scales))
 
 
 @pytest.mark.parametrize("name", SAMPLERS)

@@ -1,5 +1,7 @@
 """What comes next and what if, against the same discs run again with the change."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from sliding_discs import Disc, KnownPosterior, changed, path, tracks_of
@@ -8,6 +10,7 @@ from test_seen import CHAIN
 from vrdp_prob.errors import InputError
 from vrdp_prob.inference import Status
 from vrdp_prob.reasoning import Change, PosteriorWorlds, ask, infer
+from vrdp_prob.scene import Shape, Tracks
 
 DRAWS = 30
 
@@ -146,3 +149,15 @@ def test_defaults_drawn_from_the_prior_widen_what_is_simulated() -> None:
         worlds = PosteriorWorlds(posterior, draws=100, defaults=defaults)
         spread[defaults] = worlds.future.trajectory[:, -1, 1, 0].std()
     assert spread["prior"] > 1.2 * spread["fixed"]
+
+
+def test_a_cube_that_no_change_reaches_turns_as_it_was_seen() -> None:
+    discs = (*CHAIN[:2], Disc((-1.0, 2.0)))
+    tracks = tracks_of(discs)
+    bodies = (*tracks.bodies[:2], replace(tracks.bodies[2], shape=Shape.CUBE))
+    angles = np.full(tracks.seen.shape, np.nan)
+    angles[:, 2] = 0.7 * tracks.times
+    turning = Tracks.from_arrays("turning", bodies, tracks.times, tracks.positions, angles=angles)
+    world = PosteriorWorlds(KnownPosterior(turning, discs), draws=DRAWS).counterfactual(Change.REMOVED, 0)
+    turned = world.trajectory[:, :, 2, 2] - world.trajectory[:, :1, 2, 2]
+    assert turned == pytest.approx(np.broadcast_to(0.7 * tracks.times, turned.shape), abs=1e-9)

@@ -28,10 +28,8 @@ def named_draws(likelihood: Likelihood, points: Float[np.ndarray, "chain draw di
     """All quantities of the worlds that points stand for, sampled or not, with axes `chain`, `draw` and their own."""
     chains, draws = points.shape[:2]
     flat = torch.from_numpy(np.ascontiguousarray(points.reshape(chains * draws, -1)))
-    coordinates = likelihood.coordinates
-    values = {
-        field: coordinates.quantity(field, flat).numpy().reshape(chains, draws, -1) for field in coordinates.defaults
-    }
+    quantities = likelihood.coordinates.quantities(flat)
+    values = {field: column.numpy().reshape(chains, draws, -1) for field, column in quantities.items()}
     per_body = ("chain", "draw", "body")
     variables: dict[str, tuple[tuple[str, ...], np.ndarray]] = {
         "position": ((*per_body, "axis"), np.stack([values.pop("x"), values.pop("y")], axis=-1)),

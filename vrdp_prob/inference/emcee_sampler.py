@@ -1,5 +1,8 @@
 """Sampling with emcee: independent ensembles of walkers, each merged into one chain before anything is judged.
 
+Moves along the gradient do most of the mixing; differential evolution and proposals that forget the place jump between
+what gradients do not connect.
+
 Walkers of one ensemble propose from one another, so they are no independent chains; whole ensembles are.
 No snooker moves: in emcee 3.1.6 they shrink a Gaussian's standard deviation to 0.77 of what it is.
 Source: Foreman-Mackey, Hogg, Lang and Goodman, emcee: The MCMC Hammer, PASP 125 (2013); ter Braak, A Markov chain
@@ -14,34 +17,36 @@ import numpy as np
 from jaxtyping import Float
 from numpy.random import RandomState
 
+from vrdp_prob.inference.curved_gaussian import CurvedGaussian
+from vrdp_prob.inference.hamiltonian_move import HamiltonianMove
 from vrdp_prob.inference.laplace import DEGREES_OF_FREEDOM, adapted, smoothed_weights
 from vrdp_prob.inference.samples import (
     ESS_GOAL,
     R_HAT_GOAL,
-    Gaussian,
     LogDensity,
     Samples,
     chain_statistics,
     evaluate,
+    evaluate_with_gradient,
 )
 from vrdp_prob.progress import ProgressDisplay, SilentProgress
 
 ENSEMBLES = 4
-STEPS_PER_ROUND = 200
-STEPS_TOGETHER = 20
+WARM_UP = 16
+"""Steps that tune the Hamiltonian move and are thrown away."""
+STEPS_PER_ROUND = 24
+STEPS_TOGETHER = 2
 """Steps after which the ensembles, one thread each, wait for one another, so that an interruption is soon noticed."""
-ROUNDS = 4
+ROUNDS = 5
 """Rounds after which sampling stops even if it has not converged; a number of steps and not a time, so that the same
 seed gives the same draws on every machine."""
-BURN_IN = 0.3
-"""Share of the steps at the start of every ensemble that is thrown away."""
 START_POOL = 16
 """Importance-sampled candidates per walker from which the starting places are taken."""
 
 
 def sample_emcee(
     density: LogDensity,
-    start: Gaussian,
+    start: CurvedGaussian,
     *,
     draws: int,
     generator: np.random.Generator,
@@ -53,7 +58,7 @@ def sample_emcee(
     Parameters
     ----------
     density
-        The log posterior.
+        The log posterior, differentiable.
     start
         Gaussian around the MAP, from which the walkers set out.
     draws
@@ -63,47 +68,60 @@ def sample_emcee(
     progress
         Told how many steps are done.
     rounds
-        At most so many rounds of 200 steps.
+        At most so many rounds of 24 steps.
 
     Returns
     -------
-    One chain per ensemble, walker after walker so that autocorrelation within a walker shows; all steps after burn-in.
+    One chain per ensemble, walker after walker so that autocorrelation within a walker shows; all steps after warm-up.
+    The R-hat that goes with it compares the ensembles' earlier with their later steps.
     """
     del draws
-    dimension = len(start.mean)
-    walkers = 2 * (dimension + 2 + dimension // 4)
     start, adapting = adapted(density, start, generator, lambda _steps: None)
+    walkers = 2 * (start.dimension + 1)
     ensembles = [_Ensemble(density, start, walkers, generator) for _ in range(ENSEMBLES)]
     workers = ThreadPoolExecutor(max_workers=min(ENSEMBLES, os.cpu_count() or 1))
-    display = (progress or SilentProgress()).stage("Sampling (emcee)", total=rounds * STEPS_PER_ROUND)
+    display = (progress or SilentProgress()).stage("Sampling (emcee)", total=WARM_UP + rounds * STEPS_PER_ROUND)
     with workers, display as advance:
-        for _round in range(rounds):
-            for _ in range(STEPS_PER_ROUND // STEPS_TOGETHER):
-                list(workers.map(lambda ensemble: ensemble.run(STEPS_TOGETHER), ensembles))
+
+        def run(steps: int, *, tune: bool) -> None:
+            for _ in range(steps // STEPS_TOGETHER):
+                list(workers.map(lambda ensemble: ensemble.run(STEPS_TOGETHER, tune=tune), ensembles))
                 advance(STEPS_TOGETHER)
-            chains = np.stack([ensemble.chain() for ensemble in ensembles])
-            if _good_enough(chains):
+
+        run(WARM_UP, tune=True)
+        for _round in range(rounds):
+            run(STEPS_PER_ROUND, tune=False)
+            points = start.points(np.stack([ensemble.chain() for ensemble in ensembles]))
+            drift = _drift(points)
+            r_hat, ess = chain_statistics(_by_walker(points))
+            if max(r_hat, drift) <= R_HAT_GOAL and ess >= 1.25 * ESS_GOAL:
                 break
-    points = start.points(chains)
     log_density = np.stack([ensemble.log_density() for ensemble in ensembles])
-    acceptance = np.stack([np.full(log_density.shape[1], ensemble.acceptance) for ensemble in ensembles])
-    evaluations = adapting + sum(ensemble.evaluations for ensemble in ensembles)
-    return Samples(points, log_density, {"acceptance_rate": acceptance}, evaluations=evaluations)
+    acceptance = [np.full(log_density[0].size, ensemble.acceptance) for ensemble in ensembles]
+    return Samples(
+        _by_walker(points),
+        _by_walker(log_density[..., None])[..., 0],
+        {"acceptance_rate": np.stack(acceptance)},
+        r_hat=drift,
+        evaluations=adapting + sum(ensemble.evaluations for ensemble in ensembles),
+        gradients=sum(ensemble.gradients for ensemble in ensembles),
+    )
 
 
 class _Ensemble:
     """One emcee ensemble in whitened coordinates."""
 
-    def __init__(self, density: LogDensity, start: Gaussian, walkers: int, generator: np.random.Generator) -> None:
+    def __init__(self, density: LogDensity, start: CurvedGaussian, walkers: int, generator: np.random.Generator) -> None:
         self._density, self._gaussian = density, start
-        self.evaluations = 0
+        self.evaluations = self.gradients = 0
         moves = [
-            (emcee.moves.MHMove(_independent), 0.5),
-            (emcee.moves.DEMove(), 0.4),
+            (HamiltonianMove(self._with_gradient), 0.4),
+            (emcee.moves.MHMove(_independent), 0.2),
+            (emcee.moves.DEMove(), 0.3),
             (emcee.moves.DEMove(gamma0=1.0), 0.1),
         ]
         self._sampler = emcee.EnsembleSampler(
-            walkers, len(start.mean), self._log_probability, moves=moves, vectorize=True
+            walkers, start.dimension, self._log_probability, moves=moves, vectorize=True
         )
         state = RandomState(int(generator.integers(2**31))).get_state()
         places = self._starting_places(walkers, generator)
@@ -113,9 +131,16 @@ class _Ensemble:
         self.evaluations += len(whitened)
         return evaluate(self._density, self._gaussian.points(whitened))
 
+    def _with_gradient(
+        self, whitened: Float[np.ndarray, "walker dimension"]
+    ) -> tuple[Float[np.ndarray, "walker"], Float[np.ndarray, "walker dimension"]]:
+        self.evaluations += len(whitened)
+        self.gradients += len(whitened)
+        return evaluate_with_gradient(lambda places: self._density(self._gaussian.mapped(places)), whitened)
+
     def _starting_places(self, walkers: int, generator: np.random.Generator) -> Float[np.ndarray, "walker dimension"]:
         """Different points with support, drawn by importance from the Gaussian."""
-        pool = generator.standard_normal((START_POOL * walkers, len(self._gaussian.mean)))
+        pool = generator.standard_normal((START_POOL * walkers, self._gaussian.dimension))
         values = self._log_probability(pool)
         weights, _ = smoothed_weights(values + (pool**2).sum(axis=1) / 2)
         supported = np.flatnonzero(np.isfinite(values))
@@ -125,22 +150,32 @@ class _Ensemble:
         chosen = generator.choice(supported, size=walkers, replace=False, p=flattened / flattened.sum())
         return pool[chosen]
 
-    def run(self, steps: int) -> None:
-        self._state = self._sampler.run_mcmc(self._state, steps, skip_initial_state_check=True, progress=False)
+    def run(self, steps: int, *, tune: bool) -> None:
+        self._state = self._sampler.run_mcmc(
+            self._state, steps, tune=tune, skip_initial_state_check=True, progress=False
+        )
 
     @property
     def acceptance(self) -> float:
         return float(np.mean(self._sampler.acceptance_fraction))
 
-    def _discard(self) -> int:
-        return int(BURN_IN * self._sampler.iteration)
+    def chain(self) -> Float[np.ndarray, "step walker dimension"]:
+        steps: np.ndarray = self._sampler.get_chain(discard=WARM_UP)
+        return steps
 
-    def chain(self) -> Float[np.ndarray, "draw dimension"]:
-        steps = self._sampler.get_chain(discard=self._discard())
-        return np.ascontiguousarray(np.swapaxes(steps, 0, 1)).reshape(-1, steps.shape[-1])
+    def log_density(self) -> Float[np.ndarray, "step walker"]:
+        values: np.ndarray = self._sampler.get_log_prob(discard=WARM_UP)
+        return values
 
-    def log_density(self) -> Float[np.ndarray, "draw"]:
-        return self._sampler.get_log_prob(discard=self._discard()).T.reshape(-1)
+
+def _by_walker(values: Float[np.ndarray, "chain step walker axis"]) -> Float[np.ndarray, "chain draw axis"]:
+    """Ensembles as chains, walker after walker."""
+    return np.swapaxes(values, 1, 2).reshape(len(values), -1, values.shape[-1])
+
+
+def _drift(points: Float[np.ndarray, "chain step walker dimension"]) -> float:
+    """Largest R-hat of the ensembles, each split into its earlier and its later steps."""
+    return chain_statistics(points.reshape(len(points), -1, points.shape[-1]))[0]
 
 
 def _independent(
@@ -159,8 +194,3 @@ def _independent(
         return -power * np.log1p((whitened**2).sum(axis=1) / DEGREES_OF_FREEDOM)
 
     return proposed, log_density(places) - log_density(proposed)
-
-
-def _good_enough(chains: Float[np.ndarray, "chain draw dimension"]) -> bool:
-    r_hat, ess = chain_statistics(chains)
-    return r_hat <= R_HAT_GOAL and ess >= 1.25 * ESS_GOAL

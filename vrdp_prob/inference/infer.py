@@ -1,6 +1,6 @@
 """From tracks to posterior: the most probable values first, then a sampler that sets out from them."""
 
-from typing import Literal, get_args
+from collections.abc import Callable, Mapping
 
 import numpy as np
 import torch
@@ -22,7 +22,12 @@ from vrdp_prob.models.physics import PhysicsModel
 from vrdp_prob.progress import ProgressDisplay
 from vrdp_prob.scene import Tracks
 
-SamplerName = Literal["nuts", "emcee", "laplace"]
+SAMPLERS: Mapping[str, Callable[..., Samples]] = {
+    "emcee": sample_emcee,
+    "nuts": sample_nuts,
+    "laplace": sample_laplace,
+}
+"""The samplers by name; all take the log density and the Gaussian around the MAP."""
 PRIOR_DRAWS = 500
 BATCH = 500
 """Worlds simulated at once when the draws are looked at again."""
@@ -69,15 +74,16 @@ def infer(
     InputError
         If the sampler is unknown or fewer than 4 draws are asked for.
     """
-    if sampler not in get_args(SamplerName):
-        raise InputError(f"sampler '{sampler}' is not known; use one of {', '.join(get_args(SamplerName))}.")
+    if sampler not in SAMPLERS:
+        raise InputError(f"sampler '{sampler}' is not known; use one of {', '.join(SAMPLERS)}.")
     if draws < 4:
         raise InputError(f"draws is {draws}; ask for at least 4.")
     physics = default_model() if model is None else model
     generator = np.random.default_rng(seed)
     fit = fit_map(tracks, physics, generator, progress)
-    sample = {"nuts": sample_nuts, "emcee": sample_emcee, "laplace": sample_laplace}[sampler]
-    samples = sample(fit.likelihood.log_density, fit.gaussian, draws=draws, generator=generator, progress=progress)
+    samples = SAMPLERS[sampler](
+        fit.likelihood.log_density, fit.gaussian, draws=draws, generator=generator, progress=progress
+    )
     return _posterior(fit, samples, sampler, seed=seed, draws=draws, generator=generator)
 
 

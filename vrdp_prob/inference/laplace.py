@@ -8,7 +8,8 @@ from arviz_stats.base.array import array_stats
 from jaxtyping import Float
 from scipy.special import gammaln
 
-from vrdp_prob.inference.samples import Gaussian, LogDensity, Samples, evaluate
+from vrdp_prob.inference.curved_gaussian import CurvedGaussian
+from vrdp_prob.inference.samples import LogDensity, Samples, evaluate
 from vrdp_prob.progress import Advance, ProgressDisplay, SilentProgress
 
 DEGREES_OF_FREEDOM = 30.0
@@ -30,7 +31,7 @@ BATCH = 500
 
 def sample_laplace(
     density: LogDensity,
-    start: Gaussian,
+    start: CurvedGaussian,
     *,
     draws: int,
     generator: np.random.Generator,
@@ -58,7 +59,7 @@ def sample_laplace(
     count = OVERSAMPLING * draws
     with (progress or SilentProgress()).stage("Importance sampling", total=count + ROUNDS * ROUND_DRAWS) as advance:
         proposal, evaluations = adapted(density, start, generator, advance)
-        points, log_density, log_ratio = _weighted(density, proposal, count, generator, advance)
+        whitened, log_density, log_ratio = _weighted(density, proposal, count, generator, advance)
     weights, pareto_k = smoothed_weights(log_ratio)
     effective = effective_count(weights)
     if effective < FEWEST:
@@ -66,7 +67,7 @@ def sample_laplace(
     chosen_draws = _resample(weights, draws, generator)
     statistics = {"log_weight": np.log(np.maximum(weights[chosen_draws], 1e-300))[None]}
     return Samples(
-        points[chosen_draws][None],
+        proposal.points(whitened[chosen_draws])[None],
         log_density[chosen_draws][None],
         statistics,
         pareto_k=pareto_k,
@@ -76,28 +77,27 @@ def sample_laplace(
 
 
 def adapted(
-    density: LogDensity, start: Gaussian, generator: np.random.Generator, advance: Advance
-) -> tuple[Gaussian, int]:
+    density: LogDensity, start: CurvedGaussian, generator: np.random.Generator, advance: Advance
+) -> tuple[CurvedGaussian, int]:
     """Move and shape a Gaussian towards the density by weighted draws (population Monte Carlo).
 
     Source: Cappe, Douc, Guillin, Marin and Robert, Adaptive importance sampling in general mixture classes,
     Statistics and Computing 18 (2008).
     """
     gaussian, evaluations = start, 0
-    dimension = len(start.mean)
+    dimension = start.dimension
     for _ in range(ROUNDS):
-        points, _, log_ratio = _weighted(density, gaussian, ROUND_DRAWS, generator, advance)
+        whitened, _, log_ratio = _weighted(density, gaussian, ROUND_DRAWS, generator, advance)
         evaluations += ROUND_DRAWS
         weights, _ = smoothed_weights(log_ratio)
         if effective_count(weights) > GOOD_ENOUGH * ROUND_DRAWS:
             break
         weights = _flattened(log_ratio, EFFECTIVE_PER_DIMENSION * dimension)
-        mean = weights @ points
-        centred = points - mean
+        mean = weights @ whitened
+        centred = whitened - mean
         covariance = (centred * weights[:, None]).T @ centred
         share = min(1.0, effective_count(weights) / (2 * EFFECTIVE_PER_DIMENSION * dimension))
-        covariance = share * covariance + (1 - share) * gaussian.root @ gaussian.root.T
-        gaussian = Gaussian(mean, np.linalg.cholesky(covariance))
+        gaussian = gaussian.moved(mean, share * covariance + (1 - share) * np.eye(dimension))
     return gaussian, evaluations
 
 
@@ -107,9 +107,9 @@ def effective_count(weights: Float[np.ndarray, "draw"]) -> float:
 
 
 def _weighted(
-    density: LogDensity, proposal: Gaussian, count: int, generator: np.random.Generator, advance: Advance
+    density: LogDensity, proposal: CurvedGaussian, count: int, generator: np.random.Generator, advance: Advance
 ) -> tuple[Float[np.ndarray, "draw dimension"], Float[np.ndarray, "draw"], Float[np.ndarray, "draw"]]:
-    """Points of a proposal, their log density and the log of density over proposal."""
+    """Whitened points of a proposal, their log density and the log of density over proposal."""
     whitened, log_proposal = _proposals(proposal, count, generator)
     points = proposal.points(whitened)
     log_density = np.empty(count)
@@ -117,7 +117,7 @@ def _weighted(
         chosen = slice(begin, min(begin + BATCH, count))
         log_density[chosen] = evaluate(density, points[chosen])
         advance(chosen.stop - chosen.start)
-    return points, log_density, log_density - log_proposal
+    return whitened, log_density, log_density - log_proposal
 
 
 def _flattened(log_ratio: Float[np.ndarray, "draw"], effective: float) -> Float[np.ndarray, "draw"]:
@@ -152,15 +152,15 @@ def smoothed_weights(log_ratio: Float[np.ndarray, "draw"]) -> tuple[Float[np.nda
 
 
 def _proposals(
-    start: Gaussian, count: int, generator: np.random.Generator
+    start: CurvedGaussian, count: int, generator: np.random.Generator
 ) -> tuple[Float[np.ndarray, "draw dimension"], Float[np.ndarray, "draw"]]:
     """Multivariate Student-t points in whitened coordinates with their log density up to a constant."""
-    dimension = len(start.mean)
+    dimension = start.dimension
     normal = generator.standard_normal((count, dimension))
     chi_square = generator.chisquare(DEGREES_OF_FREEDOM, size=count) / DEGREES_OF_FREEDOM
     whitened = normal / np.sqrt(chi_square)[:, None]
     constant = gammaln((DEGREES_OF_FREEDOM + dimension) / 2) - gammaln(DEGREES_OF_FREEDOM / 2)
-    constant -= dimension / 2 * np.log(DEGREES_OF_FREEDOM * np.pi) + np.log(np.diag(start.root)).sum()
+    constant -= dimension / 2 * np.log(DEGREES_OF_FREEDOM * np.pi) + start.log_volume
     shape = np.log1p((whitened**2).sum(axis=1) / DEGREES_OF_FREEDOM)
     return whitened, constant - (DEGREES_OF_FREEDOM + dimension) / 2 * shape
 

@@ -5,12 +5,14 @@ L-BFGS on the exact gradient and Levenberg-Marquardt on the residuals climb the 
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import torch
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 from scipy.optimize import minimize as scipy_minimize
 
+from vrdp_prob.inference.curved_gaussian import CurvedGaussian
 from vrdp_prob.inference.events import first_contacts
 from vrdp_prob.inference.free_flight import SeenContact, noise_scale, release_fit, seen_contacts
 from vrdp_prob.inference.growing_fit import GrowingFit
@@ -28,6 +30,12 @@ WINDOW = 8
 """Frames by which the window grows."""
 REST_TEST = 3.0
 """A body rests until its first contact if its scatter about one place exceeds the noise by less than so many sd."""
+REST_LOOK = 0.6
+"""Time in s after its release for which a body that rests must at least stay where it is."""
+SHORTEST_REST_TEST = 6
+"""Degrees of freedom (two per position) below which a scatter says nothing."""
+STILL_ANGLE_SD = 0.06
+"""Scatter (rad) of measured angles up to which a body does not turn; shadows and occlusion let angles drift."""
 LBFGS_ITERATIONS = 30
 
 
@@ -67,10 +75,10 @@ class MapFit:
     misfit: Misfit
     evaluations: int
 
-    @property
-    def gaussian(self) -> Gaussian:
-        """Gaussian with the MAP as its mean and the Gauss-Newton covariance."""
-        return Gaussian.from_precision(self.point, self.precision)
+    @cached_property
+    def gaussian(self) -> CurvedGaussian:
+        """Gaussian with the MAP as its mean and the Gauss-Newton covariance, bent as the posterior's ridges are."""
+        return CurvedGaussian.around(Gaussian.from_precision(self.point, self.precision), self.likelihood.residuals)
 
 
 def fit_map(
@@ -139,14 +147,38 @@ def _moving(tracks: Tracks, noise: float, contacts: tuple[SeenContact, ...]) -> 
     """Bodies that are not at rest when they are released."""
     moving = set()
     for body in range(len(tracks.bodies)):
-        until = _first_contact(tracks, body, contacts)
-        chosen = tracks.seen[:, body] & (tracks.times < until)
-        places = tracks.positions[chosen, body]
-        freedom = 2 * (len(places) - 1)
-        scatter = float(((places - places.mean(axis=0)) ** 2).sum()) if len(places) else 0.0
-        if freedom < 6 or scatter > noise**2 * (freedom + REST_TEST * np.sqrt(2 * freedom)):
+        start = float(tracks.first_seen[body])
+        until = (_first_contact(tracks, body, contacts), start + REST_LOOK)
+        if not any(_stays(tracks, body, noise, tracks.times < end) for end in until):
             moving.add(body)
     return frozenset(moving)
+
+
+def _stays(tracks: Tracks, body: int, noise: float, chosen: Bool[np.ndarray, "time"]) -> bool:
+    """Whether the positions and angles of a body in some frames scatter about one value, and are enough to tell."""
+    chosen = chosen & tracks.seen[:, body]
+    places = tracks.positions[chosen, body]
+    freedom = 2 * (len(places) - 1)
+    if freedom < SHORTEST_REST_TEST:
+        return False
+    sd = _position_sd(tracks, body, noise)[chosen, None]
+    scatter = float((((places - np.average(places, axis=0, weights=sd[:, 0] ** -2)) / sd) ** 2).sum())
+    turning = 0.0 if tracks.angles is None else float(np.std(_finite(tracks.angles[chosen, body])))
+    return bool(scatter <= freedom + REST_TEST * np.sqrt(2 * freedom)) and turning <= STILL_ANGLE_SD
+
+
+def _position_sd(tracks: Tracks, body: int, noise: float) -> Float[np.ndarray, "time"]:
+    """Standard deviation (m) per axis: the stated one where it is larger, since errors that last look like motion."""
+    if tracks.position_covariance is None:
+        return np.full(len(tracks.times), noise)
+    stated = np.trace(tracks.position_covariance[:, body], axis1=-2, axis2=-1) / 2
+    return np.sqrt(np.fmax(stated, noise**2))
+
+
+def _finite(values: Float[np.ndarray, "seen"]) -> Float[np.ndarray, "finite"]:
+    """The finite values, or a 0 where there is none."""
+    finite = values[np.isfinite(values)]
+    return finite if len(finite) else np.zeros(1)
 
 
 def _first_contact(tracks: Tracks, body: int, contacts: tuple[SeenContact, ...]) -> float:

@@ -12,8 +12,9 @@ from jaxtyping import Float
 from pyro.infer.mcmc import MCMC, NUTS
 from torch import Tensor
 
+from vrdp_prob.inference.curved_gaussian import CurvedGaussian
 from vrdp_prob.inference.laplace import adapted, smoothed_weights
-from vrdp_prob.inference.samples import Gaussian, LogDensity, Samples, evaluate
+from vrdp_prob.inference.samples import LogDensity, Samples, evaluate
 from vrdp_prob.progress import Advance, ProgressDisplay, SilentProgress
 
 CHAINS = 4
@@ -28,7 +29,7 @@ OUT_OF_SUPPORT = 1e10
 
 def sample_nuts(
     density: LogDensity,
-    start: Gaussian,
+    start: CurvedGaussian,
     *,
     draws: int,
     generator: np.random.Generator,
@@ -77,15 +78,14 @@ def sample_nuts(
 class _Potential:
     """Negative log density in whitened coordinates, as Pyro wants it; counts its calls."""
 
-    def __init__(self, density: LogDensity, start: Gaussian) -> None:
+    def __init__(self, density: LogDensity, start: CurvedGaussian) -> None:
         self._density = density
-        self._mean, self._root = torch.from_numpy(start.mean), torch.from_numpy(start.root)
+        self._start = start
         self.gradients = 0
 
     def __call__(self, parameters: dict[str, Tensor]) -> Tensor:
         self.gradients += 1
-        point = self._mean + self._root @ parameters["whitened"]
-        value = -self._density(point[None])[0]
+        value = -self._density(self._start.mapped(parameters["whitened"][None]))[0]
         if bool(torch.isfinite(value)):
             return value
         return OUT_OF_SUPPORT + 0.0 * parameters["whitened"].sum()
@@ -128,13 +128,14 @@ def _chain(
 
 
 def _starting_points(
-    density: LogDensity, start: Gaussian, generator: np.random.Generator
+    density: LogDensity, start: CurvedGaussian, generator: np.random.Generator
 ) -> list[Float[np.ndarray, "dimension"]]:
-    """Different starting points of good log density, in whitened coordinates."""
-    pool = generator.standard_normal((START_POOL, len(start.mean)))
+    """Different starting points, drawn by importance, in whitened coordinates."""
+    pool = generator.standard_normal((START_POOL, start.dimension))
     values = evaluate(density, start.points(pool))
     if np.isfinite(values).sum() < CHAINS:
         return [0.1 * place for place in pool[:CHAINS]]
     weights, _ = smoothed_weights(values + (pool**2).sum(axis=1) / 2)
-    best = np.argsort(-weights)[:CHAINS]
-    return [pool[index] for index in best]
+    flattened = weights**0.5
+    chosen = generator.choice(START_POOL, size=CHAINS, replace=False, p=flattened / flattened.sum())
+    return [pool[index] for index in chosen]

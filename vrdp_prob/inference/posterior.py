@@ -14,7 +14,7 @@ from vrdp_prob.inference.continuation import continued
 from vrdp_prob.inference.identifiability import BodyStatus
 from vrdp_prob.inference.samples import Convergence
 from vrdp_prob.inference.summaries import ObjectSummary, PairSummary, ParameterSummary, Summary
-from vrdp_prob.models.likelihood import worlds_of
+from vrdp_prob.models.scenery import Scenery
 from vrdp_prob.models.parameters import WALL_RESTITUTION
 from vrdp_prob.models.physics import PhysicsModel
 from vrdp_prob.models.simulator.worlds import Worlds
@@ -123,9 +123,9 @@ class Posterior:
         return tuple(self._pair_summary(pair, mass, np.divide) for pair in self.pairs)
 
     def restitution_pairs(self) -> tuple[PairSummary, ...]:
-        """Restitution (product of both factors, at most 1) of every pair that collides."""
+        """Restitution (product of both factors) of every pair that collides."""
         restitution = self._draws("restitution")
-        return tuple(self._pair_summary(pair, restitution, lambda a, b: np.minimum(a * b, 1.0)) for pair in self.pairs)
+        return tuple(self._pair_summary(pair, restitution, np.multiply) for pair in self.pairs)
 
     def write(self, path: Path) -> None:
         """Save as one netCDF file that needs nothing else to be read again; an interruption leaves no half file.
@@ -161,7 +161,7 @@ class Posterior:
         return PairSummary(pair, Summary.of(combine(first, second)))
 
     def _worlds(self, draws: xr.Dataset) -> Worlds:
-        return worlds_of(self.tracks, self.model, quantities(draws))
+        return Scenery.of(self.tracks).worlds(self.model, quantities(draws))
 
 
 def quantities(draws: xr.Dataset) -> dict[str, Float[Tensor, "world owner"]]:

@@ -1,7 +1,7 @@
 """What a sampler is given and what it hands back, and how far the result can be trusted."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import torch
@@ -73,8 +73,10 @@ class Samples:
         Pareto k-hat of the importance weights, else None.
     effective
         Effective number of draws where the sampler knows it better than the chains tell, else None.
+    r_hat
+        Largest R-hat where the sampler knows it better than the chains tell, else None.
     evaluations, gradients
-        Log densities and gradients computed.
+        Log densities computed, and how many of them with their gradient.
     """
 
     points: Float[np.ndarray, "chain draw dimension"]
@@ -83,6 +85,7 @@ class Samples:
     divergences: int | None = None
     pareto_k: float | None = None
     effective: float | None = None
+    r_hat: float | None = None
     evaluations: int = 0
     gradients: int = 0
 
@@ -91,15 +94,11 @@ class Samples:
         chains, length = self.points.shape[:2]
         per_chain = min(length, max(1, -(-draws // chains)))
         chosen = np.linspace(0, length - 1, per_chain).round().astype(int)
-        return Samples(
-            self.points[:, chosen],
-            self.log_density[:, chosen],
-            {name: values[:, chosen] for name, values in self.statistics.items()},
-            self.divergences,
-            self.pareto_k,
-            self.effective,
-            self.evaluations,
-            self.gradients,
+        return replace(
+            self,
+            points=self.points[:, chosen],
+            log_density=self.log_density[:, chosen],
+            statistics={name: values[:, chosen] for name, values in self.statistics.items()},
         )
 
 
@@ -156,6 +155,7 @@ def assess(sampler: str, samples: Samples, *, order_changes: float | None = None
         converged = samples.pareto_k <= PARETO_K_GOAL and (ess or 0) >= min(ESS_GOAL, samples.points.shape[1] / 10)
         return Convergence(sampler, converged, None, ess, None, samples.pareto_k, order_changes)
     r_hat, ess_bulk = chain_statistics(samples.points)
+    r_hat = max(r_hat, samples.r_hat or 0.0)
     converged = r_hat <= R_HAT_GOAL and ess_bulk >= ESS_GOAL and not samples.divergences
     return Convergence(sampler, converged, r_hat, ess_bulk, samples.divergences, None, order_changes)
 
@@ -174,3 +174,15 @@ def evaluate(density: LogDensity, points: Float[np.ndarray, "point dimension"]) 
     with torch.no_grad():
         values: np.ndarray = density(torch.from_numpy(np.ascontiguousarray(points))).numpy()
     return np.where(np.isnan(values), -np.inf, values)
+
+
+def evaluate_with_gradient(
+    density: LogDensity, points: Float[np.ndarray, "point dimension"]
+) -> tuple[Float[np.ndarray, "point"], Float[np.ndarray, "point dimension"]]:
+    """Log density of a batch and its gradient; -inf and 0 where there is no support."""
+    places = torch.from_numpy(np.ascontiguousarray(points)).requires_grad_()
+    values = density(places)
+    (gradient,) = torch.autograd.grad(values.sum(), places)
+    numbers: np.ndarray = values.detach().numpy()
+    supported = np.isfinite(numbers)
+    return np.where(supported, numbers, -np.inf), np.where(supported[:, None], np.nan_to_num(gradient.numpy()), 0.0)

@@ -27,7 +27,7 @@ class Coordinate:
     owner
         Body (or wall) that it belongs to; None where it is shared by the video.
     transform
-        What the vector holds: the quantity or its logarithm.
+        What the vector holds: the quantity, or (roughly) its logarithm.
     prior
         Prior in the vector's units.
     scale
@@ -101,22 +101,18 @@ class Coordinates:
             dtype=bool,
         )
 
-    def quantity(self, field: str, points: Float[Tensor, "point dimension"]) -> Float[Tensor, "point owner"]:
-        """Values of a quantity for all its owners (one column if it is shared)."""
-        default = torch.from_numpy(np.asarray(self.defaults[field], dtype=float))
-        values = default.expand(len(points), -1)
-        columns = [(entry.owner or 0, place) for place, entry in enumerate(self.entries) if entry.field == field]
-        if not columns:
-            return values
-        owners, places = (torch.tensor(column) for column in zip(*columns, strict=True))
-        sampled = points[:, places]
-        logarithmic = self.entries[int(places[0])].transform is Transform.LOG
-        return values.index_copy(1, owners, sampled.exp() if logarithmic else sampled)
+    def quantities(self, points: Float[Tensor, "point dimension"]) -> dict[str, Float[Tensor, "point owner"]]:
+        """Values of every quantity for all its owners (one column if it is shared)."""
+        flat = self._all_defaults.expand(len(points), -1)
+        for transform, places, targets in self._targets:
+            flat = flat.index_copy(1, targets, transform.from_coordinate(points[:, places]))
+        sizes = [len(values) for values in self.defaults.values()]
+        return dict(zip(self.defaults, torch.split(flat, sizes, dim=1), strict=True))
 
     def prior_residuals(self, points: Float[Tensor, "point dimension"]) -> Float[Tensor, "point residual"]:
         """Numbers whose half sum of squares is the negative log prior (up to a constant): normal terms, then edges."""
-        gaussian = (points - torch.from_numpy(self.prior_mean)) / torch.from_numpy(self.prior_sd)
-        places, edges, softness = self._edges
+        mean, sd, places, edges, softness = self._prior
+        gaussian = (points - mean) / sd
         if not len(places):
             return gaussian
         beyond = (points[:, places] - edges) / softness
@@ -128,12 +124,30 @@ class Coordinates:
         return np.stack(columns, axis=1) if columns else np.zeros((count, 0))
 
     @cached_property
-    def _edges(self) -> tuple[Int[Tensor, "edge"], Float[Tensor, "edge"], Float[Tensor, "edge"]]:
+    def _all_defaults(self) -> Float[Tensor, "owner"]:
+        """Defaults of all quantities, one after the other."""
+        return torch.from_numpy(np.concatenate([np.asarray(v, dtype=float) for v in self.defaults.values()]))
+
+    @cached_property
+    def _targets(self) -> list[tuple[Transform, Int[Tensor, "entry"], Int[Tensor, "entry"]]]:
+        """Per transform its places in the vector and in `_all_defaults`."""
+        sizes = [len(values) for values in self.defaults.values()]
+        begin = dict(zip(self.defaults, np.cumsum([0, *sizes[:-1]]), strict=True))
+        targets = []
+        for transform in {entry.transform: None for entry in self.entries}:
+            chosen = [(k, begin[e.field] + (e.owner or 0)) for k, e in enumerate(self.entries) if e.transform is transform]
+            places, owners = (torch.tensor(column, dtype=torch.int64) for column in zip(*chosen, strict=True))
+            targets.append((transform, places, owners))
+        return targets
+
+    @cached_property
+    def _prior(self) -> tuple[Tensor, Tensor, Tensor, Tensor, Tensor]:
+        """Mean and sd of the Gaussian prior of all entries; places, edges and softness of those with an edge."""
         limited = [(place, e.prior) for place, e in enumerate(self.entries) if e.prior.upper is not None]
         places = torch.tensor([place for place, _ in limited], dtype=torch.int64)
         edges = torch.tensor([prior.upper or 0.0 for _, prior in limited], dtype=torch.float64)
         softness = torch.tensor([prior.softness for _, prior in limited], dtype=torch.float64)
-        return places, edges, softness
+        return torch.from_numpy(self.prior_mean), torch.from_numpy(self.prior_sd), places, edges, softness
 
 
 TINY = 1e-30

@@ -3,7 +3,9 @@
 from dataclasses import dataclass
 
 import numpy as np
+import torch
 from jaxtyping import Bool, Float, Int
+from torch import Tensor
 
 from vrdp_prob.scene import Shape, Tracks
 
@@ -11,7 +13,7 @@ NOISE_SHARE_OF_RADIUS = 0.05
 """Prior median of the position noise as a share of the bodies' radius, where nobody measured it."""
 NOISE_WITHOUT_RADIUS = 0.01
 """Prior median of the position noise in m where no radius is known either."""
-ANGLE_NOISE = 0.02
+ANGLE_SD = 0.02
 """Prior median of the angle noise in rad."""
 NOISE_LOG_SD = 2.0
 """Prior standard deviation of the log noise scale: two orders of magnitude either way."""
@@ -59,7 +61,7 @@ class Observations:
         angle_frame, angle_body = np.nonzero(angle_seen)
         angles = tracks.angles
         angle = np.zeros(0) if angles is None else angles[angle_frame, angle_body]
-        return cls(frame, body, position, whitening, reference, angle_frame, angle_body, angle, ANGLE_NOISE)
+        return cls(frame, body, position, whitening, reference, angle_frame, angle_body, angle, ANGLE_SD)
 
     @property
     def angle_bodies(self) -> tuple[int, ...]:
@@ -81,13 +83,14 @@ class Observations:
             self.angle_reference,
         )
 
-    def position_residuals(
-        self, trajectory: Float[np.ndarray, "world time body 3"]
-    ) -> Float[np.ndarray, "world observation 2"]:
-        """Whitened differences of predicted and seen positions (unit variance at noise scale 1)."""
-        difference = trajectory[:, self.frame, self.body, :2] - self.position
-        residuals: Float[np.ndarray, "world observation 2"] = np.einsum("oij,woj->woi", self.whitening, difference)
-        return residuals
+    def position_places(self, body_count: int) -> Int[Tensor, "coordinate"]:
+        """Places of the seen coordinates (x and y in turn) in a flattened trajectory [time, body, (x, y, angle)]."""
+        first = 3 * (self.frame * body_count + self.body)
+        return torch.from_numpy(np.stack([first, first + 1], axis=1).ravel())
+
+    def angle_places(self, body_count: int) -> Int[Tensor, "angle"]:
+        """Places of the measured angles in a flattened trajectory."""
+        return torch.from_numpy(3 * (self.angle_frame * body_count + self.angle_body) + 2)
 
 
 def prior_noise(tracks: Tracks) -> float:

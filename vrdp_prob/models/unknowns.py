@@ -42,7 +42,7 @@ class Structure:
     Parameters
     ----------
     moving
-        Bodies whose release velocity is unknown; the others are at rest when they are released.
+        Bodies whose release velocity and spin are unknown; the others are at rest when they are released.
     colliding
         Bodies whose mass and restitution (and, of a cube, yaw) the motion can say something about.
     """
@@ -85,7 +85,7 @@ def _turning(tracks: Tracks, structure: Structure) -> Iterator[Coordinate]:
         meets = description.shape is Shape.CUBE and body in structure.colliding
         if meets:
             yield Coordinate("angle", body, Transform.IDENTITY, Prior(0.0, YAW_SD), scale=0.1)
-        if (meets and body in structure.moving) or body in measured:
+        if body in structure.moving and (meets or body in measured):
             yield Coordinate("spin", body, Transform.IDENTITY, Prior(0.0, SPIN_SD), scale=0.1)
         if body in measured and angles is not None:
             seen = angles[:, body]

@@ -24,6 +24,7 @@ from vrdp_prob.reasoning.seen import SeenVideo
 from vrdp_prob.reasoning.stretch import State, Stretch, advance
 from vrdp_prob.reasoning.timeline import Timeline, WorldDraws
 from vrdp_prob.reasoning.values import MASS_FACTOR, Change
+from vrdp_prob.scene import Shape
 
 LONGEST_STRETCH = 0.4
 """Longest time in s after which bodies that are not reached are put back on their observed course."""
@@ -121,6 +122,9 @@ class Counterfactual:
         exists = np.zeros((self._seen.draws, len(times), count), dtype=bool)
         for body in range(count):
             trajectory[:, :, body, :2] = self._seen.drawn[body].state(times)[0]
+            if self._seen.tracks.bodies[body].shape is Shape.CUBE:
+                held = np.clip(times, self._first[body], self._last[body])
+                trajectory[:, :, body, 2] = np.stack([self._turning(body, float(time))[0] for time in held], axis=1)
             first, after = self._seen.presence[body]
             exists[:, first:after, body] = body != self._body or self._change is not Change.REMOVED
         return trajectory, exists

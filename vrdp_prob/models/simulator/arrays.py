@@ -44,16 +44,17 @@ def kernel_arrays(worlds: Worlds, layout: Layout, first_time: float) -> KernelAr
     missing = [name for name in (*layout.shared, *layout.constants[len(CONSTANTS) :]) if name not in worlds.parameters]
     if missing:
         raise InputError(f"worlds: the model needs the parameter {missing[0]}; add it to 'parameters'.")
-    walls = worlds.walls.to(torch.float64)
     shared = [worlds.parameters[name].to(torch.float64) for name in layout.shared]
-    earliest = worlds.release_time.detach().min(dim=1, keepdim=True).values.clamp(max=first_time)
-    release = torch.cat([worlds.release_time, earliest.expand(-1, len(walls))], dim=1).to(torch.float64)
-    states = torch.cat([_body_states(worlds), _wall_states(walls, len(worlds))], dim=1)
+    bodies, start = _body_constants(worlds, layout), _body_starts(worlds)
+    if len(worlds.walls):
+        walls = worlds.walls.to(torch.float64)
+        bodies = torch.cat([bodies, _wall_constants(worlds, walls, layout)], dim=1)
+        start = torch.cat([start, _wall_starts(worlds, walls, first_time)], dim=1)
     return KernelArrays(
         kinds=_kinds(worlds),
-        bodies=torch.cat([_body_constants(worlds, layout), _wall_constants(worlds, walls, layout)], dim=1),
+        bodies=bodies,
         shared=torch.stack(shared, dim=-1) if shared else torch.zeros(len(worlds), 0, dtype=torch.float64),
-        start=torch.cat([states, release[..., None]], dim=-1),
+        start=start,
     )
 
 
@@ -81,8 +82,9 @@ def _body_constants(worlds: Worlds, layout: Layout) -> Float[Tensor, "world body
     return torch.stack(columns, dim=-1)
 
 
-def _body_states(worlds: Worlds) -> Float[Tensor, "world body 6"]:
-    parts = [worlds.position, worlds.angle[..., None], worlds.velocity, worlds.spin[..., None]]
+def _body_starts(worlds: Worlds) -> Float[Tensor, "world body state_and_time"]:
+    columns = [worlds.angle, worlds.velocity, worlds.spin, worlds.release_time]
+    parts = [worlds.position, *(part if part.ndim == 3 else part[..., None] for part in columns)]
     return torch.cat([part.to(torch.float64) for part in parts], dim=-1)
 
 
@@ -98,9 +100,13 @@ def _wall_constants(
     return torch.stack(columns, dim=-1)
 
 
-def _wall_states(walls: Float[Tensor, "wall 4"], count: int) -> Float[Tensor, "world wall 6"]:
+def _wall_starts(
+    worlds: Worlds, walls: Float[Tensor, "wall 4"], first_time: float
+) -> Float[Tensor, "world wall state_and_time"]:
     middle = (walls[:, 2:] + walls[:, :2]) / 2
     along = walls[:, 2:] - walls[:, :2]
     angle = torch.atan2(along[:, 1], along[:, 0])
     still = torch.zeros(len(walls), 3, dtype=torch.float64)
-    return torch.cat([middle, angle[:, None], still], dim=-1).expand(count, -1, -1)
+    states = torch.cat([middle, angle[:, None], still], dim=-1).expand(len(worlds), -1, -1)
+    earliest = worlds.release_time.detach().min(dim=1).values.clamp(max=first_time).to(torch.float64)
+    return torch.cat([states, earliest[:, None, None].expand(-1, len(walls), 1)], dim=-1)

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from types import ModuleType
 from typing import Any
 
@@ -38,18 +39,23 @@ class Rollout:
         Velocity in m/s and spin in rad/s.
     exists
         Whether a body is present and released.
-    events
-        Collisions, contacts with walls, and stops.
     outcome
         How the simulation of each world ended.
+    tapes
+        What the kernel recorded.
     """
 
     times: Float[Tensor, "time"]
     trajectory: Float[Tensor, "world time body 3"]
     velocity: Float[Tensor, "world time body 3"]
     exists: Bool[Tensor, "world time body"]
-    events: EventTable
     outcome: tuple[Outcome, ...]
+    tapes: Tapes
+
+    @cached_property
+    def events(self) -> EventTable:
+        """Collisions, contacts with walls, and stops."""
+        return EventTable.of(self.tapes, self.exists.shape[-1])
 
     @property
     def fine(self) -> Bool[np.ndarray, "world"]:
@@ -103,8 +109,8 @@ def simulate(
         trajectory=states[..., :3],
         velocity=states[..., 3:],
         exists=released.detach() & worlds.present[:, None, :],
-        events=EventTable.of(run.tapes, len(worlds.shapes)),
         outcome=tuple(Outcome(int(code)) for code in run.outcomes),
+        tapes=run.tapes,
     )
 
 

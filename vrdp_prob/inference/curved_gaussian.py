@@ -1,0 +1,127 @@
+"""A Gaussian around the MAP whose axes follow the bends of the posterior's ridges.
+
+A release velocity and the drag that slows a body make up for each other along a curve; on the straight axis of a Gaussian
+the density falls by tens of nats within one standard deviation. The curve to second order follows from how the residuals
+bend. The map from standard normal coordinates is a shear, so it keeps volumes, and a sampler needs nothing but the map.
+Source: Parno and Marzouk, Transport map accelerated Markov chain Monte Carlo, SIAM/ASA J. Uncertainty Quantification 6
+(2018); Bates and Watts, Relative curvature measures of nonlinearity, J. Royal Statistical Society B 42 (1980).
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import torch
+from jaxtyping import Float
+from torch import Tensor
+
+from vrdp_prob.inference.least_squares import Residuals
+from vrdp_prob.inference.samples import Gaussian
+
+MOST_BENT = 4
+"""Largest number of axes along which others are bent."""
+SMALLEST_BEND = 0.5
+"""Bend, in standard deviations at one standard deviation from the MAP, below which an axis counts as straight."""
+STEP = 0.5
+"""Step of the second differences in standard deviations: large enough to see past kinks at contacts."""
+BATCH = 200
+
+
+@dataclass(frozen=True)
+class CurvedGaussian:
+    """Map from standard normal coordinates to points of the posterior.
+
+    Parameters
+    ----------
+    gaussian
+        The straight Gaussian.
+    axes
+        Directions, in its whitened coordinates, along which the others are bent; orthonormal.
+    bend
+        Displacement across all `axes` per product of two coordinates along them.
+    shift, scale
+        Affine map that comes before, by which later knowledge moves and shapes the whole.
+    """
+
+    gaussian: Gaussian
+    axes: Float[Tensor, "dimension bent"]
+    bend: Float[Tensor, "bent bent dimension"]
+    shift: Float[Tensor, "dimension"]
+    scale: Float[Tensor, "dimension dimension"]
+
+    @classmethod
+    def straight(cls, gaussian: Gaussian) -> "CurvedGaussian":
+        """A Gaussian as it is."""
+        count = len(gaussian.mean)
+        none = torch.zeros(count, 0, dtype=torch.float64)
+        zero, unit = torch.zeros(count, dtype=torch.float64), torch.eye(count, dtype=torch.float64)
+        return cls(gaussian, none, torch.zeros(0, 0, count, dtype=torch.float64), zero, unit)
+
+    @classmethod
+    def around(cls, gaussian: Gaussian, residuals: Residuals) -> "CurvedGaussian":
+        """The Gaussian with its strongest bends, from second differences of the residuals around its mean."""
+        tensor = _bends(gaussian, residuals)
+        count = len(gaussian.mean)
+        directions, sizes, _ = np.linalg.svd(tensor.reshape(count, -1), full_matrices=False)
+        axes = directions[:, : min(MOST_BENT, int((sizes >= SMALLEST_BEND).sum()))]
+        across = np.eye(count) - axes @ axes.T
+        bend = np.einsum("ia,jb,ijk,kl->abl", axes, axes, tensor, across)
+        straight = cls.straight(gaussian)
+        return replace(straight, axes=torch.from_numpy(axes.copy()), bend=torch.from_numpy(bend))
+
+    @property
+    def dimension(self) -> int:
+        """Number of coordinates."""
+        return len(self.gaussian.mean)
+
+    @property
+    def log_volume(self) -> float:
+        """Logarithm of the volume of points per volume of standard normal coordinates."""
+        return float(np.log(np.diag(self.gaussian.root)).sum() + torch.log(torch.diagonal(self.scale)).sum())
+
+    def mapped(self, whitened: Float[Tensor, "*batch dimension"]) -> Float[Tensor, "*batch dimension"]:
+        """Points of some standard normal coordinates; differentiable."""
+        places = self.shift + whitened @ self.scale.T
+        along = places @ self.axes
+        bent = places + torch.einsum("...a,...b,abk->...k", along, along, self.bend) / 2
+        return torch.from_numpy(self.gaussian.mean) + bent @ torch.from_numpy(self.gaussian.root.T.copy())
+
+    def points(self, whitened: Float[np.ndarray, "*batch dimension"]) -> Float[np.ndarray, "*batch dimension"]:
+        """The same for arrays."""
+        points: np.ndarray = self.mapped(torch.from_numpy(np.ascontiguousarray(whitened))).numpy()
+        return points
+
+    def moved(
+        self, shift: Float[np.ndarray, "dimension"], covariance: Float[np.ndarray, "dimension dimension"]
+    ) -> "CurvedGaussian":
+        """The map for which a normal distribution of the present coordinates becomes the standard one."""
+        scale = torch.from_numpy(np.linalg.cholesky(covariance))
+        return replace(
+            self, shift=self.shift + self.scale @ torch.from_numpy(np.asarray(shift)), scale=self.scale @ scale
+        )
+
+
+def _bends(gaussian: Gaussian, residuals: Residuals) -> Float[np.ndarray, "dimension dimension dimension"]:
+    """Displacement, per product of two whitened coordinates, that keeps the residuals as small as they can be.
+
+    With J the derivative of the residuals in whitened coordinates, so that J'J is the unit matrix, and H their second
+    derivative along two directions, it is -J'H.
+    """
+    count = len(gaussian.mean)
+    unit = np.eye(count)
+    first, second = np.triu_indices(count)
+    steps = np.concatenate([np.zeros((1, count)), STEP * unit, STEP * (unit[first] + unit[second])])
+    ahead, behind = (_evaluated(gaussian, residuals, sign * steps) for sign in (1.0, -1.0))
+    derivative = (ahead[1 : count + 1] - behind[1 : count + 1]) / (2 * STEP)
+    even = (ahead + behind) / 2
+    single, double = even[1 : count + 1], even[count + 1 :]
+    mixed = (double - single[first] - single[second] + even[0]) / STEP**2
+    tensor = np.zeros((count, count, count))
+    tensor[first, second] = tensor[second, first] = np.nan_to_num(-(mixed @ derivative.T))
+    return tensor
+
+
+def _evaluated(
+    gaussian: Gaussian, residuals: Residuals, whitened: Float[np.ndarray, "point dimension"]
+) -> Float[np.ndarray, "point residual"]:
+    points = gaussian.points(whitened)
+    return np.concatenate([residuals(points[begin : begin + BATCH]) for begin in range(0, len(points), BATCH)])

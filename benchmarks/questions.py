@@ -69,8 +69,12 @@ class Score:
 def main() -> None:
     arguments = _arguments()
     begin, end = (int(part) for part in arguments.scenes.split(":"))
-    questions = read_questions(DATA / "questions.json")
     scores: dict[str, Score] = defaultdict(Score)
+    if DATA.is_dir():
+        questions = read_questions(DATA / "questions.json")
+    else:
+        print(f"no data at {DATA}: nothing measured")
+        questions, end = {}, begin
     started = time.monotonic()
     for scene in range(begin, end):
         facts = _facts(scene, arguments)
@@ -80,7 +84,8 @@ def main() -> None:
                 if arguments.misses:
                     print(f"scene {scene}, question {question.question_id}: {question.text} {miss}", file=sys.stderr)
     seconds = (time.monotonic() - started) / max(end - begin, 1)
-    _print_table(scores, seconds)
+    if scores:
+        _print_table(scores, seconds)
     if arguments.json is not None:
         document = {"checks": _checks(scores), "seconds_per_scene": seconds, "scenes": [begin, end]}
         with write_atomically(arguments.json) as temporary:

@@ -12,7 +12,7 @@ import pytest
 
 from vrdp_prob import cli
 from vrdp_prob.progress import Advance
-from vrdp_prob.report import schema
+from vrdp_prob.report import pipeline, schema
 from vrdp_prob.scene import Camera
 
 TRACKS_HEADER = "video,object,time,x,y"
@@ -204,7 +204,97 @@ def test_unusable_question_files(folder: Path, capsys: pytest.CaptureFixture[str
     assert message in refused(capsys, "report", folder, "--questions", folder / "questions.json")
 
 
-def test_an_output_folder_that_cannot_be_written(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+@pytest.mark.parametrize("command", [("report",), ("ask", "How many collisions happen?")])
+def test_a_table_of_another_name(folder: Path, capsys: pytest.CaptureFixture[str], command: tuple[str, ...]) -> None:
+    (folder / "tracks.csv").rename(folder / "run_1.csv")
+    line = refused(capsys, command[0], folder / "run_1.csv", *command[1:])
+    assert "must be named tracks.csv" in line
+
+
+def forbid(monkeypatch: pytest.MonkeyPatch, *names: str) -> None:
+    """Let functions of the command line fail the test when they are called."""
+
+    def fail(*_arguments: object, **_options: object) -> None:
+        pytest.fail("expensive work before a refusal")
+
+    for name in names:
+        monkeypatch.setattr(cli, name, fail)
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (["--sampler", "gibbs"], "sampler 'gibbs' is not known"),
+        (["--model", "nowhere.toml"], "nowhere.toml"),
+    ],
+)
+@pytest.mark.parametrize("command", [("report",), ("ask", "How many collisions happen?")])
+def test_options_are_refused_before_the_video_is_read(
+    folder: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+    *,
+    command: tuple[str, ...],
+    options: list[str],
+    message: str,
+) -> None:
+    forbid(monkeypatch, "load", "load_all")
+    assert message in refused(capsys, command[0], folder, *command[1:], *options)
+
+
+@pytest.mark.parametrize(
+    ("question", "choices", "message"),
+    [
+        ("Why does the moon shine?", [], "why"),
+        ("What will happen next?", [], "needs choices"),
+        ("What will happen next?", ["The moon shines"], "moon"),
+        ("How many collisions happen?", ["two"], "without choices"),
+    ],
+)
+def test_questions_are_refused_before_the_video_is_read(
+    folder: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+    *,
+    question: str,
+    choices: list[str],
+    message: str,
+) -> None:
+    forbid(monkeypatch, "load", "load_all")
+    options = [word for choice in choices for word in ("--choice", choice)]
+    assert message in refused(capsys, "ask", folder, question, *options).lower()
+    entry = {"question": question, "question_id": 7, "choices": [{"choice": choice} for choice in choices]}
+    document = [{"video_filename": "v.mp4", "questions": [entry]}]
+    (folder / "questions.json").write_text(json.dumps(document))
+    line = refused(capsys, "report", folder, "--questions", folder / "questions.json")
+    assert message in line.lower()
+    assert "questions.json, v, question 7: " in line
+
+
+@pytest.mark.parametrize(
+    ("question", "message"),
+    [
+        ("What color is the cube?", "there is no cube in the video"),
+        ("What color is the object that collides with the green object?", "there is no green object"),
+        ("What is the shape of the thing?", "2 objects"),
+    ],
+)
+def test_objects_are_looked_up_before_inference(
+    folder: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, question: str, message: str
+) -> None:
+    forbid(monkeypatch, "infer")
+    monkeypatch.setattr(pipeline, "infer", cli.infer)
+    assert message in refused(capsys, "ask", folder, question).replace("two objects", "2 objects")
+    document = [{"video_filename": "v.mp4", "questions": [{"question": question}]}]
+    (folder / "questions.json").write_text(json.dumps(document))
+    line = refused(capsys, "report", folder, "--questions", folder / "questions.json")
+    assert message in line.replace("two objects", "2 objects")
+
+
+def test_an_output_folder_that_cannot_be_written(
+    folder: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    forbid(monkeypatch, "load_all")
     (folder / "taken").write_text("a file is in the way")
     line = refused(capsys, "report", folder, "--out", folder / "taken", "--sampler", "laplace")
     assert "taken" in line
@@ -213,6 +303,7 @@ def test_an_output_folder_that_cannot_be_written(folder: Path, capsys: pytest.Ca
 def test_unusable_options(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert "sampler 'gibbs' is not known" in refused(capsys, "report", folder, "--sampler", "gibbs")
     assert "--seed" in refused(capsys, "report", folder, "--seed", "many")
+    assert "--seed" in refused(capsys, "report", folder, "--seed", "-1")
     assert "No such option" in refused(capsys, "report", folder, "--colour")
     assert "INPUT" in refused(capsys, "report")
 

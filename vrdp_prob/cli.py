@@ -10,16 +10,18 @@ from typing import Annotated
 
 import typer
 
-from vrdp_prob.datasets import load, load_all, read_questions, video_files
+from vrdp_prob.datasets import load, load_all, read_questions, video_files, video_names
 from vrdp_prob.errors import InputError
+from vrdp_prob.files import check_writable
 from vrdp_prob.inference import SAMPLERS, default_model
 from vrdp_prob.models.physics import PhysicsModel
 from vrdp_prob.models.simulator.rollout import compile_model
 from vrdp_prob.progress import progress_display
 from vrdp_prob.reasoning import Answer, ask, infer
-from vrdp_prob.report.pipeline import Report
+from vrdp_prob.reasoning.checking import check_question
+from vrdp_prob.report.pipeline import Report, check_questions
 from vrdp_prob.report.pipeline import report as write_report
-from vrdp_prob.scene import Choice, Question, Tracks
+from vrdp_prob.scene import Choice, Question
 
 UNUSABLE_INPUT = 2
 FAILURE = 1
@@ -38,7 +40,7 @@ app = typer.Typer(
 Input = Annotated[Path, typer.Argument(metavar="INPUT", help="A video, a tracks folder, or a CLEVRER annotation file.")]
 Model = Annotated[Path | None, typer.Option(metavar="FILE.toml", help="Physics model; the base model by default.")]
 Sampler = Annotated[str, typer.Option(metavar="|".join(SAMPLERS), help="How the posterior is drawn.")]
-Seed = Annotated[int, typer.Option(help="Same seed, same numbers.")]
+Seed = Annotated[int, typer.Option(min=0, help="Same seed, same numbers.")]
 Quiet = Annotated[bool, typer.Option("--quiet", help="No progress bars, no closing lines.")]
 CameraOption = Annotated[
     str | None,
@@ -66,14 +68,17 @@ def report(
 ) -> None:
     """Write an uncertainty report: report.html, report.json and posterior.nc."""
     progress = progress_display(quiet=quiet)
-    asked = {} if questions is None else read_questions(questions)
-    videos = load_all(path, videos=None if video is None else [video], camera=camera, progress=progress)
+    _check_sampler(sampler)
+    check_writable(out)
     physics = _model(model)
+    names = [name for name in video_names(path) if video in (None, name)]
+    asked = {name: [] for name in names} if questions is None else _questions_of(questions, names)
+    videos = load_all(path, videos=None if video is None else [video], camera=camera, progress=progress)
     files = video_files(path)
     for tracks in videos:
         written = write_report(
             tracks,
-            questions=_questions_of(asked, questions, tracks),
+            questions=asked[tracks.video],
             directory=out if len(videos) == 1 else out / tracks.video,
             video_file=files.get(tracks.video),
             model=physics,
@@ -104,8 +109,12 @@ def ask_question(
     if not question.strip():
         raise InputError('the question is empty; ask one, for example "What will happen next?" with --choice options.')
     asked = Question(question, choices=tuple(Choice(number, text) for number, text in enumerate(choice or ())))
+    _check_sampler(sampler)
+    physics = _model(model)
+    check_question(asked)
     tracks = load(path, video=video, camera=camera, progress=progress)
-    posterior = infer(tracks, sampler=sampler, model=_model(model), seed=seed, progress=progress)
+    check_question(asked, tracks=tracks)
+    posterior = infer(tracks, sampler=sampler, model=physics, seed=seed, progress=progress)
     answer = ask(posterior, asked, progress=progress)
     if as_json:
         print(json.dumps(answer.to_document(), allow_nan=False))
@@ -218,15 +227,25 @@ def _model(path: Path | None) -> PhysicsModel | None:
     return None if path is None else PhysicsModel.read(path)
 
 
-def _questions_of(asked: dict[str, list[Question]], path: Path | None, tracks: Tracks) -> list[Question]:
-    if path is None:
-        return []
-    if tracks.video not in asked:
-        raise InputError(
-            f"{path}: there is no question about {tracks.video}; "
-            "the stem of a scene's 'video_filename' must be the name of the video."
-        )
-    return asked[tracks.video]
+def _check_sampler(name: str) -> None:
+    if name not in SAMPLERS:
+        raise InputError(f"sampler '{name}' is not known; use one of {', '.join(SAMPLERS)}.")
+
+
+def _questions_of(path: Path, names: list[str]) -> dict[str, list[Question]]:
+    """The questions about each video, understood as far as that goes before the video is looked at."""
+    asked = read_questions(path)
+    for name in names:
+        if name not in asked:
+            raise InputError(
+                f"{path}: there is no question about {name}; "
+                "the stem of a scene's 'video_filename' must be the name of the video."
+            )
+        try:
+            check_questions(asked[name])
+        except InputError as error:
+            raise InputError(f"{path}, {name}, {error}") from error
+    return asked
 
 
 def _tell(written: Report) -> None:

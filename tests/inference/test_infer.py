@@ -156,9 +156,35 @@ def test_a_model_that_cannot_fit_is_told_first() -> None:
     )
 
 
-def test_unknown_samplers_and_too_few_draws_are_refused() -> None:
+def test_unknown_samplers_too_few_draws_and_negative_seeds_are_refused() -> None:
     tracks = observe(chain(), frames=30)
-    with pytest.raises(InputError, match="use one of nuts, emcee, laplace"):
-        infer(tracks, sampler="gibbs")  # type: ignore[arg-type]
+    with pytest.raises(InputError, match="use one of emcee, nuts, laplace"):
+        infer(tracks, sampler="gibbs")
     with pytest.raises(InputError, match="at least 4"):
         infer(tracks, draws=2)
+    with pytest.raises(InputError, match="not negative"):
+        infer(tracks, seed=-1)
+
+
+def test_tracks_without_motion_are_refused() -> None:
+    tracks = observe(chain(), frames=30)
+    still = np.tile(tracks.positions[:1, :3], (30, 1, 1))
+    with pytest.raises(InputError, match="no object moves"):
+        infer(Tracks.from_arrays("still", tracks.bodies[:3], tracks.times, still))
+
+
+def test_a_body_that_drifts_less_than_its_stated_noise_is_at_rest_at_its_release() -> None:
+    scene = chain()
+    tracks = observe(scene, frames=100, noise=0.001)
+    drift = 0.004 * np.linspace(-1, 1, len(tracks.times))
+    positions = tracks.positions.copy()
+    resting = int(np.flatnonzero((scene.velocity == 0).all(axis=1))[0])
+    before = tracks.times < 0.9 * min(time for time, *pair in scene.contacts if resting in pair)
+    positions[before, resting, 0] += drift[before]
+    covariance = np.broadcast_to(0.005**2 * np.eye(2), (*tracks.seen.shape, 2, 2))
+    stated = Tracks.from_arrays(
+        "drift", tracks.bodies, tracks.times, positions, position_covariance=np.array(covariance)
+    )
+    posterior = infer(stated, sampler="laplace", draws=50)
+    velocity = posterior.data["posterior"]["velocity"].values[..., resting, :]
+    assert (velocity == 0).all()

@@ -11,6 +11,7 @@ from vrdp_prob.scene import Camera, Tracks
 
 CameraChoice = Camera | Path | str | None
 CAMERA_FILE = "camera.json"
+TRACKS_FILE = "tracks.csv"
 CLEVRER = "clevrer"
 VIDEO_SUFFIXES = (".avi", ".m4v", ".mkv", ".mov", ".mp4", ".mpg", ".webm")
 ANNOTATION_PATTERN = "annotation*.json"
@@ -103,18 +104,22 @@ def _existing(path: Path | str) -> Path:
     source = Path(path)
     if not source.exists():
         raise InputError(f"{source}: there is no such file or folder; check the path.")
+    if source.is_file() and source.suffix.lower() == ".csv" and not _is_tracks_folder(source):
+        raise InputError(
+            f"{source}: a table of positions must be named {TRACKS_FILE} and have an objects.csv beside it; rename it."
+        )
     if source.is_dir() and not (_is_tracks_folder(source) or _annotation_files(source) or video_files(source)):
         raise InputError(f"{source}: the folder holds no tracks.csv, no video and no annotation; check the path.")
     return source
 
 
 def _is_tracks_folder(path: Path) -> bool:
-    return (path / "tracks.csv").is_file() if path.is_dir() else path.name == "tracks.csv"
+    return (path / TRACKS_FILE).is_file() if path.is_dir() else path.name == TRACKS_FILE
 
 
 def _annotation_files(path: Path) -> dict[str, Path]:
     """CLEVRER annotation files by the name of their video."""
-    files = sorted(path.glob(ANNOTATION_PATTERN)) if path.is_dir() else [path] if path.suffix == ".json" else []
+    files = sorted(path.glob(ANNOTATION_PATTERN)) if path.is_dir() else [path] if path.suffix.lower() == ".json" else []
     return {annotated_video(file): file for file in files}
 
 

@@ -7,6 +7,7 @@ from vrdp_prob.inference.samples import Convergence
 from vrdp_prob.inference.summaries import ObjectSummary, PairSummary, ParameterSummary, Summary
 
 __all__ = [
+    "SAMPLERS",
     "BodyStatus",
     "Convergence",
     "ObjectSummary",
@@ -14,7 +15,6 @@ __all__ = [
     "ParameterStatus",
     "ParameterSummary",
     "Posterior",
-    "SAMPLERS",
     "Status",
     "Summary",
     "default_model",

@@ -1,10 +1,11 @@
 """A Gaussian around the MAP whose axes follow the bends of the posterior's ridges.
 
-A release velocity and the drag that slows a body make up for each other along a curve; on the straight axis of a Gaussian
-the density falls by tens of nats within one standard deviation. The curve to second order follows from how the residuals
-bend. The map from standard normal coordinates is a shear, so it keeps volumes, and a sampler needs nothing but the map.
-Source: Parno and Marzouk, Transport map accelerated Markov chain Monte Carlo, SIAM/ASA J. Uncertainty Quantification 6
-(2018); Bates and Watts, Relative curvature measures of nonlinearity, J. Royal Statistical Society B 42 (1980).
+A release velocity and the drag that slows a body make up for each other along a curve; on the straight axis of a
+Gaussian the density falls by tens of nats within one standard deviation. The curve to second order follows from how
+the residuals bend. The map from standard normal coordinates is a shear, so it keeps volumes, and a sampler needs
+nothing but the map. Source: Parno and Marzouk, Transport map accelerated Markov chain Monte Carlo, SIAM/ASA J.
+Uncertainty Quantification 6 (2018); Bates and Watts, Relative curvature measures of nonlinearity, J. Royal
+Statistical Society B 42 (1980).
 """
 
 from dataclasses import dataclass, replace
@@ -14,7 +15,7 @@ import torch
 from jaxtyping import Float
 from torch import Tensor
 
-from vrdp_prob.inference.least_squares import Residuals
+from vrdp_prob.inference.least_squares import Residuals, robust_cost
 from vrdp_prob.inference.samples import Gaussian
 
 MOST_BENT = 4
@@ -62,11 +63,26 @@ class CurvedGaussian:
         tensor = _bends(gaussian, residuals)
         count = len(gaussian.mean)
         directions, sizes, _ = np.linalg.svd(tensor.reshape(count, -1), full_matrices=False)
-        axes = directions[:, : min(MOST_BENT, int((sizes >= SMALLEST_BEND).sum()))]
-        across = np.eye(count) - axes @ axes.T
-        bend = np.einsum("ia,jb,ijk,kl->abl", axes, axes, tensor, across)
+        strongest = directions[:, : min(MOST_BENT, int((sizes >= SMALLEST_BEND).sum()))]
         straight = cls.straight(gaussian)
-        return replace(straight, axes=torch.from_numpy(axes.copy()), bend=torch.from_numpy(bend))
+        kept = [axis for axis in strongest.T if straight._bent(axis[:, None], tensor).helps(straight, residuals)]
+        return straight._bent(np.array(kept).reshape(-1, count).T, tensor)
+
+    def _bent(
+        self, axes: Float[np.ndarray, "dimension bent"], tensor: Float[np.ndarray, "dimension dimension dimension"]
+    ) -> "CurvedGaussian":
+        across = np.eye(len(axes)) - axes @ axes.T
+        bend = np.einsum("ia,jb,ijk,kl->abl", axes, axes, tensor, across)
+        return replace(self, axes=torch.from_numpy(axes.copy()), bend=torch.from_numpy(bend))
+
+    def helps(self, straight: "CurvedGaussian", residuals: Residuals) -> bool:
+        """Whether the residuals one standard deviation along the axes are smaller than without the bend.
+
+        At contacts that come and go within a standard deviation second differences mean nothing.
+        """
+        ends = np.concatenate([self.axes.numpy().T, -self.axes.numpy().T])
+        bent, unbent = (robust_cost(residuals(one.points(ends)), None) for one in (self, straight))
+        return bool((bent < unbent).all())
 
     @property
     def dimension(self) -> int:

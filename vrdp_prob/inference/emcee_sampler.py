@@ -62,7 +62,8 @@ def sample_emcee(
     start
         Gaussian around the MAP, from which the walkers set out.
     draws
-        Number of draws to hand back over all ensembles.
+        Number of draws that are wanted over all ensembles; ensembles are run until they have converged, which gives
+        more.
     generator
         Source of randomness.
     progress
@@ -111,7 +112,9 @@ def sample_emcee(
 class _Ensemble:
     """One emcee ensemble in whitened coordinates."""
 
-    def __init__(self, density: LogDensity, start: CurvedGaussian, walkers: int, generator: np.random.Generator) -> None:
+    def __init__(
+        self, density: LogDensity, start: CurvedGaussian, walkers: int, generator: np.random.Generator
+    ) -> None:
         self._density, self._gaussian = density, start
         self.evaluations = self.gradients = 0
         moves = [

@@ -72,12 +72,14 @@ def infer(
     Raises
     ------
     InputError
-        If the sampler is unknown or fewer than 4 draws are asked for.
+        If the sampler is unknown, fewer than 4 draws are asked for, the seed is negative or no object moves.
     """
     if sampler not in SAMPLERS:
         raise InputError(f"sampler '{sampler}' is not known; use one of {', '.join(SAMPLERS)}.")
     if draws < 4:
         raise InputError(f"draws is {draws}; ask for at least 4.")
+    if seed < 0:
+        raise InputError(f"seed is {seed}; give a number that is not negative.")
     physics = default_model() if model is None else model
     generator = np.random.default_rng(seed)
     fit = fit_map(tracks, physics, generator, progress)

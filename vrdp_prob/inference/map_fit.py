@@ -12,6 +12,7 @@ import torch
 from jaxtyping import Bool, Float
 from scipy.optimize import minimize as scipy_minimize
 
+from vrdp_prob.errors import InputError
 from vrdp_prob.inference.curved_gaussian import CurvedGaussian
 from vrdp_prob.inference.events import first_contacts
 from vrdp_prob.inference.free_flight import SeenContact, noise_scale, release_fit, seen_contacts
@@ -103,9 +104,16 @@ def fit_map(
         Told how many windows are done.
     climb
         Whether L-BFGS on the exact log posterior follows the least squares.
+
+    Raises
+    ------
+    InputError
+        If no object moves.
     """
     noise = _noise(tracks)
     contacts = seen_contacts(tracks, noise)
+    if not _moving(tracks, noise, contacts) and not contacts:
+        raise InputError(f"{tracks.video}: no object moves, so nothing can be inferred; give tracks with motion.")
     growing = _grow(tracks, model, noise=noise, contacts=contacts, generator=generator, progress=progress)
     everything = growing.likelihood
     pairs = _pairs(everything, growing.point)
@@ -302,7 +310,7 @@ def _climb(
     )
     if result.fun < before:
         return gaussian.points(result.x), -float(result.fun), bool(result.success)
-    return start, -before, before < 1e30
+    return start, -before, False
 
 
 def _with_noise(

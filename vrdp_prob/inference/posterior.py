@@ -14,9 +14,9 @@ from vrdp_prob.inference.continuation import continued
 from vrdp_prob.inference.identifiability import BodyStatus
 from vrdp_prob.inference.samples import Convergence
 from vrdp_prob.inference.summaries import ObjectSummary, PairSummary, ParameterSummary, Summary
-from vrdp_prob.models.scenery import Scenery
 from vrdp_prob.models.parameters import WALL_RESTITUTION
 from vrdp_prob.models.physics import PhysicsModel
+from vrdp_prob.models.scenery import Scenery
 from vrdp_prob.models.simulator.worlds import Worlds
 from vrdp_prob.scene import Tracks
 

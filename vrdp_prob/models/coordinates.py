@@ -135,7 +135,9 @@ class Coordinates:
         begin = dict(zip(self.defaults, np.cumsum([0, *sizes[:-1]]), strict=True))
         targets = []
         for transform in {entry.transform: None for entry in self.entries}:
-            chosen = [(k, begin[e.field] + (e.owner or 0)) for k, e in enumerate(self.entries) if e.transform is transform]
+            chosen = [
+                (k, begin[e.field] + (e.owner or 0)) for k, e in enumerate(self.entries) if e.transform is transform
+            ]
             places, owners = (torch.tensor(column, dtype=torch.int64) for column in zip(*chosen, strict=True))
             targets.append((transform, places, owners))
         return targets

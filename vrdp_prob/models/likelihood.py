@@ -104,11 +104,6 @@ class Likelihood:
         result[:, observations.frame, observations.body] = values
         return result
 
-    @property
-    def data_count(self) -> int:
-        """Number of seen numbers (two per position, one per angle)."""
-        return 2 * len(self.observations.frame) + len(self.observations.angle)
-
     def _data_residuals(
         self, quantities: Quantities, frame_count: int | None
     ) -> tuple[Float[Tensor, "point residual"], Bool[np.ndarray, "point"]]:

@@ -7,6 +7,7 @@ from enum import StrEnum
 import numpy as np
 import torch
 from jaxtyping import Float
+from scipy.special import expit
 from torch import Tensor
 
 from vrdp_prob.errors import InputError
@@ -16,9 +17,11 @@ GRAVITY = 9.81
 
 
 EDGE, EDGE_WIDTH = -0.04, 0.02
-"""Middle and width, in the logarithm, of the soft edge of restitutions. It replaces a wall at 1: the posterior stays
-smooth in the logarithm, where the ridges are straight, and hardly a draw lies above 1. A transform that keeps the factor
-below 1 bends the ridge of two factors with a known product, and samplers get stuck in the bend.
+"""Middle and width, in the logarithm, of the soft edge of restitutions.
+
+It replaces a wall at 1: the posterior stays smooth in the logarithm, where the ridges are straight, and hardly a draw
+lies above 1. A transform that keeps the factor below 1 bends the ridge of two factors with a known product, and
+samplers get stuck in the bend.
 """
 
 
@@ -74,16 +77,14 @@ class Prior:
 
     def sample(self, generator: np.random.Generator, shape: tuple[int, ...]) -> Float[np.ndarray, "..."]:
         """Draws of the coordinate (by rejection where there is an edge)."""
-        draws = generator.normal(self.mean, self.sd, shape)
-        if self.upper is None:
-            return np.asarray(draws)
-        while True:
-            keep = 1 / (1 + np.exp(np.clip((draws - self.upper) / self.softness, -700, 700)))
-            rejected = generator.random(shape) > keep
-            if not rejected.any():
-                return np.asarray(draws)
-            accepted = generator.normal(self.mean, self.sd, shape)
-            draws = np.where(rejected, accepted, draws)
+        draws = np.asarray(generator.normal(self.mean, self.sd, shape))
+        wanting = np.full(shape, self.upper is not None)
+        while wanting.any():
+            again = generator.normal(self.mean, self.sd, int(wanting.sum()))
+            keep = expit(((self.upper or 0.0) - again) / self.softness) > generator.random(len(again))
+            draws[wanting] = again
+            wanting[wanting] = ~keep
+        return draws
 
 
 @dataclass(frozen=True)
@@ -157,5 +158,3 @@ AIR_DRAG = _log_parameter("air_drag", "1/m", "deceleration by the air per square
 ANGULAR_DRAG = _log_parameter(
     "angular_drag", "rad/s^2", "rate at which a body's spin about the vertical decays", median=1.0, log_sd=1.0
 )
-BODY_PARAMETERS = (MASS, RESTITUTION)
-"""Parameters that every model has per body."""

@@ -4,12 +4,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from vrdp_prob.errors import InputError
 from vrdp_prob.files import check_writable
 from vrdp_prob.inference import Posterior, infer
 from vrdp_prob.models.physics import PhysicsModel
 from vrdp_prob.perception.video import read_frames
 from vrdp_prob.progress import ProgressDisplay, SilentProgress
 from vrdp_prob.reasoning import Answer, PosteriorWorlds, ask
+from vrdp_prob.reasoning.checking import check_question
 from vrdp_prob.report.content import ReportContent
 from vrdp_prob.report.from_posterior import build
 from vrdp_prob.report.summary import summary
@@ -75,10 +77,14 @@ def report(
     Raises
     ------
     InputError
-        If the folder cannot be written, or a question cannot be answered (see `vrdp_prob.reasoning.ask`).
+        If the folder cannot be written, the video file is not there, or a question cannot be answered (see
+        `vrdp_prob.reasoning.ask`). What can be told without the posterior is told before the work.
     """
     directory, progress = Path(directory), progress or SilentProgress()
     check_writable(directory)
+    if video_file is not None and not Path(video_file).is_file():
+        raise InputError(f"{video_file}: there is no such video file; check the path.")
+    check_questions(questions, tracks=source if isinstance(source, Tracks) else source.tracks)
     if isinstance(source, Posterior):
         posterior = source
     else:
@@ -95,3 +101,26 @@ def report(
         written = write_report(content, directory)
         posterior.write(directory / "posterior.nc")
     return Report(posterior, tuple(answers), content, (written.page, written.document, directory / "posterior.nc"))
+
+
+def check_questions(questions: Sequence[Question | str], *, tracks: Tracks | None = None) -> None:
+    """Refuse questions that could not be answered, before any work on the video.
+
+    Parameters
+    ----------
+    questions
+        Questions to answer.
+    tracks
+        What was seen, where it is known already; see `vrdp_prob.reasoning.checking.check_question`.
+
+    Raises
+    ------
+    InputError
+        With the question's name or its place (counting from 1), if one cannot be answered.
+    """
+    for number, question in enumerate(questions, start=1):
+        name = question.question_id if isinstance(question, Question) else None
+        try:
+            check_question(question, tracks=tracks)
+        except InputError as error:
+            raise InputError(f"question {number if name is None else name}: {error}") from error

@@ -75,7 +75,7 @@ def test_second_derivatives_are_refused() -> None:
         torch.autograd.grad(value, v, create_graph=True)
 
 
-def _relative_errors(worlds: Worlds, seed: int, model: PhysicsModel) -> np.ndarray:
+def relative_errors(worlds: Worlds, seed: int, model: PhysicsModel) -> np.ndarray:
     """Error of a directional derivative in all inputs at once, relative, per world; NaN where events change order."""
     generator = np.random.default_rng(seed)
     # Not on a frame: a body that is shown at the moment of its release has a derivative from each side only.
@@ -136,7 +136,7 @@ def _worlds(shapes: tuple[object, ...], count: int, model: PhysicsModel) -> Worl
 @pytest.mark.parametrize("shapes", MIXES)
 @pytest.mark.parametrize("model", [PhysicsModel.base(), EXTENDED], ids=["base", "extended"])
 def test_random_scenes_against_central_differences(shapes: tuple[object, ...], model: PhysicsModel) -> None:
-    errors = _relative_errors(_worlds(shapes, 25, model), 12, model)
+    errors = relative_errors(_worlds(shapes, 25, model), 12, model)
     assert np.nanmedian(errors) < 1e-6
     assert (np.nan_to_num(errors) <= 1e-5).mean() >= 0.9
 
@@ -144,7 +144,7 @@ def test_random_scenes_against_central_differences(shapes: tuple[object, ...], m
 @pytest.mark.slow
 @pytest.mark.parametrize("shapes", MIXES)
 def test_a_thousand_random_scenes_against_central_differences(shapes: tuple[object, ...]) -> None:
-    errors = _relative_errors(_worlds(shapes, 500, PhysicsModel.base()), 12, PhysicsModel.base())
+    errors = relative_errors(_worlds(shapes, 500, PhysicsModel.base()), 12, PhysicsModel.base())
     kept = errors[~np.isnan(errors)]
     print(f"share within 1e-5: {(kept <= 1e-5).mean():.4f} of {len(kept)} scenes, worst {kept.max():.1e}")
     assert (kept <= 1e-5).mean() >= 0.97

@@ -2,7 +2,7 @@
 
 # numba infers types, and compiled functions take their arrays one by one and by position.
 # mypy: disable-error-code="no-untyped-def"
-# ruff: noqa: PLR0912, PLR0917
+# ruff: noqa: PLR0917
 from vrdp_prob.models.simulator.adjoint_kernel import (
     FLATTEST,
     OF_A,
@@ -13,12 +13,15 @@ from vrdp_prob.models.simulator.adjoint_kernel import (
     VALUE_A,
     VALUE_B,
     VELOCITIES,
-    end_leg,
+    continue_legs,
+    end_legs,
     load,
+    load_touches,
     read_frames,
-    reverse_piece,
+    reverse_pieces,
     shift_of,
 )
+from vrdp_prob.models.simulator.cluster_kernel import ROOM_RATE, constraint_bar_states, set_constraints
 from vrdp_prob.models.simulator.laws_kernel import (
     GROUP_SIZE,
     SLIPS,
@@ -27,10 +30,14 @@ from vrdp_prob.models.simulator.laws_kernel import (
     contact_law_vjp,
     gap_law_vjp,
 )
+from vrdp_prob.models.simulator.motion_kernel import take_states
 from vrdp_prob.models.simulator.tableau import DENSE
 from vrdp_prob.models.simulator.tape_kernel import (
     BEFORE_FIRST,
     BEFORE_SECOND,
+    BLOCK,
+    BLOCK_PIECES,
+    BLOCK_TOUCHES,
     CLOSING_SPEED,
     CONTACT,
     CONTACT_KIND,
@@ -39,8 +46,11 @@ from vrdp_prob.models.simulator.tape_kernel import (
     FIRST,
     FRAME_BEGIN,
     FRAME_END,
+    HOLDS,
     KIND,
+    PART,
     PIECE,
+    PRESS,
     RELEASE,
     SECOND,
     SPIN_STOP,
@@ -51,7 +61,6 @@ from vrdp_prob.models.simulator.world_kernel import (
     FIXED,
     LENGTH,
     MOVING,
-    ORIGIN,
     PRESENT,
     REFERENCE_X,
     REFERENCE_Y,
@@ -64,45 +73,36 @@ from vrdp_prob.models.simulator.world_kernel import (
 
 
 @compiled
-def reverse_continue(adjoint, group):
-    """The next piece of a leg begins where the one before ends."""
-    for slot in range(GROUP_SIZE):
-        for c in range(STATE_SIZE):
-            for power in range(DENSE.shape[0]):
-                adjoint.polynomial[group, power, slot, c] += adjoint.state[group, slot, c]
-
-
-@compiled
 def reverse_release(world, adjoint, body, t, has_before):
     """The state with which a body is released, and its time."""
     group = body // GROUP_SIZE
-    slot = body - group * GROUP_SIZE
     for c in range(STATE_SIZE):
-        adjoint.start[body, c] += adjoint.state[group, slot, c]
-        adjoint.state[group, slot, c] = 0.0
-    adjoint.start[body, RELEASE_TIME] += adjoint.leg[group]
-    adjoint.leg[group] = 0.0
+        adjoint.start[body, c] += adjoint.state[body, c]
+        adjoint.state[body, c] = 0.0
     if has_before:
-        adjoint.start[body, RELEASE_TIME] += shift_of(world, adjoint, group, t)
-        end_leg(world, adjoint, group, t)
+        adjoint.start[body, RELEASE_TIME] += shift_of(world, adjoint, world.members[group, 1], t)
+        end_legs(world, adjoint, world.members[group, 1], t)
+    else:
+        adjoint.start[body, RELEASE_TIME] += adjoint.leg[group]
+        adjoint.leg[group] = 0.0
 
 
 @compiled
 def reverse_stop(world, adjoint, body, t):
     """A body stops, or begins to roll: what vanishes sets the time."""
     group = body // GROUP_SIZE
-    slot = body - group * GROUP_SIZE
-    phase = world.phase[body]
-    bar = adjoint.state[group, slot]
+    cluster = world.members[group, 1]
+    phase, bar = world.phase[body], adjoint.state[body]
     rolls = SLIPS and phase[MOVING] == SLIPPING
     if rolls:
         bar[3], bar[4] = bar[3] + bar[6], bar[4] + bar[7]
         bar[6], bar[7] = 0.0, 0.0
     else:
         bar[3], bar[4] = 0.0, 0.0
-    of_time = adjoint.leg[group] + shift_of(world, adjoint, group, t)
+    of_time = shift_of(world, adjoint, cluster, t)
     rate = adjoint.local[RATE_A]
-    evaluate_rate(world.polynomial[group], slot, share_of(world, group, t), world.clock[group, LENGTH], rate)
+    share = share_of(world, group, t)
+    evaluate_rate(world.polynomial[group], body - group * GROUP_SIZE, share, world.clock[group, LENGTH], rate)
     x, y = phase[REFERENCE_X], phase[REFERENCE_Y]
     falling = rate[3] * x + rate[4] * y
     if rolls:
@@ -112,49 +112,62 @@ def reverse_stop(world, adjoint, body, t):
         bar[3], bar[4] = bar[3] + factor * x, bar[4] + factor * y
         if rolls:
             bar[6], bar[7] = bar[6] - factor * x, bar[7] - factor * y
-    end_leg(world, adjoint, group, t)
+    end_legs(world, adjoint, cluster, t)
 
 
 @compiled
 def reverse_spin_stop(world, adjoint, body, t):
     """A body stops to spin: its spin vanishes."""
     group = body // GROUP_SIZE
-    slot = body - group * GROUP_SIZE
-    bar = adjoint.state[group, slot]
+    cluster = world.members[group, 1]
+    bar = adjoint.state[body]
     bar[5] = 0.0
-    of_time = adjoint.leg[group] + shift_of(world, adjoint, group, t)
+    of_time = shift_of(world, adjoint, cluster, t)
     rate = adjoint.local[RATE_A]
-    evaluate_rate(world.polynomial[group], slot, share_of(world, group, t), world.clock[group, LENGTH], rate)
+    share = share_of(world, group, t)
+    evaluate_rate(world.polynomial[group], body - group * GROUP_SIZE, share, world.clock[group, LENGTH], rate)
     if abs(rate[5]) > FLATTEST:
         bar[5] = -of_time / rate[5]
-    end_leg(world, adjoint, group, t)
+    end_legs(world, adjoint, cluster, t)
+
+
+@compiled
+def reverse_slide(world, adjoint, cluster, touch, t):
+    """A contact slides off its feature, where the force jumps: its room on the feature vanishes."""
+    bar = adjoint.constraint
+    take_states(world, cluster, share_of(world, cluster, t))
+    set_constraints(world, cluster)
+    of_time = shift_of(world, adjoint, cluster, t)
+    rate = world.touching[touch, ROOM_RATE]
+    if abs(rate) > FLATTEST:
+        for c in range(7):
+            bar[c] = 0.0
+        bar[7] = -of_time / rate
+        constraint_bar_states(world, adjoint, touch, adjoint.state)
+    end_legs(world, adjoint, cluster, t)
 
 
 @compiled
 def take_velocities(world, adjoint, body, of_body, bar):
     """Move the adjoints of a body's state after a contact: positions pass through, velocities go to the law."""
-    group = body // GROUP_SIZE
-    slot = body - group * GROUP_SIZE
     for c in range(STATE_SIZE):
         of_body[c] = 0.0
     for c in range(3):
         bar[c] = 0.0
     if not world.kind[body, FIXED]:
         for c in range(3):
-            bar[c] = adjoint.state[group, slot, 3 + c]
-            adjoint.state[group, slot, 3 + c] = 0.0
+            bar[c] = adjoint.state[body, 3 + c]
+            adjoint.state[body, 3 + c] = 0.0
 
 
 @compiled
-def give_back(world, adjoint, body, of_body, t):
+def give_back(world, adjoint, body, of_body):
     """Add what the laws of a contact say to the adjoint of a body's state before it."""
-    group = body // GROUP_SIZE
-    slot = body - group * GROUP_SIZE
     for c in range(STATE_SIZE):
         if world.kind[body, FIXED]:
-            adjoint.polynomial[group, 0, slot, c] += of_body[c]
+            adjoint.start[body, c] += of_body[c]
         else:
-            adjoint.state[group, slot, c] += of_body[c]
+            adjoint.state[body, c] += of_body[c]
 
 
 @compiled
@@ -171,8 +184,8 @@ def product(world, adjoint, body, of_body, t):
 
 
 @compiled
-def reverse_contact(world, adjoint, kind, a, b, numbers, t):
-    """A contact: the gap vanishes, the laws give the velocities after it."""
+def reverse_contact(world, adjoint, kind, a, b, together, numbers, t):
+    """A contact: the gap vanishes, the laws give the velocities after it; `together` in one cluster before it."""
     group_a, group_b = a // GROUP_SIZE, b // GROUP_SIZE
     ya, yb = adjoint.local[VALUE_A], adjoint.local[VALUE_B]
     of_a, of_b, bar, one = adjoint.local[OF_A], adjoint.local[OF_B], adjoint.local[VELOCITIES], adjoint.local[ONE]
@@ -186,20 +199,22 @@ def reverse_contact(world, adjoint, kind, a, b, numbers, t):
         kind, ya, yb, world.body[a], world.body[b], feature, world.shared, bar, of_a, of_b, body[a], body[b], shared
     )
     of_time = product(world, adjoint, a, of_a, t) + product(world, adjoint, b, of_b, t)
-    if not world.kind[a, FIXED]:
-        of_time += adjoint.leg[group_a] + shift_of(world, adjoint, group_a, t)
-    if not world.kind[b, FIXED] and group_a != group_b:
-        of_time += adjoint.leg[group_b] + shift_of(world, adjoint, group_b, t)
+    of_first = not world.kind[a, FIXED]
+    of_second = not world.kind[b, FIXED] and not (of_first and together)
+    if of_first:
+        of_time += shift_of(world, adjoint, world.members[group_a, 1], t)
+    if of_second:
+        of_time += shift_of(world, adjoint, world.members[group_b, 1], t)
     one[0] = of_time / numbers[CLOSING_SPEED]
     gap_law_vjp(
         kind, ya, yb, world.body[a], world.body[b], feature, world.shared, one, of_a, of_b, body[a], body[b], shared
     )
-    give_back(world, adjoint, a, of_a, t)
-    give_back(world, adjoint, b, of_b, t)
-    if not world.kind[a, FIXED]:
-        end_leg(world, adjoint, group_a, t)
-    if not world.kind[b, FIXED] and group_a != group_b:
-        end_leg(world, adjoint, group_b, t)
+    give_back(world, adjoint, a, of_a)
+    give_back(world, adjoint, b, of_b)
+    if of_first:
+        end_legs(world, adjoint, world.members[group_a, 1], t)
+    if of_second:
+        end_legs(world, adjoint, world.members[group_b, 1], t)
 
 
 @compiled
@@ -216,32 +231,59 @@ def read_unreleased(world, adjoint, times, states_bar):
 def reverse_world(world, adjoint, integers, numbers, times, states_bar):
     """Read the tape of a world backwards."""
     read_unreleased(world, adjoint, times, states_bar)
+    clear_adjoint(world, adjoint)
+    for row in range(integers.shape[0] - 1, -1, -1):
+        entry = integers[row]
+        kind, first = entry[KIND], entry[FIRST]
+        if kind == PIECE:
+            load(world, adjoint, integers, numbers, row)
+            read_frames(world, adjoint, first, entry[FRAME_BEGIN], entry[FRAME_END], times, states_bar)
+            if entry[BLOCK] == row:
+                reverse_pieces(world, adjoint, integers, numbers, row)
+        elif kind != PRESS:
+            before, other = entry[BEFORE_FIRST], entry[BEFORE_SECOND]
+            if before >= 0:
+                load(world, adjoint, integers, numbers, before)
+            if other >= 0:
+                load(world, adjoint, integers, numbers, other)
+            reverse_event(world, adjoint, integers, numbers, row)
+
+
+@compiled
+def clear_adjoint(world, adjoint):
+    """Nothing read yet."""
     for group in range(adjoint.leg.shape[0]):
         adjoint.leg[group], adjoint.loaded[group] = 0.0, -1
         for slot in range(GROUP_SIZE):
             for c in range(STATE_SIZE):
-                adjoint.state[group, slot, c] = 0.0
+                adjoint.state[group * GROUP_SIZE + slot, c] = 0.0
                 for power in range(DENSE.shape[0]):
                     adjoint.polynomial[group, power, slot, c] = 0.0
-    for row in range(integers.shape[0] - 1, -1, -1):
-        entry = integers[row]
-        kind, first, second, t = entry[KIND], entry[FIRST], entry[SECOND], numbers[row, TIME]
-        if kind == PIECE:
-            load(world, adjoint, integers, numbers, first, row)
-            read_frames(world, adjoint, first, entry[FRAME_BEGIN], entry[FRAME_END], times, states_bar)
-            reverse_piece(world, adjoint, first, world.clock[first, ORIGIN])
-            continue
-        if entry[BEFORE_FIRST] >= 0:
-            load(world, adjoint, integers, numbers, first // GROUP_SIZE, entry[BEFORE_FIRST])
-        if entry[BEFORE_SECOND] >= 0:
-            load(world, adjoint, integers, numbers, second // GROUP_SIZE, entry[BEFORE_SECOND])
-        if kind == CONTINUE:
-            reverse_continue(adjoint, first // GROUP_SIZE)
-        elif kind == RELEASE:
-            reverse_release(world, adjoint, first, t, entry[BEFORE_FIRST] >= 0)
-        elif kind == STOP:
-            reverse_stop(world, adjoint, first, t)
-        elif kind == SPIN_STOP:
-            reverse_spin_stop(world, adjoint, first, t)
-        elif kind == CONTACT:
-            reverse_contact(world, adjoint, entry[CONTACT_KIND], first, second, numbers[row], t)
+    for body in range(adjoint.before.shape[0]):
+        for c in range(STATE_SIZE):
+            adjoint.before[body, c] = 0.0
+
+
+@compiled
+def reverse_event(world, adjoint, integers, numbers, row):
+    """Pass the adjoints of the states after an event on to those before it; the pieces that it ended are loaded."""
+    entry = integers[row]
+    kind, first, second, t = entry[KIND], entry[FIRST], entry[SECOND], numbers[row, TIME]
+    before, other = entry[BEFORE_FIRST], entry[BEFORE_SECOND]
+    if kind == CONTINUE or (kind == PART and entry[HOLDS] < 0):
+        continue_legs(world, adjoint, world.members[first // GROUP_SIZE, 1], t)
+    elif kind == RELEASE:
+        reverse_release(world, adjoint, first, t, before >= 0)
+    elif kind == STOP:
+        reverse_stop(world, adjoint, first, t)
+    elif kind == SPIN_STOP:
+        reverse_spin_stop(world, adjoint, first, t)
+    elif kind == PART:
+        # Takes the contacts of the pieces that end here as those at hand; nothing else reads them until others are.
+        block = integers[before, BLOCK]
+        touches = integers[block, BLOCK_TOUCHES]
+        load_touches(world, integers, numbers, block + integers[block, BLOCK_PIECES], touches)
+        reverse_slide(world, adjoint, world.members[first // GROUP_SIZE, 1], entry[HOLDS], t)
+    elif kind == CONTACT:
+        together = before >= 0 and other >= 0 and integers[before, BLOCK] == integers[other, BLOCK]
+        reverse_contact(world, adjoint, entry[CONTACT_KIND], first, second, together, numbers[row], t)

@@ -9,21 +9,48 @@ against its rate when it begins later.
 
 # numba infers types, and compiled functions take their arrays one by one and by position.
 # mypy: disable-error-code="no-untyped-def"
-# ruff: noqa: PLR0912, PLR0917
+# ruff: noqa: PLR0917
 
 from typing import NamedTuple
 
 import numpy as np
 
+from vrdp_prob.models.simulator.cluster_kernel import (
+    HOLD,
+    TOUCH_A,
+    TOUCH_B,
+    TOUCH_FEATURE,
+    TOUCH_KIND,
+    constrain_vjp,
+    note_member,
+    presses,
+    set_touch_count,
+    spread,
+)
 from vrdp_prob.models.simulator.laws_kernel import (
     GROUP_SIZE,
     STATE_SIZE,
     compiled,
     motion_vjp,
 )
-from vrdp_prob.models.simulator.motion_kernel import STAGES, compute_stages, set_polynomial, stage_state
+from vrdp_prob.models.simulator.motion_kernel import (
+    PARTS_OF_STEP,
+    cluster_derivatives,
+    compute_stages,
+    match_velocities,
+    set_polynomial,
+    stage_states,
+)
 from vrdp_prob.models.simulator.tableau import DENSE, NODES, WEIGHTS
 from vrdp_prob.models.simulator.tape_kernel import (
+    BLOCK,
+    BLOCK_PIECES,
+    BLOCK_TOUCHES,
+    CONTACT_KIND,
+    FEATURE,
+    FIRST,
+    HOLDS,
+    SECOND,
     TIME,
 )
 from vrdp_prob.models.simulator.world_kernel import (
@@ -31,9 +58,12 @@ from vrdp_prob.models.simulator.world_kernel import (
     FIXED,
     LENGTH,
     MOVING,
+    ORIGIN,
     PHASE_SIZE,
     RESTING,
     SPIN_SENSE,
+    STAGES,
+    WORK,
     evaluate_rate,
     hold,
     share_of,
@@ -53,35 +83,71 @@ class Adjoint(NamedTuple):
     start: np.ndarray  # [body, (state, release time)]
     times: np.ndarray  # [time]
     polynomial: np.ndarray  # [group, power, slot, state]
-    state: np.ndarray  # [group, slot, state], of the state with which the current piece begins
+    state: np.ndarray  # [body, state], of the state with which the current piece begins
     leg: np.ndarray  # [group], of the beginning of the current leg
     loaded: np.ndarray  # [group], row of the piece whose polynomial is at hand
-    stages: np.ndarray  # [stage, slot, state], adjoints of the stages
+    stages: np.ndarray  # [stage, body, state], adjoints of the stages
+    before: np.ndarray  # [body, state], of the state at which a stage or the contacts were evaluated
+    constraint: np.ndarray  # [8], of the constraint of one contact
     local: np.ndarray  # [8, 16]
 
 
 @compiled
-def load(world, adjoint, integers, numbers, group, row):
-    """Compute the polynomial of a recorded piece again, if it is not at hand."""
-    if adjoint.loaded[group] == row:
-        return
-    adjoint.loaded[group] = row
-    at = 2
+def load(world, adjoint, integers, numbers, row):
+    """Compute the polynomials of recorded pieces of a cluster again, where one of them is not at hand."""
+    if adjoint.loaded[integers[row, FIRST]] != row:
+        load_block(world, adjoint, integers, numbers, integers[row, BLOCK])
+
+
+@compiled
+def load_block(world, adjoint, integers, numbers, block):
+    """Compute the polynomials of the recorded pieces of a cluster, which becomes the one at hand with its contacts."""
+    size, touches = integers[block, BLOCK_PIECES], integers[block, BLOCK_TOUCHES]
+    cluster = integers[block, FIRST]
+    world.members[world.clock.shape[0] + 1, 0] = 0
+    for place in range(size):
+        note_member(world, integers[block + place, FIRST])
+    spread(world)
+    moving = False
+    for row in range(block, block + size):
+        group = integers[row, FIRST]
+        adjoint.loaded[group] = row
+        moving = load_states(world, group, numbers[row]) or moving
+    load_touches(world, integers, numbers, block + size, touches)
+    if moving:
+        match_velocities(world, cluster)
+        compute_stages(world, cluster, numbers[block, TIME], numbers[block, 1], PARTS_OF_STEP[0], PARTS_OF_STEP[3])
+        for row in range(block, block + size):
+            world.clock[integers[row, FIRST], LENGTH] = numbers[block, 1]
+            set_polynomial(world, integers[row, FIRST], numbers[block, 1])
+
+
+@compiled
+def load_states(world, group, numbers):
+    """States and phases with which a recorded piece begins; returns whether a body moves."""
     moving = False
     for slot in range(GROUP_SIZE):
         phase = world.phase[group * GROUP_SIZE + slot]
+        at = 2 + slot * (STATE_SIZE + PHASE_SIZE)
         for c in range(STATE_SIZE):
-            world.polynomial[group, 0, slot, c] = numbers[row, at + c]
-        at += STATE_SIZE
+            world.polynomial[group, 0, slot, c] = numbers[at + c]
         for c in range(PHASE_SIZE):
-            phase[c] = numbers[row, at + c]
-        at += PHASE_SIZE
+            phase[c] = numbers[at + STATE_SIZE + c]
         moving = moving or phase[MOVING] != RESTING or phase[SPIN_SENSE] != 0.0
-    hold(world, group, numbers[row, TIME])
-    if moving:
-        world.clock[group, LENGTH] = numbers[row, 1]
-        compute_stages(world, group, numbers[row, TIME], numbers[row, 1], 0, STAGES)
-        set_polynomial(world, group, numbers[row, 1])
+    hold(world, group, numbers[TIME])
+    return moving
+
+
+@compiled
+def load_touches(world, integers, numbers, begin, count):
+    """Take the recorded lasting contacts of a cluster as those at hand."""
+    set_touch_count(world, count)
+    for touch in range(count):
+        row, entry = world.touching[touch], integers[begin + touch]
+        row[TOUCH_A], row[TOUCH_B], row[TOUCH_KIND] = entry[FIRST], entry[SECOND], entry[CONTACT_KIND]
+        row[HOLD] = entry[HOLDS]
+        for c in range(7):
+            row[TOUCH_FEATURE + c] = numbers[begin + touch, FEATURE + c]
 
 
 @compiled
@@ -116,13 +182,38 @@ def read(adjoint, group, slot, share, bar, rate):
 
 
 @compiled
-def reverse_step(world, adjoint, group, t, h):
-    """Adjoint of the state with which a piece begins, from that of its polynomial."""
+def reverse_step(world, adjoint, cluster, t, h):
+    """Adjoints of the states with which the pieces of a cluster begin, from those of their polynomials."""
+    for place in range(world.members[cluster, 0]):
+        reverse_polynomial(adjoint, world.members[cluster, 1 + place], h)
+    pressing = presses(world, cluster)
+    compute_stages(world, cluster, t, h, PARTS_OF_STEP[0], PARTS_OF_STEP[3])
+    for stage in range(STAGES - 1, -1, -1):
+        stage_states(world, cluster, stage, h)
+        if pressing:
+            # Computes the forces of this stage again.
+            cluster_derivatives(world, cluster, t + NODES[stage] * h, world.stages[stage])
+        for place in range(world.members[cluster, 0]):
+            group = world.members[cluster, 1 + place]
+            for body in range(group * GROUP_SIZE, (group + 1) * GROUP_SIZE):
+                for c in range(STATE_SIZE):
+                    adjoint.before[body, c] = 0.0
+        if pressing:
+            bars = adjoint.stages[stage]
+            constrain_vjp(world, adjoint, cluster, world.stages[stage], bars, adjoint.before, 1.0)
+        for place in range(world.members[cluster, 0]):
+            reverse_stage(world, adjoint, world.members[cluster, 1 + place], t, h, stage)
+
+
+@compiled
+def reverse_polynomial(adjoint, group, h):
+    """Adjoints of the stages of a group's step from that of its polynomial."""
     for slot in range(GROUP_SIZE):
+        body = group * GROUP_SIZE + slot
         for c in range(STATE_SIZE):
-            adjoint.state[group, slot, c] = adjoint.polynomial[group, 0, slot, c]
+            adjoint.state[body, c] = adjoint.polynomial[group, 0, slot, c]
         for stage in range(STAGES):
-            out = adjoint.stages[stage, slot]
+            out = adjoint.stages[stage, body]
             for c in range(STATE_SIZE):
                 out[c] = 0.0
             for power in range(1, DENSE.shape[0]):
@@ -130,56 +221,82 @@ def reverse_step(world, adjoint, group, t, h):
                 if weight != 0.0:
                     for c in range(STATE_SIZE):
                         out[c] += weight * adjoint.polynomial[group, power, slot, c]
-    compute_stages(world, group, t, h, 0, STAGES)
-    before = adjoint.local[VALUE_A]
-    for stage in range(STAGES - 1, -1, -1):
-        stage_state(world, group, stage, h)
-        for slot in range(GROUP_SIZE):
-            body = group * GROUP_SIZE + slot
-            phase = world.phase[body]
-            if phase[MOVING] == RESTING and phase[SPIN_SENSE] == 0.0:
-                continue
-            for c in range(STATE_SIZE):
-                before[c] = 0.0
+
+
+@compiled
+def reverse_stage(world, adjoint, group, t, h, stage):
+    """Pass the adjoint of a group's derivative in one stage on to the earlier ones and to the beginning."""
+    for body in range(group * GROUP_SIZE, (group + 1) * GROUP_SIZE):
+        phase, before = world.phase[body], adjoint.before[body]
+        if phase[MOVING] != RESTING or phase[SPIN_SENSE] != 0.0:
             motion_vjp(
                 t + NODES[stage] * h,
-                world.stages[STAGES, slot],
+                world.stages[WORK, body],
                 phase,
                 world.body[body],
                 world.shared,
-                adjoint.stages[stage, slot],
+                adjoint.stages[stage, body],
                 before,
                 adjoint.body[body],
                 adjoint.shared,
                 adjoint.leg[group : group + 1],
             )
-            for c in range(STATE_SIZE):
-                adjoint.state[group, slot, c] += before[c]
-            for earlier in range(stage):
-                weight = h * WEIGHTS[stage, earlier]
-                if weight != 0.0:
-                    for c in range(STATE_SIZE):
-                        adjoint.stages[earlier, slot, c] += weight * before[c]
+        for c in range(STATE_SIZE):
+            adjoint.state[body, c] += before[c]
+        for earlier in range(stage):
+            weight = h * WEIGHTS[stage, earlier]
+            if weight != 0.0:
+                for c in range(STATE_SIZE):
+                    adjoint.stages[earlier, body, c] += weight * before[c]
 
 
 @compiled
-def reverse_piece(world, adjoint, group, t):
-    """Pass the adjoint of a piece on to the state with which it begins."""
+def reverse_pieces(world, adjoint, integers, numbers, block):
+    """Pass the adjoints of the pieces of a cluster on to the states with which they begin."""
+    cluster = integers[block, FIRST]
+    if integers[block, BLOCK_PIECES] > 1 or integers[block, BLOCK_TOUCHES] > 0:
+        load_block(world, adjoint, integers, numbers, block)
     moving = False
-    for slot in range(GROUP_SIZE):
-        phase = world.phase[group * GROUP_SIZE + slot]
-        moving = moving or phase[MOVING] != RESTING or phase[SPIN_SENSE] != 0.0
+    for place in range(world.members[cluster, 0]):
+        group = world.members[cluster, 1 + place]
+        for body in range(group * GROUP_SIZE, (group + 1) * GROUP_SIZE):
+            moving = moving or world.phase[body, MOVING] != RESTING or world.phase[body, SPIN_SENSE] != 0.0
     if moving:
-        reverse_step(world, adjoint, group, t, world.clock[group, LENGTH])
+        reverse_step(world, adjoint, cluster, world.clock[cluster, ORIGIN], world.clock[cluster, LENGTH])
+        reverse_match(world, adjoint, numbers, block, cluster)
+    for place in range(world.members[cluster, 0]):
+        reverse_beginning(world, adjoint, world.members[cluster, 1 + place], moving)
+
+
+@compiled
+def reverse_match(world, adjoint, numbers, block, cluster):
+    """Velocities were matched in the recorded states before the pieces of a cluster began."""
+    if not presses(world, cluster):
+        return
+    for place in range(world.members[cluster, 0]):
+        load_states(world, world.members[cluster, 1 + place], numbers[block + place])
+        adjoint.loaded[world.members[cluster, 1 + place]] = -1
+    match_velocities(world, cluster)
+    for body in range(adjoint.before.shape[0]):
+        for c in range(STATE_SIZE):
+            adjoint.before[body, c] = 0.0
+    constrain_vjp(world, adjoint, cluster, world.stages[WORK], adjoint.state, adjoint.before, 0.0)
+    for body in range(adjoint.before.shape[0]):
+        for c in range(STATE_SIZE):
+            adjoint.state[body, c] += adjoint.before[body, c]
+
+
+@compiled
+def reverse_beginning(world, adjoint, group, moving):
+    """The adjoint of a piece is read; a resting body was set to rest, whatever small velocity it came with."""
     for slot in range(GROUP_SIZE):
         phase = world.phase[group * GROUP_SIZE + slot]
-        bar = adjoint.state[group, slot]
+        bar = adjoint.state[group * GROUP_SIZE + slot]
         for c in range(STATE_SIZE):
             if not moving:
                 bar[c] = adjoint.polynomial[group, 0, slot, c]
             for power in range(DENSE.shape[0]):
                 adjoint.polynomial[group, power, slot, c] = 0.0
-        # A resting body was set to rest, whatever small velocity it came with.
         if phase[MOVING] == RESTING:
             bar[3], bar[4] = 0.0, 0.0
         if phase[SPIN_SENSE] == 0.0:
@@ -187,24 +304,43 @@ def reverse_piece(world, adjoint, group, t):
 
 
 @compiled
-def shift_of(world, adjoint, group, t):
-    """Product of the adjoints of the states after an event with the rates before it: an adjoint of the event's time."""
+def shift_of(world, adjoint, cluster, t):
+    """Adjoint of the time of an event by the legs that begin with it and by the states after it.
+
+    The latter is the product of their adjoints with the rates before the event, of all bodies of a cluster.
+    """
     total = 0.0
-    share = share_of(world, group, t)
     rate = adjoint.local[RATE_A]
-    for slot in range(GROUP_SIZE):
-        evaluate_rate(world.polynomial[group], slot, share, world.clock[group, LENGTH], rate)
-        for c in range(STATE_SIZE):
-            total += adjoint.state[group, slot, c] * rate[c]
+    for place in range(world.members[cluster, 0]):
+        group = world.members[cluster, 1 + place]
+        share = share_of(world, group, t)
+        total += adjoint.leg[group]
+        for slot in range(GROUP_SIZE):
+            evaluate_rate(world.polynomial[group], slot, share, world.clock[group, LENGTH], rate)
+            for c in range(STATE_SIZE):
+                total += adjoint.state[group * GROUP_SIZE + slot, c] * rate[c]
     return total
 
 
 @compiled
-def end_leg(world, adjoint, group, t):
-    """Read the states before an event from the piece that it ended; the leg before it is the current one then."""
-    share = share_of(world, group, t)
+def end_legs(world, adjoint, cluster, t):
+    """Read the states before an event from the pieces that it ended; the legs before it are the current ones then."""
     rate = adjoint.local[RATE_A]
-    adjoint.leg[group] = 0.0
-    for slot in range(GROUP_SIZE):
-        evaluate_rate(world.polynomial[group], slot, share, world.clock[group, LENGTH], rate)
-        adjoint.leg[group] -= read(adjoint, group, slot, share, adjoint.state[group, slot], rate)
+    for place in range(world.members[cluster, 0]):
+        group = world.members[cluster, 1 + place]
+        share = share_of(world, group, t)
+        adjoint.leg[group] = 0.0
+        for slot in range(GROUP_SIZE):
+            evaluate_rate(world.polynomial[group], slot, share, world.clock[group, LENGTH], rate)
+            adjoint.leg[group] -= read(adjoint, group, slot, share, adjoint.state[group * GROUP_SIZE + slot], rate)
+
+
+@compiled
+def continue_legs(world, adjoint, cluster, t):
+    """Read the states in which pieces go on from those before, within a leg."""
+    for place in range(world.members[cluster, 0]):
+        group = world.members[cluster, 1 + place]
+        share = share_of(world, group, t)
+        for slot in range(GROUP_SIZE):
+            rate = adjoint.local[RATE_A]
+            read(adjoint, group, slot, share, adjoint.state[group * GROUP_SIZE + slot], rate)

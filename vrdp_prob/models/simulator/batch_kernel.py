@@ -10,15 +10,14 @@ from numba import njit
 from vrdp_prob.models.simulator.adjoint_events_kernel import reverse_world
 from vrdp_prob.models.simulator.adjoint_kernel import Adjoint
 from vrdp_prob.models.simulator.detection_kernel import new_pairs
-from vrdp_prob.models.simulator.laws_kernel import GROUP_SIZE, STATE_SIZE, compiled
-from vrdp_prob.models.simulator.motion_kernel import STAGES
+from vrdp_prob.models.simulator.laws_kernel import GROUP_SIZE, STATE_SIZE, allocating, compiled
 from vrdp_prob.models.simulator.rollout_kernel import NOT_FINITE, TAPE_FULL, rollout_world
 from vrdp_prob.models.simulator.tableau import DENSE
 from vrdp_prob.models.simulator.tape_kernel import INTEGERS, NUMBERS, ROWS, Tape
-from vrdp_prob.models.simulator.world_kernel import new_world
+from vrdp_prob.models.simulator.world_kernel import STAGES, new_world
 
 
-@compiled
+@allocating
 def is_finite(values):
     """Whether all numbers of an array are finite."""
     total = 0.0
@@ -27,7 +26,7 @@ def is_finite(values):
     return total == 0.0
 
 
-@compiled
+@allocating
 def joined(integers, numbers, first_row, world, tape):
     """Append the tape of a world to the tapes of the batch, which grow where they must."""
     begin, rows = first_row[world], tape.counts[ROWS]
@@ -60,7 +59,7 @@ def rollout_batch(kinds, bodies, shared, start, times, event_limit, states, outc
     `outcomes` [world].
     """
     worlds, count = kinds.shape[0], kinds.shape[1]
-    capacity = 64 + 16 * count
+    capacity = 256 + 64 * count
     integers, numbers = np.zeros((64 * worlds, INTEGERS), np.int64), np.zeros((64 * worlds, NUMBERS))
     first_row = np.zeros(worlds + 1, np.int64)
     pairs = new_pairs(count)
@@ -108,8 +107,9 @@ def reverse_batch(
     count = kinds.shape[1]
     groups = count // GROUP_SIZE
     polynomial = np.zeros((groups, DENSE.shape[0], GROUP_SIZE, STATE_SIZE))
-    state, leg, loaded = np.zeros((groups, GROUP_SIZE, STATE_SIZE)), np.zeros(groups), np.zeros(groups, np.int64)
-    stages, local = np.zeros((STAGES, GROUP_SIZE, STATE_SIZE)), np.zeros((8, 16))
+    state, leg, loaded = np.zeros((count, STATE_SIZE)), np.zeros(groups), np.zeros(groups, np.int64)
+    stages, before = np.zeros((STAGES, count, STATE_SIZE)), np.zeros((count, STATE_SIZE))
+    constraint, local = np.zeros(8), np.zeros((8, 16))
     for index in range(kinds.shape[0]):
         if outcomes[index] == NOT_FINITE:
             continue
@@ -124,6 +124,8 @@ def reverse_batch(
             leg,
             loaded,
             stages,
+            before,
+            constraint,
             local,
         )
         rows = slice(first_row[index], first_row[index + 1])

@@ -11,18 +11,17 @@ from typing import TYPE_CHECKING
 
 from vrdp_prob.models.effects.effect import BodyView, ContactView
 from vrdp_prob.models.simulator.formula import Scalar
-from vrdp_prob.models.simulator.mathematics import cos, length, maximum, minimum, sin, where
+from vrdp_prob.models.simulator.mathematics import absolute, cos, length, maximum, minimum, sin, where
 
 if TYPE_CHECKING:
     from vrdp_prob.models.effects.effect import Effect
 
 
 HOP = 0.05
-"""Slowest rebound of two bodies that press on each other, in radii (of the smaller) per second.
+"""Slowest rebound of two bodies that press and rub on each other, in radii (of the smaller) per second.
 
-They would meet infinitely often in finite time. They hop by about a thousandth of their radius instead, which pushes as
-a lasting contact would, and may gain the energy of that hop. Bodies press when they meet again within `PRESSING_TIME`
-of `search_kernel.py`; all other contacts follow the restitution exactly.
+Bodies that press move together (see `cluster_kernel.py`), but not yet with friction between them. Where an effect adds
+tangential impulses they hop instead, by about a thousandth of their radius.
 """
 
 
@@ -80,6 +79,21 @@ def contact_geometry(kind: ContactKind, a: BodyView, b: BodyView, of_a: Feature,
     return ContactGeometry(distance - of_a.extent * a.radius - round_b, normal, point)
 
 
+def room_on_feature(kind: ContactKind, a: BodyView, b: BodyView, of_a: Feature, of_b: Feature) -> Scalar:
+    """Way in m that the touching point may still slide before the contact passes to another feature of `a`.
+
+    Past the end of a side comes the corner, beside a corner come the sides; a disc has no other feature.
+    """
+    offset = _rotated(b.angle, of_b.x * b.radius, of_b.y * b.radius)
+    between = (b.x + offset[0] - a.x, b.y + offset[1] - a.y)
+    x, y = _rotated(-a.angle, *between)
+    if kind is ContactKind.LINE_POINT:
+        return a.radius - absolute(of_a.x * y - of_a.y * x)
+    beside_x = where(absolute(of_a.x) > 0.5, x * of_a.x - a.radius, 1.0)
+    beside_y = where(absolute(of_a.y) > 0.5, y * of_a.y - a.radius, 1.0)
+    return minimum(beside_x, beside_y)
+
+
 @dataclass(frozen=True)
 class ContactResult:
     """Velocities (vx, vy, spin) of both bodies after a contact, the impulse along the normal and the closing speed."""
@@ -135,6 +149,11 @@ class _Arms:
         return change_a, change_b
 
 
+def rubs(effects: "Sequence[Effect]") -> bool:
+    """Whether an effect adds tangential impulses to contacts."""
+    return any(effect.overrides("tangential_impulse") for effect in effects)
+
+
 def contact(
     effects: "Sequence[Effect]",
     geometry: ContactGeometry,
@@ -146,6 +165,7 @@ def contact(
 ) -> ContactResult:
     """What a contact does: a normal impulse with restitution, then the tangential impulses that effects add.
 
+    Bodies that begin to press on each other (`pressing` is 1) do not rebound, or hop where they also rub.
     Momentum and angular momentum are kept, because one impulse acts on both bodies at one point. Source: J. K. Hahn,
     Realistic animation of rigid bodies, SIGGRAPH 1988 (impact with the effective mass at the touching point).
     """
@@ -157,7 +177,8 @@ def contact(
     for effect in effects:
         restitution = effect.restitution(closing, restitution, a, b, parameters)
     rebound = restitution * closing
-    rebound = where(pressing > 0.5, maximum(rebound, HOP * minimum(a.radius, b.radius)), rebound)
+    hop = maximum(rebound, HOP * minimum(a.radius, b.radius)) if rubs(effects) else 0.0
+    rebound = where(pressing > 0.5, hop, rebound)
     impulse = (closing + rebound) / arms.inverse_mass(normal)
     change_a, change_b = arms.after(normal, impulse)
     sliding = arms.relative_speed(tangent)

@@ -17,7 +17,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vrdp_prob.models.simulator.laws_kernel import GROUP_SIZE, compiled
+from vrdp_prob.models.simulator.laws_kernel import GROUP_SIZE, allocating, compiled
 from vrdp_prob.models.simulator.world_kernel import LENGTH, share_of
 
 TOUCHING = 1e-12
@@ -30,8 +30,10 @@ CRAWL = 1e-6
 """Shortest walk in s while two bodies touch."""
 # Columns of `table`; a contact has 6 numbers of features (x, y, extent of the owner, the same of the other).
 CONTACT_TIME, PAIR_KIND, OWNER, OVERLAPPING, LAST_CONTACT, PAIR_FEATURE, PRESSING = 0, 1, 2, 3, 4, 5, 11
-# Rows of `local`: the difference of the positions and both angles as polynomials; a look; its features.
-ANGLE_FIRST, LOOK, LOOK_FEATURE = 2, 4, 5
+# Rows of `local`: the difference of the positions and both angles as polynomials; a look; its features; two corners
+# that press already (whether there is one, whether the second body owns the side, the side's normal, the corner);
+# bounds on the fall of the rate in the frames of both; the corner nearest to a side; room for one polynomial.
+ANGLE_FIRST, LOOK, LOOK_FEATURE, KNOWN, BOUNDS, CORNER, POWERS = 2, 4, 5, 6, 8, 9, 10
 GAP, RATE, CURVATURE = 0, 1, 2
 
 
@@ -41,13 +43,13 @@ class Pairs(NamedTuple):
     table: (
         np.ndarray
     )  # [first, second, (time, kind, owner, overlapping, last contact, features, pressing)] with first < second
-    local: np.ndarray  # [6, 8]
+    local: np.ndarray  # [11, 8]
 
 
-@compiled
+@allocating
 def new_pairs(count):
     """Room for the contacts of `count` bodies."""
-    return Pairs(np.zeros((count, count, 12)), np.zeros((6, 8)))
+    return Pairs(np.zeros((count, count, 12)), np.zeros((11, 8)))
 
 
 @compiled
@@ -65,10 +67,9 @@ def set_look(pairs, gap, rate, curvature):
 
 
 @compiled
-def restrict(polynomial, slot, c, offset, scale, sign, out):
+def restrict(polynomial, slot, c, offset, scale, sign, work, out):
     """Add `sign` times a coordinate, as a polynomial of `s` with share = offset + scale * s, to `out`."""
     degree = polynomial.shape[0] - 1
-    work = np.empty(8)
     for power in range(degree + 1):
         work[power] = polynomial[power, slot, c]
     if offset != 0.0:
@@ -82,12 +83,12 @@ def restrict(polynomial, slot, c, offset, scale, sign, out):
 
 
 @compiled
-def add_path(world, body, t, duration, sign, c, out):
+def add_path(world, body, t, duration, sign, c, work, out):
     """Add a coordinate of a body on [t, t + duration], as a polynomial of the share of `duration`, to `out`."""
     group = body // GROUP_SIZE
     slot = body - group * GROUP_SIZE
     scale = duration / world.clock[group, LENGTH]
-    restrict(world.polynomial[group], slot, c, share_of(world, group, t), scale, sign, out)
+    restrict(world.polynomial[group], slot, c, share_of(world, group, t), scale, sign, work, out)
 
 
 @compiled
@@ -157,10 +158,9 @@ def disc_disc(pairs, s, reach, curvature):
 
 
 @compiled
-def box_disc(pairs, s, half, flat, radius, box_is_second, curvature):
-    """Gap of a square (or a straight wall, `flat`) and a disc."""
-    sign = -1.0 if box_is_second else 1.0
-    angle_row = ANGLE_FIRST + 1 if box_is_second else ANGLE_FIRST
+def box_disc(pairs, s, half, flat, radius, sign, curvature):
+    """Gap of a square (or a straight wall, `flat`) and a disc; `sign` is -1.0 where the square is the second body."""
+    angle_row = ANGLE_FIRST + 1 if sign < 0.0 else ANGLE_FIRST
     dx, dy = sign * value(pairs.local[0], s), sign * value(pairs.local[1], s)
     vx, vy = sign * slope(pairs.local[0], s), sign * slope(pairs.local[1], s)
     angle, spin = value(pairs.local[angle_row], s), slope(pairs.local[angle_row], s)
@@ -195,10 +195,22 @@ def box_disc(pairs, s, half, flat, radius, box_is_second, curvature):
 
 
 @compiled
-def box_side(pairs, s, swapped, half_a, half_b, flat_b, face, curvature, corner):
+def is_known(pairs, swapped, face_x, face_y, x, y):
+    """Whether a corner presses on a side already."""
+    for place in range(KNOWN, KNOWN + 2):
+        row = pairs.local[place]
+        same_side = (row[1] != 0.0) == swapped and row[2] == face_x and row[3] == face_y
+        if row[0] != 0.0 and same_side and row[4] == x and row[5] == y:
+            return True
+    return False
+
+
+@compiled
+def box_side(pairs, s, swapped, half_a, half_b, flat_b, face_x, face_y, curvature, corner):
     """Gap between a side of one box and its nearest corner of the other.
 
-    Writes gap, rate and the chosen corner; returns the certain step over all corners.
+    Writes gap, rate and the chosen corner; returns the certain step over all corners. Corners that press already are
+    left out.
     """
     sign = -1.0 if swapped else 1.0
     row_a = ANGLE_FIRST + 1 if swapped else ANGLE_FIRST
@@ -207,12 +219,15 @@ def box_side(pairs, s, swapped, half_a, half_b, flat_b, face, curvature, corner)
     vx, vy = sign * slope(pairs.local[0], s), sign * slope(pairs.local[1], s)
     angle_a, spin_a = value(pairs.local[row_a], s), slope(pairs.local[row_a], s)
     angle_b, spin_b = value(pairs.local[row_b], s), slope(pairs.local[row_b], s)
-    nx, ny = math.cos(angle_a + face), math.sin(angle_a + face)
+    nx = math.cos(angle_a) * face_x - math.sin(angle_a) * face_y
+    ny = math.sin(angle_a) * face_x + math.cos(angle_a) * face_y
     cosine, sine = math.cos(angle_b), math.sin(angle_b)
     least, step = math.inf, math.inf
     for index in range(4):
         sx = 1.0 if index < 2 else -1.0
         sy = 0.0 if flat_b else (1.0 if index % 2 == 0 else -1.0)
+        if is_known(pairs, swapped, face_x, face_y, sx, sy):
+            continue
         ox, oy = half_b * (cosine * sx - sine * sy), half_b * (sine * sx + cosine * sy)
         px, py = dx + ox, dy + oy
         gap = nx * px + ny * py - half_a
@@ -237,7 +252,7 @@ def box_box(pairs, s, half_i, half_j, flat_i, flat_j, curvature):
 
     The look holds the certain step in place of the curvature. Returns 1, plus 2 where the second box owns the side.
     """
-    corner = np.empty(5)
+    corner = pairs.local[CORNER]
     best = -math.inf
     result = 1
     for swapped in range(2):
@@ -247,14 +262,13 @@ def box_box(pairs, s, half_i, half_j, flat_i, flat_j, curvature):
         for index in range(4):
             if flat_a and index % 2 == 0:
                 continue
-            face = 0.5 * math.pi * index
-            step = box_side(pairs, s, swapped == 1, height, half_b, flat_b, face, curvature[swapped], corner)
+            x = 1.0 if index == 0 else (-1.0 if index == 2 else 0.0)
+            y = 1.0 if index == 1 else (-1.0 if index == 3 else 0.0)
+            step = box_side(pairs, s, swapped == 1, height, half_b, flat_b, x, y, curvature[swapped], corner)
             if corner[4] > best:
                 best = corner[4]
                 result = 1 + 2 * swapped
                 set_look(pairs, corner[0], corner[1], step)
-                x = 1.0 if index == 0 else (-1.0 if index == 2 else 0.0)
-                y = 1.0 if index == 1 else (-1.0 if index == 3 else 0.0)
                 set_feature(pairs, 0, x, y, 0.0 if flat_a else 1.0)
                 set_feature(pairs, 3, corner[2], corner[3], 0.0)
     return result

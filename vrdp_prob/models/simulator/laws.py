@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from vrdp_prob.models.effects.effect import BodyView, Effect
 from vrdp_prob.models.parameters import Parameter, Scope
-from vrdp_prob.models.simulator.contact import ContactKind, Feature, contact, contact_geometry
+from vrdp_prob.models.simulator.contact import ContactKind, Feature, contact, contact_geometry, room_on_feature
 from vrdp_prob.models.simulator.formula import Recorder, Scalar, Symbol, assignments, vector_jacobian
 from vrdp_prob.models.simulator.mathematics import length, where
 from vrdp_prob.models.simulator.motion import (
@@ -112,6 +112,10 @@ def _external_source(effects: Sequence[Effect], layout: Layout) -> str:
     return _function("external", "t, y, phase, body, shared, out", lines)
 
 
+_CONTACT_ARGUMENTS = "ya, yb, body_a, body_b, feature, shared"
+_CONTACT_BARS = "bar, ya_bar, yb_bar, body_a_bar, body_b_bar, shared_bar"
+
+
 def _contact_source(kind: ContactKind, effects: Sequence[Effect], layout: Layout) -> str:
     inputs = _Inputs(layout)
     state_a, state_b = inputs.array("ya", len(STATE)), inputs.array("yb", len(STATE))
@@ -119,15 +123,22 @@ def _contact_source(kind: ContactKind, effects: Sequence[Effect], layout: Layout
     constants_b = inputs.array("body_b", len(layout.constants))
     feature = inputs.array("feature", 7)
     a, b = inputs.view(state_a, constants_a), inputs.view(state_b, constants_b)
-    geometry = contact_geometry(kind, a, b, Feature(*feature[:3]), Feature(*feature[3:6]))
+    of_a, of_b = Feature(*feature[:3]), Feature(*feature[3:6])
+    geometry = contact_geometry(kind, a, b, of_a, of_b)
     result = contact(effects, geometry, a, b, inputs.shared, pressing=feature[6])
+    velocities = [*result.a, *result.b]
+    room = room_on_feature(kind, a, b, of_a, of_b)
+    constraint = [*_gap_motion(geometry.gap, state_a, state_b), room]
     more = [result.closing_speed, result.normal_impulse, *geometry.point, *geometry.normal, geometry.gap]
-    arguments = "ya, yb, body_a, body_b, feature, shared"
     name = kind.name.lower()
-    value = _function(
-        f"contact_{name}", f"{arguments}, out", assignments(_targets("out", [*result.a, *result.b, *more]))
+    text = _function(
+        f"contact_{name}", f"{_CONTACT_ARGUMENTS}, out", assignments(_targets("out", [*velocities, *more]))
     )
-    bar_arguments = f"{arguments}, bar, ya_bar, yb_bar, body_a_bar, body_b_bar, shared_bar"
+    text += _function(
+        f"constraint_{name}",
+        f"{_CONTACT_ARGUMENTS}, out",
+        assignments(_targets("out", [*constraint, _rate(room, state_a, state_b)])),
+    )
     sizes = {
         "ya_bar": state_a,
         "yb_bar": state_b,
@@ -135,17 +146,31 @@ def _contact_source(kind: ContactKind, effects: Sequence[Effect], layout: Layout
         "body_b_bar": constants_b,
         "shared_bar": list(inputs.shared.values()),
     }
-    text = value
-    for part, outputs in (("contact", [*result.a, *result.b]), ("gap", [geometry.gap])):
+    for part, outputs in (("contact", velocities), ("gap", [geometry.gap]), ("constraint", constraint)):
         wanted = [symbol for symbols in sizes.values() for symbol in symbols]
         adjoints = iter(vector_jacobian(outputs, inputs.array("bar", len(outputs)), wanted))
         targets = {target: next(adjoints) for array, symbols in sizes.items() for target in _targets(array, symbols)}
-        text += _function(f"{part}_{name}_vjp", bar_arguments, assignments(targets, add=True))
+        lines = assignments(targets, add=True)
+        text += _function(f"{part}_{name}_vjp", f"{_CONTACT_ARGUMENTS}, {_CONTACT_BARS}", lines)
     return text
 
 
+def _gap_motion(gap: Symbol, state_a: Sequence[Symbol], state_b: Sequence[Symbol]) -> list[Symbol]:
+    """Gradient of a gap by the positions of both bodies, and its second time derivative at constant velocities."""
+    gradient = vector_jacobian([gap], [gap.recorder.constant(1.0)], [*state_a[:3], *state_b[:3]])
+    return [*gradient, _rate(_rate(gap, state_a, state_b), state_a, state_b)]
+
+
+def _rate(length: Symbol, state_a: Sequence[Symbol], state_b: Sequence[Symbol]) -> Symbol:
+    """Time derivative, at constant velocities, of what depends on the states of two bodies."""
+    gradient = vector_jacobian([length], [length.recorder.constant(1.0)], [*state_a[:3], *state_b[:3]])
+    velocities = [*state_a[3:6], *state_b[3:6]]
+    products = [slope * velocity for slope, velocity in zip(gradient, velocities, strict=True)]
+    return sum(products[1:], products[0])
+
+
 def _choice_source(part: str, suffix: str, arguments: str) -> str:
-    arguments = f"ya, yb, body_a, body_b, feature, shared, {arguments}"
+    arguments = f"{_CONTACT_ARGUMENTS}, {arguments}"
     lines = [
         f"if kind == {int(ContactKind.LINE_POINT)}:",
         f"    {part}_{ContactKind.LINE_POINT.name.lower()}{suffix}({arguments})",
@@ -157,13 +182,12 @@ def _choice_source(part: str, suffix: str, arguments: str) -> str:
 
 def law_source(effects: Sequence[Effect], layout: Layout) -> str:
     """Source of all compiled laws of a model (see `laws_kernel.py`)."""
-    bars = "bar, ya_bar, yb_bar, body_a_bar, body_b_bar, shared_bar"
     parts = [
         _motion_source(effects, layout),
         _external_source(effects, layout),
         *(_contact_source(kind, effects, layout) for kind in ContactKind),
         _choice_source("contact", "", "out"),
-        _choice_source("contact", "_vjp", bars),
-        _choice_source("gap", "_vjp", bars),
+        _choice_source("constraint", "", "out"),
+        *(_choice_source(part, "_vjp", _CONTACT_BARS) for part in ("contact", "gap", "constraint")),
     ]
     return "".join(parts)

@@ -11,13 +11,22 @@ from typing import Any
 from numba import njit
 
 compiled = njit(nogil=True, error_model="numpy")
-"""How kernels are compiled: without the interpreter's lock; a division by zero gives inf or NaN, as in numpy."""
+"""How kernels are compiled: without the interpreter's lock; a division by zero gives inf or NaN, as in numpy.
+
+The assembled module compiles without counting references too, which doubles the speed of short functions; so they
+must not make arrays, nor return them. Numbers that choose a variant of a function are floats: of integers and truth
+values that are written down in a call, numba compiles a variant each.
+"""
+allocating = compiled
+"""How the few functions are compiled that make arrays."""
 STATE_SIZE = 6
 """Numbers in a body's state."""
 GROUP_SIZE = 1
 """Bodies that move together: 1, or all of them where an effect couples their motion."""
 SLIPS = False
 """Whether spheres may slip, so that their state has a rolling velocity."""
+RUBS = False
+"""Whether contacts have friction, so that bodies which press do not move together but hop."""
 
 
 def motion(t: Any, y: Any, phase: Any, body: Any, shared: Any, out: Any) -> None:
@@ -72,3 +81,29 @@ def gap_law_vjp(
     shared_bar: Any,
 ) -> None:
     """Derivative of the gap."""
+
+
+def constraint_law(kind: Any, ya: Any, yb: Any, body_a: Any, body_b: Any, feature: Any, shared: Any, out: Any) -> None:
+    """Write what keeps a gap: nine numbers.
+
+    The gradient of the gap by (x, y, angle) of both, its second time derivative without accelerations, the way that is
+    left until the contact passes to another feature, and the rate of that.
+    """
+
+
+def constraint_law_vjp(
+    kind: Any,
+    ya: Any,
+    yb: Any,
+    body_a: Any,
+    body_b: Any,
+    feature: Any,
+    shared: Any,
+    bar: Any,
+    ya_bar: Any,
+    yb_bar: Any,
+    body_a_bar: Any,
+    body_b_bar: Any,
+    shared_bar: Any,
+) -> None:
+    """Derivative of all numbers of `constraint_law` but the last."""

@@ -6,6 +6,24 @@
 
 import math
 
+from vrdp_prob.models.simulator.cluster_kernel import (
+    HOLD,
+    LEANS,
+    MATCHES,
+    PARTED,
+    PRESSES,
+    TOUCH_A,
+    TOUCH_B,
+    TOUCH_FEATURE,
+    TOUCH_KIND,
+    cluster_of,
+    cluster_of_touch,
+    join,
+    presses,
+    set_touch_count,
+    split,
+    touch_count,
+)
 from vrdp_prob.models.simulator.detection_kernel import (
     CONTACT_TIME,
     CRAWL,
@@ -16,9 +34,19 @@ from vrdp_prob.models.simulator.detection_kernel import (
     PAIR_KIND,
     SLACK,
 )
-from vrdp_prob.models.simulator.laws_kernel import GROUP_SIZE, SLIPS, STATE_SIZE, compiled, contact_law
-from vrdp_prob.models.simulator.motion_kernel import advance, settle
+from vrdp_prob.models.simulator.laws_kernel import GROUP_SIZE, RUBS, SLIPS, STATE_SIZE, compiled, contact_law
+from vrdp_prob.models.simulator.motion_kernel import LINGERING, cluster_derivatives, settle, take_states
+from vrdp_prob.models.simulator.pressing_kernel import (
+    ROOM_COUNTS,
+    choose_contacts,
+    forget_touch,
+    gentle_speed,
+    set_push,
+    start,
+    start_spin,
+)
 from vrdp_prob.models.simulator.search_kernel import depth, search_group, search_pair
+from vrdp_prob.models.simulator.step_kernel import advance
 from vrdp_prob.models.simulator.tape_kernel import (
     CLOSING_SPEED,
     CONTACT,
@@ -26,6 +54,8 @@ from vrdp_prob.models.simulator.tape_kernel import (
     CONTINUE,
     EVENTS,
     FEATURE,
+    HOLDS,
+    PART,
     RELEASE,
     RESULT,
     ROW,
@@ -34,9 +64,11 @@ from vrdp_prob.models.simulator.tape_kernel import (
     STATE_A,
     STATE_B,
     STOP,
-    add_piece,
+    add_pair,
+    add_pieces,
     add_row,
     clear_tape,
+    complete_pieces,
     finish,
     skip_frames,
     write_frames,
@@ -48,13 +80,19 @@ from vrdp_prob.models.simulator.world_kernel import (
     ENDING_BODY,
     FIXED,
     MOVING,
+    PARTS,
     PRESENT,
     RELEASE_TIME,
     RESTING,
+    SLIDES_OFF,
+    SPARE,
     SPIN_SENSE,
+    SPIN_STOPS,
     STEP,
     STOPS,
+    TOUCHES_PER_BODY,
     UNTIL,
+    YIELDS,
     clear_world,
     evaluate,
     evaluate_at,
@@ -63,6 +101,8 @@ from vrdp_prob.models.simulator.world_kernel import (
 )
 
 OK, OVERLAP, EVENT_LIMIT, NOT_SOLVED, NOT_FINITE, TAPE_FULL = 0, 1, 2, 3, 4, 5
+ROWS_PER_BODY = 1 + TOUCHES_PER_BODY
+"""Rows that an event may add for each body of the world: its next piece and its lasting contacts."""
 ROWS_PER_EVENT = 16
 """Rows of the tape after which a world counts as having too many events, per event that is allowed."""
 
@@ -86,11 +126,46 @@ def leave_piece(world, tape, group, t):
 
 
 @compiled
-def begin_piece(world, tape, group, t, horizon):
-    """Start a piece of a group from its constant term; returns an outcome."""
-    solved = advance(world, group, t, horizon)
-    add_piece(tape, world, group)
+def leave_pieces(world, tape, cluster, t):
+    """Finish the current pieces of a cluster."""
+    for place in range(world.members[cluster, 0]):
+        leave_piece(world, tape, world.members[cluster, 1 + place], t)
+
+
+@compiled
+def begin_pieces(world, tape, cluster, t, horizon):
+    """Start pieces of a cluster from their constant terms; returns an outcome."""
+    add_pieces(tape, world, cluster)
+    solved = advance(world, cluster, t, horizon)
+    complete_pieces(tape, world, cluster)
     return OK if solved else NOT_SOLVED
+
+
+@compiled
+def forget(world, pairs, cluster, hold, t):
+    """Remove the lasting contacts of a cluster that hold as little as `hold`, with the time until which they lasted."""
+    for touch in range(touch_count(world) - 1, -1, -1):
+        holds = world.touching[touch, HOLD]
+        if holds <= hold and holds != LEANS and cluster_of_touch(world, touch) == cluster:
+            a, b = int(world.touching[touch, TOUCH_A]), int(world.touching[touch, TOUCH_B])
+            pairs.table[min(a, b), max(a, b), LAST_CONTACT] = t
+            forget_touch(world, touch)
+
+
+@compiled
+def begin_clusters(world, pairs, tape, cluster, t, horizon):
+    """Start the pieces of all clusters that a former one falls into; all move on before any looks for contacts."""
+    split(world, cluster)
+    labels = world.members[world.clock.shape[0] + 1]
+    outcome = OK
+    for group in range(world.clock.shape[0]):
+        if labels[1 + group] == group:
+            outcome = max(outcome, begin_pieces(world, tape, group, t, horizon))
+            forget(world, pairs, group, MATCHES, t)
+    for group in range(world.clock.shape[0]):
+        if labels[1 + group] >= 0:
+            search_group(world, pairs, group, t, horizon)
+    return outcome
 
 
 @compiled
@@ -113,7 +188,7 @@ def release(world, pairs, tape, body, horizon):
     t = world.start[body, RELEASE_TIME]
     group = body // GROUP_SIZE
     slot = body - group * GROUP_SIZE
-    add_row(tape, RELEASE, body, -1, t)
+    add_row(tape, RELEASE, body, t)
     if tape.place[group, ROW] >= 0:
         leave_piece(world, tape, group, t)
     y = world.polynomial[group, 0, slot]
@@ -125,38 +200,82 @@ def release(world, pairs, tape, body, horizon):
     hold(world, group, t)
     world.clock[group, STEP] = math.inf
     outcome = overlaps(world, pairs, body, t)
-    result = begin_piece(world, tape, group, t, horizon)
+    result = begin_pieces(world, tape, world.members[group, 1], t, horizon)
     search_group(world, pairs, group, t, horizon)
     return max(outcome, result)
 
 
 @compiled
-def end_piece(world, pairs, tape, group, horizon):
-    """Go on where a piece of motion ends: with the next piece, with rolling or with rest."""
-    t, ending = world.clock[group, UNTIL], world.clock[group, ENDING]
-    body = int(world.clock[group, ENDING_BODY])
+def end_pieces(world, pairs, tape, cluster, horizon):
+    """Go on where the pieces of a cluster end: with the next, with rolling, with rest, or with other contacts."""
+    t, ending = world.clock[cluster, UNTIL], world.clock[cluster, ENDING]
+    what = int(world.clock[cluster, ENDING_BODY])
     if ending == CONTINUES:
-        add_row(tape, CONTINUE, group * GROUP_SIZE, -1, t)
-        leave_piece(world, tape, group, t)
-    else:
-        add_row(tape, STOP if ending == STOPS else SPIN_STOP, body, -1, t)
+        add_row(tape, CONTINUE, cluster * GROUP_SIZE, t)
+        leave_pieces(world, tape, cluster, t)
+        return begin_clusters(world, pairs, tape, cluster, t, horizon)
+    if ending in (STOPS, SPIN_STOPS):
+        add_row(tape, STOP if ending == STOPS else SPIN_STOP, what, t)
         tape.counts[EVENTS] += 1
-        leave_piece(world, tape, group, t)
-        y = world.polynomial[group, 0, body - group * GROUP_SIZE]
-        if ending != STOPS:
-            y[5] = 0.0
-        elif SLIPS and world.phase[body, MOVING] == 2.0:
-            y[6], y[7] = y[3], y[4]
-        else:
-            y[3], y[4] = 0.0, 0.0
-        settle(world, body, t, y)
-    result = begin_piece(world, tape, group, t, horizon)
-    search_group(world, pairs, group, t, horizon)
-    return result
+        leave_pieces(world, tape, cluster, t)
+        stop(world, cluster, what, t, ending == STOPS)
+    else:
+        change_contacts(world, pairs, tape, cluster, t, ending, what)
+    return restart(world, pairs, tape, cluster, t, horizon)
 
 
 @compiled
-def resume(world, tape, body, t, result):
+def stop(world, cluster, body, t, moves):
+    """Let a body stop to move, or only to spin; what moves with it as slowly stops too."""
+    group = body // GROUP_SIZE
+    y = world.polynomial[group, 0, body - group * GROUP_SIZE]
+    if not moves:
+        y[5] = 0.0
+    elif SLIPS and world.phase[body, MOVING] == 2.0:
+        y[6], y[7] = y[3], y[4]
+    else:
+        y[3], y[4] = 0.0, 0.0
+        for place in range(world.members[cluster, 0] if world.members[cluster, 0] > 1 else 0):
+            for slot in range(GROUP_SIZE):
+                other = world.polynomial[world.members[cluster, 1 + place], 0, slot]
+                if math.hypot(other[3], other[4]) <= 2.0 * LINGERING:
+                    other[3], other[4] = 0.0, 0.0
+    settle(world, body, t, y)
+
+
+@compiled
+def pressing_place(world, cluster, touch):
+    """Place of a lasting contact among those of its cluster, in the order of the tape."""
+    place = 0
+    for other in range(touch):
+        if world.touching[other, HOLD] == PRESSES and cluster_of_touch(world, other) == cluster:
+            place += 1
+    return place
+
+
+@compiled
+def change_contacts(world, pairs, tape, cluster, t, ending, what):
+    """A contact parts or slides off its feature, or a body at rest is pushed to move or to spin."""
+    row = add_row(tape, PART, cluster * GROUP_SIZE, t)
+    tape.integers[row, HOLDS] = -1
+    if ending == SLIDES_OFF:
+        tape.integers[row, HOLDS] = pressing_place(world, cluster, what)
+    leave_pieces(world, tape, cluster, t)
+    if ending in (PARTS, SLIDES_OFF):
+        world.touching[what, HOLD] = PARTED
+        forget(world, pairs, cluster, PARTED, t)
+        return
+    take_states(world, cluster, 0.0)
+    cluster_derivatives(world, cluster, t, world.stages[SPARE])
+    set_push(world, what, t)
+    if ending == YIELDS:
+        start(world, what)
+    else:
+        start_spin(world, what)
+
+
+@compiled
+def resume(world, body, t, result):
     """Give a body the velocities after a contact."""
     group = body // GROUP_SIZE
     y = world.polynomial[group, 0, body - group * GROUP_SIZE]
@@ -166,20 +285,34 @@ def resume(world, tape, body, t, result):
 
 
 @compiled
-def restart(world, pairs, tape, a, b, t, horizon):
-    """Start new pieces for the bodies of a contact; both move on before either looks for contacts."""
-    group_a, group_b = a // GROUP_SIZE, b // GROUP_SIZE
-    both = not world.kind[b, FIXED] and group_b != group_a
-    outcome = OK
-    if not world.kind[a, FIXED]:
-        outcome = begin_piece(world, tape, group_a, t, horizon)
-    if both:
-        outcome = max(outcome, begin_piece(world, tape, group_b, t, horizon))
-    if not world.kind[a, FIXED]:
-        search_group(world, pairs, group_a, t, horizon)
-    if both:
-        search_group(world, pairs, group_b, t, horizon)
-    return outcome
+def restart(world, pairs, tape, cluster, t, horizon):
+    """Start new pieces for the bodies of a cluster, with the contacts that last."""
+    if presses(world, cluster):
+        choose_contacts(world, cluster, t)
+        for touch in range(touch_count(world)):
+            if world.touching[touch, HOLD] == MATCHES and cluster_of_touch(world, touch) == cluster:
+                a, b = int(world.touching[touch, TOUCH_A]), int(world.touching[touch, TOUCH_B])
+                pairs.table[min(a, b), max(a, b), LAST_CONTACT] = t
+        forget(world, pairs, cluster, PARTED, t)
+    if world.members[cluster, 0] > 1:
+        # Other forces act now: how long the last step was says nothing.
+        for place in range(world.members[cluster, 0]):
+            world.clock[world.members[cluster, 1 + place], STEP] = math.inf
+    return begin_clusters(world, pairs, tape, cluster, t, horizon)
+
+
+@compiled
+def hold_contact(world, a, b, kind, feature):
+    """Add a lasting contact to the list; whether to stay, the next pieces decide."""
+    touch = touch_count(world)
+    if touch == world.touching.shape[0]:
+        return
+    row = world.touching[touch]
+    row[TOUCH_A], row[TOUCH_B], row[TOUCH_KIND] = a, b, kind
+    for c in range(6):
+        row[TOUCH_FEATURE + c] = feature[c]
+    row[ROOM_COUNTS] = 1.0
+    set_touch_count(world, touch + 1)
 
 
 @compiled
@@ -196,23 +329,30 @@ def collide(world, pairs, tape, i, j, horizon):
     if not result[6] > 0.0:
         search_pair(world, pairs, i, j, t + CRAWL, horizon)
         return OK
+    if feature[6] != 0.0 and not RUBS and result[6] > gentle_speed(world, a, b):
+        feature[6] = 0.0
+        contact_law(kind, ya, yb, world.body[a], world.body[b], feature, world.shared, result)
     pairs.table[i, j, LAST_CONTACT] = t
-    row = add_row(tape, CONTACT, a, b, t)
+    row = add_pair(tape, CONTACT, a, b, t)
     tape.counts[EVENTS] += 1
     tape.integers[row, CONTACT_KIND] = kind
     for c in range(7):
         tape.numbers[row, FEATURE + c] = feature[c]
     for c in range(7):
         tape.numbers[row, CLOSING_SPEED + c] = result[6 + c]
+    cluster = cluster_of(world, a if world.kind[b, FIXED] else b)
+    if not world.kind[a, FIXED] and cluster_of(world, a) != cluster:
+        leave_pieces(world, tape, cluster_of(world, a), t)
+    leave_pieces(world, tape, cluster, t)
+    if not world.kind[a, FIXED] and not world.kind[b, FIXED]:
+        cluster = join(world, a // GROUP_SIZE, b // GROUP_SIZE)
+    if feature[6] != 0.0 and not RUBS:
+        hold_contact(world, a, b, kind, feature)
     if not world.kind[a, FIXED]:
-        leave_piece(world, tape, a // GROUP_SIZE, t)
-    if not world.kind[b, FIXED] and b // GROUP_SIZE != a // GROUP_SIZE:
-        leave_piece(world, tape, b // GROUP_SIZE, t)
-    if not world.kind[a, FIXED]:
-        resume(world, tape, a, t, result[0:3])
+        resume(world, a, t, result[0:3])
     if not world.kind[b, FIXED]:
-        resume(world, tape, b, t, result[3:6])
-    return restart(world, pairs, tape, a, b, t, horizon)
+        resume(world, b, t, result[3:6])
+    return restart(world, pairs, tape, cluster, t, horizon)
 
 
 @compiled
@@ -254,20 +394,20 @@ def rollout_world(world, pairs, tape, event_limit):
     while True:
         time, kind, first, second = next_event(world, pairs)
         if not time <= horizon or (kind == 1 and time >= horizon):
-            finish(tape, world, horizon, False)
+            finish(tape, world, horizon, 0.0)
             return outcome
         rows = tape.counts[ROWS]
-        if rows + 8 > tape.integers.shape[0]:
+        if rows + 8 + ROWS_PER_BODY * world.kind.shape[0] > tape.integers.shape[0]:
             return TAPE_FULL
         result = EVENT_LIMIT
         if tape.counts[EVENTS] < event_limit and rows < ROWS_PER_EVENT * (event_limit + 1):
             if kind == 0:
                 result = release(world, pairs, tape, first, horizon)
             elif kind == 1:
-                result = end_piece(world, pairs, tape, first, horizon)
+                result = end_pieces(world, pairs, tape, first, horizon)
             else:
                 result = collide(world, pairs, tape, first, second, horizon)
         outcome = max(outcome, result)
         if result in (EVENT_LIMIT, NOT_SOLVED):
-            finish(tape, world, time, True)
+            finish(tape, world, time, 1.0)
             return outcome

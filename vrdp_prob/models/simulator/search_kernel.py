@@ -6,14 +6,15 @@
 
 import math
 
-import numpy as np
-
+from vrdp_prob.models.simulator.cluster_kernel import TOUCH_A, TOUCH_B, TOUCH_FEATURE, touch_count
 from vrdp_prob.models.simulator.detection_kernel import (
     ANGLE_FIRST,
+    BOUNDS,
     CONTACT_TIME,
     CRAWL,
     CURVATURE,
     GAP,
+    KNOWN,
     LAST_CONTACT,
     LOOK,
     LOOK_FEATURE,
@@ -21,6 +22,7 @@ from vrdp_prob.models.simulator.detection_kernel import (
     OWNER,
     PAIR_FEATURE,
     PAIR_KIND,
+    POWERS,
     PRESSING,
     RATE,
     SLACK,
@@ -36,6 +38,7 @@ from vrdp_prob.models.simulator.detection_kernel import (
     walk,
 )
 from vrdp_prob.models.simulator.laws_kernel import GROUP_SIZE, compiled
+from vrdp_prob.models.simulator.pressing_kernel import touches
 from vrdp_prob.models.simulator.world_kernel import (
     ALIVE,
     DISC,
@@ -51,7 +54,7 @@ from vrdp_prob.models.simulator.world_kernel import (
 )
 
 PRESSING_TIME = 0.02
-"""Time in s after a contact within which the same two bodies count as pressing on each other when they meet again."""
+"""Time in s after a contact within which two bodies press on each other when they meet again and close slowly."""
 CLEARING = 1e-3
 """Shortest time in s between two looks at bodies that overlap."""
 
@@ -91,13 +94,16 @@ def set_path(world, pairs, i, j, t, duration):
     for row in range(4):
         for power in range(8):
             pairs.local[row, power] = 0.0
-    for c in range(2):
-        add_path(world, j, t, duration, 1.0, c, pairs.local[c])
-        add_path(world, i, t, duration, -1.0, c, pairs.local[c])
-    if world.kind[i, SHAPE] != DISC:
-        add_path(world, i, t, duration, 1.0, 2, pairs.local[ANGLE_FIRST])
-    if world.kind[j, SHAPE] != DISC:
-        add_path(world, j, t, duration, 1.0, 2, pairs.local[ANGLE_FIRST + 1])
+    work = pairs.local[POWERS]
+    for c in range(3):
+        if c < 2:
+            add_path(world, j, t, duration, 1.0, c, work, pairs.local[c])
+            add_path(world, i, t, duration, -1.0, c, work, pairs.local[c])
+        else:
+            if world.kind[i, SHAPE] != DISC:
+                add_path(world, i, t, duration, 1.0, c, work, pairs.local[ANGLE_FIRST])
+            if world.kind[j, SHAPE] != DISC:
+                add_path(world, j, t, duration, 1.0, c, work, pairs.local[ANGLE_FIRST + 1])
 
 
 @compiled
@@ -121,9 +127,9 @@ def look(world, pairs, i, j, s, curvature):
     if shape_i == DISC and shape_j == DISC:
         return disc_disc(pairs, s, half_i + half_j, curvature[0])
     if shape_i == DISC:
-        return 2 + box_disc(pairs, s, half_j, shape_j == WALL, half_i, True, curvature[1])
+        return 2 + box_disc(pairs, s, half_j, shape_j == WALL, half_i, -1.0, curvature[1])
     if shape_j == DISC:
-        return box_disc(pairs, s, half_i, shape_i == WALL, half_j, False, curvature[0])
+        return box_disc(pairs, s, half_i, shape_i == WALL, half_j, 1.0, curvature[0])
     return box_box(pairs, s, half_i, half_j, shape_i == WALL, shape_j == WALL, curvature)
 
 
@@ -157,7 +163,7 @@ def search(world, pairs, i, j, t, end):
     if passing_distance(pairs.local) > reach:
         pairs.table[i, j, OVERLAPPING] = 0.0
         return
-    curvature = np.zeros(2)
+    curvature = pairs.local[BOUNDS]
     set_curvature(world, pairs, i, j, curvature)
     turning = outer_radius(world, i) * bound(pairs.local[ANGLE_FIRST], 1)
     turning += outer_radius(world, j) * bound(pairs.local[ANGLE_FIRST + 1], 1)
@@ -188,9 +194,26 @@ def search(world, pairs, i, j, t, end):
 def depth(world, pairs, i, j, t):
     """Gap of two bodies at one time."""
     set_path(world, pairs, i, j, t, 1.0)
-    curvature = np.zeros(2)
+    curvature = pairs.local[BOUNDS]
     look(world, pairs, i, j, 0.0, curvature)
     return pairs.local[LOOK, GAP]
+
+
+@compiled
+def note_touches(world, pairs, i, j):
+    """Note the corners of two squares that press already, so that no look sees them."""
+    known = 0
+    for touch in range(touch_count(world)):
+        row = world.touching[touch]
+        a, b = int(row[TOUCH_A]), int(row[TOUCH_B])
+        if known < 2 and ((a == i and b == j) or (a == j and b == i)):
+            out = pairs.local[KNOWN + known]
+            out[0], out[1] = 1.0, 1.0 if a == j else 0.0
+            out[2], out[3] = row[TOUCH_FEATURE], row[TOUCH_FEATURE + 1]
+            out[4], out[5] = row[TOUCH_FEATURE + 3], row[TOUCH_FEATURE + 4]
+            known += 1
+    for place in range(known, 2):
+        pairs.local[KNOWN + place, 0] = 0.0
 
 
 @compiled
@@ -203,6 +226,10 @@ def search_pair(world, pairs, body, other, t, horizon):
         return
     if first[MOVING] == RESTING and second[MOVING] == RESTING and first[SPIN_SENSE] == 0.0 == second[SPIN_SENSE]:
         return
+    # A disc has no second place that could touch; of a square the other corners are looked at.
+    if touches(world, i, j) and (world.kind[i, SHAPE] == DISC or world.kind[j, SHAPE] == DISC):
+        return
+    note_touches(world, pairs, i, j)
     end = min(world.clock[i // GROUP_SIZE, UNTIL], world.clock[j // GROUP_SIZE, UNTIL], horizon)
     search(world, pairs, i, j, t, end)
 

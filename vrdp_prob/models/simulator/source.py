@@ -18,12 +18,28 @@ from platformdirs import user_cache_dir
 from vrdp_prob.files import write_atomically
 from vrdp_prob.models.effects.effect import Effect
 from vrdp_prob.models.simulator import tableau
+from vrdp_prob.models.simulator.contact import rubs
 from vrdp_prob.models.simulator.laws import STATE, Layout, law_source
 
 CACHE_VARIABLE = "VRDP_PROB_CACHE"
 """Environment variable that names another folder for compiled kernels."""
 
-_KERNELS = ("world", "motion", "detection", "search", "tape", "rollout", "adjoint", "adjoint_events", "batch")
+_KERNELS = (
+    "world",
+    "cluster",
+    "motion",
+    "pressing",
+    "step",
+    "detection",
+    "search",
+    "tape",
+    "rollout",
+    "adjoint",
+    "adjoint_events",
+    "batch",
+)
+_LIGHT = "no_cpython_wrapper=True, no_cfunc_wrapper=True"
+"""Options of functions that only compiled code calls; numba needs less time for them."""
 _HEADER = '"""Assembled by vrdp_prob.models.simulator.source; do not edit."""\n\n'
 
 
@@ -38,8 +54,9 @@ def assemble(effects: Sequence[Effect], layout: Layout) -> str:
     parts = [
         _HEADER,
         "import math\nfrom typing import NamedTuple\n\nimport numpy as np\nfrom numba import njit\n\n",
-        'compiled = njit(nogil=True, error_model="numpy")\n',
-        f"STATE_SIZE, GROUP_SIZE, SLIPS = {len(STATE)}, 1, False\n",
+        f"compiled = njit(nogil=True, error_model='numpy', {_LIGHT}, _nrt=False)\n",
+        f"allocating = njit(nogil=True, error_model='numpy', {_LIGHT})\n",
+        f"STATE_SIZE, GROUP_SIZE, SLIPS, RUBS = {len(STATE)}, 1, False, {rubs(effects)}\n",
         *(
             f"{name} = np.array({getattr(tableau, name).tolist()!r})\n"
             for name in ("DENSE", "ERRORS", "NODES", "WEIGHTS")

@@ -8,6 +8,16 @@ from typing import NamedTuple
 
 import numpy as np
 
+from vrdp_prob.models.simulator.cluster_kernel import (
+    HOLD,
+    MATCHES,
+    TOUCH_A,
+    TOUCH_B,
+    TOUCH_FEATURE,
+    TOUCH_KIND,
+    cluster_of_touch,
+    touch_count,
+)
 from vrdp_prob.models.simulator.laws_kernel import GROUP_SIZE, STATE_SIZE, compiled
 from vrdp_prob.models.simulator.world_kernel import (
     ALIVE,
@@ -21,12 +31,16 @@ from vrdp_prob.models.simulator.world_kernel import (
 )
 
 # Kinds of rows.
-PIECE, CONTINUE, RELEASE, STOP, SPIN_STOP, CONTACT = 0, 1, 2, 3, 4, 5
-# Columns of integers. A piece is of a group; a row number of a piece says which piece an event ended.
+PIECE, CONTINUE, RELEASE, STOP, SPIN_STOP, CONTACT, PRESS, PART = 0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0
+# Columns of integers. A row number of a piece says which piece an event ended. A piece is of a group; the pieces of a
+# cluster stand together, its lasting contacts (PRESS) behind them, and know their first row and both numbers of rows.
+# Where contacts part (PART) the motion stays smooth, except where one slides off its feature, which is named.
 KIND, FIRST, SECOND, BEFORE_FIRST, BEFORE_SECOND, FRAME_BEGIN, FRAME_END = 0, 1, 2, 3, 4, 5, 6
-CONTACT_KIND = FRAME_BEGIN
+CONTACT_KIND, HOLDS = FRAME_BEGIN, FRAME_END
+BLOCK, BLOCK_PIECES, BLOCK_TOUCHES = SECOND, BEFORE_FIRST, BEFORE_SECOND
 INTEGERS = 7
-# Columns of numbers. A piece: origin, length, states, phases. An event: its time. A contact: features, then its result.
+# Columns of numbers. A piece: origin, length, states, phases. An event: its time. A contact: features, then its result
+# (or, where it slides off, the rate at which its room on the feature shrinks).
 TIME, FEATURE, CLOSING_SPEED = 0, 1, 8
 NUMBERS = max(2 + GROUP_SIZE * (STATE_SIZE + PHASE_SIZE), 16)
 # Columns of `place`: next frame of a body, row of the current piece of a group.
@@ -62,37 +76,67 @@ def clear_tape(tape, start):
 
 
 @compiled
-def add_row(tape, kind, first, second, time):
-    """Append a row and return its number; the caller keeps a reserve of rows."""
+def add_row(tape, kind, first, time):
+    """Append a row of one body (or of a group, for a piece) and return its number; the caller keeps a reserve."""
     row = tape.counts[ROWS]
     integers = tape.integers[row]
-    integers[KIND], integers[FIRST], integers[SECOND] = kind, first, second
+    integers[KIND], integers[FIRST], integers[SECOND] = int(kind), first, -1
     integers[FRAME_BEGIN], integers[FRAME_END] = 0, 0
     integers[BEFORE_FIRST], integers[BEFORE_SECOND] = -1, -1
     if kind != PIECE:
         integers[BEFORE_FIRST] = tape.place[first // GROUP_SIZE, ROW]
-        if second >= 0:
-            integers[BEFORE_SECOND] = tape.place[second // GROUP_SIZE, ROW]
     tape.numbers[row, TIME] = time
     tape.counts[ROWS] = row + 1
     return row
 
 
 @compiled
-def add_piece(tape, world, group):
-    """Append the current piece of a group."""
-    row = add_row(tape, PIECE, group, -1, world.clock[group, ORIGIN])
-    numbers = tape.numbers[row]
-    numbers[1] = world.clock[group, LENGTH]
-    at = 2
-    for slot in range(GROUP_SIZE):
-        for c in range(STATE_SIZE):
-            numbers[at + c] = world.polynomial[group, 0, slot, c]
-        at += STATE_SIZE
-        for c in range(PHASE_SIZE):
-            numbers[at + c] = world.phase[group * GROUP_SIZE + slot, c]
-        at += PHASE_SIZE
-    tape.place[group, ROW] = row
+def add_pair(tape, kind, first, second, time):
+    """Append a row of two bodies and return its number."""
+    row = add_row(tape, kind, first, time)
+    tape.integers[row, SECOND] = second
+    tape.integers[row, BEFORE_SECOND] = tape.place[second // GROUP_SIZE, ROW]
+    return row
+
+
+@compiled
+def add_pieces(tape, world, cluster):
+    """Append the next pieces of a cluster, with the states they begin with, and its lasting contacts."""
+    block, size = tape.counts[ROWS], world.members[cluster, 0]
+    for place in range(size):
+        group = world.members[cluster, 1 + place]
+        row = add_row(tape, PIECE, group, 0.0)
+        tape.integers[row, BLOCK] = block
+        numbers = tape.numbers[row]
+        for slot in range(GROUP_SIZE):
+            at = 2 + slot * (STATE_SIZE + PHASE_SIZE)
+            for c in range(STATE_SIZE):
+                numbers[at + c] = world.polynomial[group, 0, slot, c]
+        tape.place[group, ROW] = block + place
+    touches = 0
+    for touch in range(touch_count(world)):
+        row = world.touching[touch]
+        if row[HOLD] >= MATCHES and cluster_of_touch(world, touch) == cluster:
+            index = add_pair(tape, PRESS, int(row[TOUCH_A]), int(row[TOUCH_B]), 0.0)
+            tape.integers[index, CONTACT_KIND], tape.integers[index, HOLDS] = int(row[TOUCH_KIND]), int(row[HOLD])
+            for c in range(7):
+                tape.numbers[index, FEATURE + c] = row[TOUCH_FEATURE + c]
+            touches += 1
+    for index in range(block, block + size):
+        tape.integers[index, BLOCK_PIECES], tape.integers[index, BLOCK_TOUCHES] = size, touches
+
+
+@compiled
+def complete_pieces(tape, world, cluster):
+    """Add to the last pieces of a cluster what is known when their step was done."""
+    for place in range(world.members[cluster, 0]):
+        group = world.members[cluster, 1 + place]
+        numbers = tape.numbers[tape.place[group, ROW]]
+        numbers[TIME], numbers[1] = world.clock[group, ORIGIN], world.clock[group, LENGTH]
+        for slot in range(GROUP_SIZE):
+            at = 2 + slot * (STATE_SIZE + PHASE_SIZE) + STATE_SIZE
+            for c in range(PHASE_SIZE):
+                numbers[at + c] = world.phase[group * GROUP_SIZE + slot, c]
 
 
 @compiled
@@ -126,8 +170,8 @@ def finish(tape, world, now, broken):
     """Write the frames that are left; where the simulation broke off, bodies are shown where they were then."""
     for group in range(world.clock.shape[0]):
         if tape.place[group, ROW] >= 0:
-            write_frames(tape, world, group, now if broken else math.inf)
-    if broken:
+            write_frames(tape, world, group, now if broken != 0.0 else math.inf)
+    if broken != 0.0:
         for body in range(tape.place.shape[0]):
             if world.phase[body, ALIVE] != 0.0:
                 for frame in range(tape.place[body, FRAME], tape.times.shape[0]):

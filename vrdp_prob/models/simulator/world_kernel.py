@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vrdp_prob.models.simulator.laws_kernel import GROUP_SIZE, STATE_SIZE, compiled
+from vrdp_prob.models.simulator.laws_kernel import GROUP_SIZE, STATE_SIZE, allocating, compiled
 from vrdp_prob.models.simulator.tableau import DENSE
 
 DISC, SQUARE, WALL = 0, 1, 2
@@ -23,13 +23,21 @@ MOVING, REFERENCE_X, REFERENCE_Y, SPIN_SENSE, ALIVE, TRAVEL = 0, 1, 2, 3, 4, 5
 PHASE_SIZE = 6
 RESTING, SLIDING, SLIPPING = 0.0, 1.0, 2.0
 ORIGIN, LENGTH, UNTIL, STEP, ENDING, ENDING_BODY = 0, 1, 2, 3, 4, 5
-CONTINUES, STOPS, SPIN_STOPS, LASTS = 0.0, 1.0, 2.0, 3.0
+STAGES = DENSE.shape[1]
+# Rows of `stages` behind those of a step: the state at hand, a derivative apart from the step, what pushes a body.
+WORK, SPARE, PUSH = STAGES, STAGES + 1, STAGES + 2
+# How a piece ends: its step is over, or a body stops (to spin), or never; in a cluster also by a contact that parts or
+# passes to another feature, or by a resting body that is pushed to move or to spin.
+CONTINUES, STOPS, SPIN_STOPS, LASTS, PARTS, SLIDES_OFF, YIELDS, TURNS = 0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0
+TOUCHES_PER_BODY = 4
+"""Lasting contacts per body that a world has room for; two bodies in a plane share at most two, and few touch each."""
 
 
 class World(NamedTuple):
     """What is simulated, and the current piece of motion of every group of bodies.
 
     A piece is a polynomial of the share of its length. A group holds one body, or all where an effect couples them.
+    Groups that press on each other form a cluster, whose pieces begin and end together (see `cluster_kernel.py`).
     """
 
     kind: np.ndarray  # [body, (shape, fixed, present)]
@@ -39,15 +47,19 @@ class World(NamedTuple):
     phase: np.ndarray  # [body, (moving, reference x, reference y, spin sense, alive, bound on the way)]
     clock: np.ndarray  # [group, (origin, length, end of validity, next step, how it ends, for which body)], s
     polynomial: np.ndarray  # [group, power, slot, state]
-    stages: np.ndarray  # [stage and one for work, slot, state]
+    stages: np.ndarray  # [stage and three for work, body, state]
+    members: np.ndarray  # [group, (size of its cluster, groups in it)], two more rows of room
+    touching: np.ndarray  # [lasting contact, (bodies, kind, features, how it holds, force, constraint)]
+    matrix: np.ndarray  # [lasting contact, lasting contact and one], room for the equations of a cluster
 
 
-@compiled
+@allocating
 def new_world(kind, body, shared, start):
     """World with room for its motion, nothing released."""
     count = kind.shape[0]
     groups = count // GROUP_SIZE
-    return World(
+    most = TOUCHES_PER_BODY * count
+    world = World(
         kind,
         body,
         shared,
@@ -55,8 +67,17 @@ def new_world(kind, body, shared, start):
         np.zeros((count, PHASE_SIZE)),
         np.zeros((groups, 6)),
         np.zeros((groups, DENSE.shape[0], GROUP_SIZE, STATE_SIZE)),
-        np.zeros((DENSE.shape[1] + 1, GROUP_SIZE, STATE_SIZE)),
+        np.zeros((PUSH + 1, count, STATE_SIZE)),
+        np.zeros((groups + 2, groups + 1), np.int64),
+        np.zeros((most, 21)),
+        np.zeros((most, most + 1)),
     )
+    # What cannot move is always at hand.
+    for fixed in range(count):
+        if kind[fixed, FIXED]:
+            for c in range(STATE_SIZE):
+                world.stages[WORK, fixed, c] = start[fixed, c]
+    return world
 
 
 @compiled
@@ -100,7 +121,9 @@ def clear_world(world):
     for body in range(world.phase.shape[0]):
         for c in range(PHASE_SIZE):
             world.phase[body, c] = 0.0
+    world.members[world.clock.shape[0], 0] = 0
     for group in range(world.clock.shape[0]):
+        world.members[group, 0], world.members[group, 1] = 1, group
         hold(world, group, 0.0)
         for slot in range(GROUP_SIZE):
             for c in range(STATE_SIZE):

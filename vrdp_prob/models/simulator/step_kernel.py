@@ -1,0 +1,128 @@
+"""Compiled steps: the next piece of motion of a cluster of bodies."""
+
+# numba infers types, and compiled functions take their arrays one by one and by position.
+# mypy: disable-error-code="no-untyped-def"
+
+from vrdp_prob.models.simulator.cluster_kernel import presses
+from vrdp_prob.models.simulator.laws_kernel import GROUP_SIZE, compiled
+from vrdp_prob.models.simulator.motion_kernel import (
+    LINGERING,
+    PARTS_OF_STEP,
+    compute_stages,
+    find_ending,
+    first_step,
+    match_velocities,
+    really_stops,
+    set_polynomial,
+    set_references,
+    step_error,
+)
+from vrdp_prob.models.simulator.pressing_kernel import find_parting
+from vrdp_prob.models.simulator.world_kernel import (
+    CONTINUES,
+    ENDING,
+    LENGTH,
+    MOVING,
+    ORIGIN,
+    REFERENCE_X,
+    REFERENCE_Y,
+    RESTING,
+    SPIN_SENSE,
+    STEP,
+    UNTIL,
+    hold,
+)
+
+SMALLEST_STEP = 1e-12
+"""Step in s below which the motion counts as not solvable."""
+APPROACH = 0.5
+"""Longest step of bodies that press, in units of the time in which friction alone would stop one of them."""
+
+
+@compiled
+def is_still(world, cluster):
+    """Whether no body of a cluster moves or spins."""
+    for place in range(world.members[cluster, 0]):
+        group = world.members[cluster, 1 + place]
+        for body in range(group * GROUP_SIZE, (group + 1) * GROUP_SIZE):
+            if world.phase[body, MOVING] != RESTING or world.phase[body, SPIN_SENSE] != 0.0:
+                return False
+    return True
+
+
+@compiled
+def hold_cluster(world, cluster, t):
+    """Let a cluster stay in the states of the constant terms."""
+    for place in range(world.members[cluster, 0]):
+        hold(world, world.members[cluster, 1 + place], t)
+
+
+@compiled
+def begin_step(world, cluster, t, horizon):
+    """First stage of a step; returns a length to try."""
+    h = max(horizon - t, SMALLEST_STEP)
+    match_velocities(world, cluster)
+    for place in range(world.members[cluster, 0]):
+        set_references(world, world.members[cluster, 1 + place])
+    compute_stages(world, cluster, t, 0.0, PARTS_OF_STEP[0], PARTS_OF_STEP[1])
+    for place in range(world.members[cluster, 0]):
+        group = world.members[cluster, 1 + place]
+        h = first_step(world, group, min(h, world.clock[group, STEP]), reach_of_step(world, cluster, group))
+    return h
+
+
+@compiled
+def reach_of_step(world, cluster, group):
+    """Length of a step in units of the time in which friction stops a body.
+
+    A little more than 1, so that a body alone stops within it. Where bodies press, how their directions change becomes
+    singular at the stop; the error of a straight motion does not show that, but its derivative needs shorter steps.
+    """
+    first = world.phase[group * GROUP_SIZE]
+    slow = first[REFERENCE_X] ** 2 + first[REFERENCE_Y] ** 2 < (4.0 * LINGERING) ** 2
+    return 1.25 if world.members[cluster, 0] == 1 or slow else APPROACH
+
+
+@compiled
+def try_step(world, cluster, t, h):
+    """Error of a step; where it is small enough, its polynomials and the share of it that is valid are set."""
+    error = 0.0
+    compute_stages(world, cluster, t, h, PARTS_OF_STEP[1], PARTS_OF_STEP[2])
+    for place in range(world.members[cluster, 0]):
+        error = max(error, step_error(world, world.members[cluster, 1 + place], h))
+    if error > 1.0:
+        return error, 1.0
+    compute_stages(world, cluster, t, h, PARTS_OF_STEP[2], PARTS_OF_STEP[3])
+    share = 1.0
+    world.clock[cluster, ENDING] = CONTINUES
+    for place in range(world.members[cluster, 0]):
+        group = world.members[cluster, 1 + place]
+        set_polynomial(world, group, h)
+        share = find_ending(world, cluster, group, share)
+    return error, share
+
+
+@compiled
+def advance(world, cluster, t, horizon):
+    """Compute the next piece of motion of a cluster from the states in the constant terms; False where that fails."""
+    if is_still(world, cluster):
+        hold_cluster(world, cluster, t)
+        return True
+    h = begin_step(world, cluster, t, horizon)
+    while h >= SMALLEST_STEP:
+        error, share = try_step(world, cluster, t, h)
+        if error > 1.0:
+            h *= max(0.1, 0.9 * error ** (-0.125))
+        elif not really_stops(world, cluster, share):
+            h *= 0.5 * max(share, 0.1)
+        else:
+            if presses(world, cluster):
+                share = find_parting(world, cluster, t, h, share)
+            for place in range(world.members[cluster, 0]):
+                clock = world.clock[world.members[cluster, 1 + place]]
+                clock[ORIGIN], clock[LENGTH], clock[UNTIL] = t, h, t + share * h
+                clock[STEP] = h * min(5.0, 0.9 * max(error, 1e-9) ** (-0.125))
+                clock[ENDING] = world.clock[cluster, ENDING]
+            return True
+    hold_cluster(world, cluster, t)
+    return False

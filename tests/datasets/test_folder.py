@@ -88,6 +88,8 @@ def test_write_then_read_gives_the_same(tmp_path: Path) -> None:
         ("objects.csv", "a,1,sphere,0.2", "a,1,sphere,-0.2", "row 2: object 1: radius is -0.2"),
         ("objects.csv", "a,2,cube,0.2,,\n", "", "object 2 of video a has tracks but no row"),
         ("objects.csv", "a,2,cube", "a,1,cube", "row 3: object 1 of video a is there twice"),
+        ("objects.csv", "b,1,", "c,1,sphere,,,\nb,1,", "object 1 of video c has no row in tracks.csv"),
+        ("objects.csv", "b,1,", "b,7,sphere,,,\nb,1,", "object 7 of video b has no row in tracks.csv"),
     ],
 )
 def test_a_mistake_is_one_sentence_with_its_place(folder: Path, name: str, old: str, new: str, message: str) -> None:
@@ -103,6 +105,12 @@ def test_a_mistake_is_one_sentence_with_its_place(folder: Path, name: str, old: 
 def test_wall_mistakes_name_their_row(folder: Path) -> None:
     (folder / "walls.csv").write_text("video,x1,y1,x2,y2,restitution\n*,0,0,0,0,\n")
     with pytest.raises(InputError, match=r"row 2: wall .* are the same"):
+        read_folder(folder)
+
+
+def test_a_wall_of_an_unknown_video(folder: Path) -> None:
+    (folder / "walls.csv").write_text("video,x1,y1,x2,y2,restitution\n*,0,-1,5,-1,\nc,0,-1,5,-1,\n")
+    with pytest.raises(InputError, match=r"walls\.csv, row 3: tracks\.csv has no video 'c'; the videos are a, b"):
         read_folder(folder)
 
 
@@ -131,6 +139,19 @@ def test_a_video_needs_a_camera(tmp_path: Path) -> None:
     (tmp_path / "camera.json").write_text('{"projection": [[1, 2], [3, 4]], "width": 4, "height": 3}')
     with pytest.raises(InputError, match=r"camera\.json: 'projection' is \(2, 2\)"):
         load(video)
+
+
+def test_a_tracks_folder_uses_no_camera_but_its_own(folder: Path) -> None:
+    inner = folder / "inner"
+    inner.mkdir()
+    for name in ("tracks.csv", "objects.csv"):
+        (folder / name).rename(inner / name)
+    Camera.clevrer().write(folder / "camera.json")
+    for path in (inner, inner / "tracks.csv"):
+        assert load(path, video="a").camera is None
+    assert load(inner, video="a", camera=folder / "camera.json").camera is not None
+    (folder / "camera.json").rename(inner / "camera.json")
+    assert load(inner / "tracks.csv", video="a").camera is not None
 
 
 @pytest.mark.parametrize(

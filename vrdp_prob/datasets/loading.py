@@ -35,7 +35,7 @@ def load(
         Which video of a folder of several.
     camera
         A camera, the path of a camera file, or `"clevrer"` for the camera of that data set. By default `camera.json`
-        beside the file or in its parent folder. Only a video needs one.
+        beside the file or in its parent folder (of a tracks folder: in it). Only a video needs one.
     progress
         Who follows the work on a video file.
 
@@ -88,16 +88,19 @@ def video_files(path: Path | str) -> dict[str, Path]:
 
 
 def find_camera(path: Path, camera: CameraChoice = None) -> Camera | None:
-    """The camera for an input: the one asked for, else `camera.json` in or beside it, or in the parent folder."""
+    """The camera for an input: the one asked for, else `camera.json` in or beside it, or in the parent folder.
+
+    The parent folder's is for videos and annotations; a tracks folder, which needs none, has its own or none.
+    """
     if isinstance(camera, Camera):
         return camera
     if camera is not None:
         return Camera.clevrer() if str(camera) == CLEVRER else Camera.read(Path(camera))
     folder = path if path.is_dir() else path.parent
-    for candidate in (folder / CAMERA_FILE, folder.resolve().parent / CAMERA_FILE):
-        if candidate.is_file():
-            return Camera.read(candidate)
-    return None
+    candidates = [folder / CAMERA_FILE]
+    if not _is_tracks_folder(path):
+        candidates.append(folder.resolve().parent / CAMERA_FILE)
+    return next((Camera.read(candidate) for candidate in candidates if candidate.is_file()), None)
 
 
 def _existing(path: Path | str) -> Path:

@@ -347,6 +347,13 @@ def test_objects_are_looked_up_before_inference(
     assert message in line.replace("two objects", "2 objects")
 
 
+def test_positions_are_no_videos_to_calibrate_with(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    line = refused(capsys, "calibrate-camera", folder, "--positions", folder, "--out", folder / "camera.json")
+    assert "a tracks folder or an annotation is no video" in line
+    assert "no such file" in refused(capsys, "calibrate-camera", folder / "none.mp4", "--positions", folder)
+    assert not (folder / "camera.json").exists()
+
+
 def test_an_output_folder_that_cannot_be_written(
     folder: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -47,7 +47,8 @@ Quiet = Annotated[bool, typer.Option("--quiet", help="No progress bars, no closi
 CameraOption = Annotated[
     str | None,
     typer.Option(
-        metavar="FILE|clevrer", help="Camera file; by default camera.json beside the video or in its parent folder."
+        metavar="FILE|clevrer",
+        help="Camera file; by default camera.json beside the video or in its parent folder, or in the tracks folder.",
     ),
 ]
 Video = Annotated[str | None, typer.Option(metavar="ID", help="Which video of a folder of several.")]
@@ -155,7 +156,8 @@ def calibrate_camera(
     from vrdp_prob.perception import calibrate_from_videos  # noqa: PLC0415 - OpenCV is loaded only for videos
 
     progress = progress_display(quiet=quiet)
-    files = {name: file for path in videos for name, file in video_files(path).items()}
+    check_writable(out.parent)
+    files = {name: file for path in videos for name, file in _videos_at(path).items()}
     known = {tracks.video: tracks for tracks in load_all(positions)}
     unknown = sorted(set(files) - set(known))
     if unknown:
@@ -248,6 +250,16 @@ def _questions_of(path: Path, names: list[str]) -> dict[str, list[Question]]:
         except InputError as error:
             raise InputError(f"{path}, {name}, {error}") from error
     return asked
+
+
+def _videos_at(path: Path) -> dict[str, Path]:
+    video_names(path)  # refuses a path at which there is nothing
+    files = video_files(path)
+    if not files:
+        raise InputError(
+            f"{path}: a tracks folder or an annotation is no video; name the videos, and give this with --positions."
+        )
+    return files
 
 
 def _tell(written: Report) -> None:

@@ -63,7 +63,13 @@ def read_folder(
     if not measurements:
         raise InputError(f"{folder / 'tracks.csv'}: there are 0 objects; give tracks of at least one.")
     bodies = _read_bodies(folder / "objects.csv")
-    walls = _read_walls(folder / "walls.csv")
+    for video, object_id in bodies:
+        if object_id not in measurements.get(video, {}):
+            raise InputError(
+                f"{folder / 'objects.csv'}: object {object_id} of video {video} has no row in tracks.csv; "
+                "correct its name or take its row out."
+            )
+    walls = _read_walls(folder / "walls.csv", list(measurements))
     if camera is None and (folder / "camera.json").is_file():
         camera = Camera.read(folder / "camera.json")
     names = list(measurements) if videos is None else list(videos)
@@ -153,7 +159,7 @@ def _shape(row: Row) -> Shape:
         raise InputError(f"{row.place}: shape '{name}' is not known; use sphere, cube or cylinder.") from error
 
 
-def _read_walls(path: Path) -> dict[str, tuple[Wall, ...]]:
+def _read_walls(path: Path, videos: Sequence[str]) -> dict[str, tuple[Wall, ...]]:
     walls: dict[str, tuple[Wall, ...]] = defaultdict(tuple)
     if path.is_file():
         for row in read_rows(path, WALL_COLUMNS):
@@ -162,7 +168,13 @@ def _read_walls(path: Path) -> dict[str, tuple[Wall, ...]]:
                 wall = Wall(x1, y1, x2, y2, row.optional_number("restitution"))
             except InputError as error:
                 raise InputError(f"{row.place}: {error}") from error
-            walls[row.text("video")] += (wall,)
+            video = row.text("video")
+            if video not in (ALL_VIDEOS, *videos):
+                raise InputError(
+                    f"{row.place}: tracks.csv has no video '{video}'; the videos are {some(videos)}, and "
+                    f"{ALL_VIDEOS} means all."
+                )
+            walls[video] += (wall,)
     return walls
 
 

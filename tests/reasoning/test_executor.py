@@ -163,7 +163,7 @@ def test_documents_fit_the_schema() -> None:
         ("Where is the cube?", (), "is not understood at 'where' (word 1)"),
         ("What will happen next?", (), "needs choices to judge; give at least one (--choice TEXT)."),
         ("How many collisions happen?", ("the red cube",), "is answered without choices; leave them out."),
-        ("What will happen next?", ("The sphere hits the cube",), "is not understood at 'hits' (word 3)"),
+        ("What will happen next?", ("The sphere kicks the cube",), "is not understood at 'kicks' (word 3)"),
         ("What will happen next?", ("The pink cube and the sphere collide",), "at 'pink' (word 2)"),
         (
             "What will happen next?",

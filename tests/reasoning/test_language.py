@@ -61,6 +61,20 @@ B = "objects metal filter_material cube filter_shape unique"
             f"events events {A} filter_out unique filter_ancestor belong_to",
         ),
         ("What will happen next?", "unseen_events belong_to"),
+        ("What happens next?", "unseen_events belong_to"),
+        ("What would have happened without the red object?", f"all_events {A} get_counterfact belong_to"),
+        ("What would not have happened without the red object?", f"all_events {A} get_counterfact belong_to negate"),
+        ("What happens if the red object is removed?", f"all_events {A} get_counterfact belong_to"),
+        ("What if the metal cube were 5 times heavier?", f"all_events {B} counterfact_heavier belong_to"),
+        (
+            "How many cubes hit the red object?",
+            f"events {A} filter_collision objects cube filter_shape filter_collision count",
+        ),
+        ("Does the red object hit the metal cube?", f"events {A} filter_collision {B} filter_collision exist"),
+        (
+            "Will the red object hit the metal cube?",
+            f"all_events {A} filter_collision {B} filter_collision unique unseen_events belong_to",
+        ),
         ("Which event will not happen next?", "unseen_events belong_to negate"),
         ("What will happen without the red object?", f"all_events {A} get_counterfact belong_to"),
         ("What if the red object were removed?", f"all_events {A} get_counterfact belong_to"),
@@ -90,6 +104,7 @@ def test_questions(question: str, program: str) -> None:
         ("the red object's entrance", QuestionType.EXPLANATORY, f"events {A} filter_in unique"),
         ("the red object's colliding with the metal cube", QuestionType.EXPLANATORY, "events"),
         ("The red object and the metal cube collide", QuestionType.PREDICTIVE, "all_events"),
+        ("The red object hits the metal cube", QuestionType.PREDICTIVE, "all_events"),
         ("The red object collides with the metal cube.", QuestionType.COUNTERFACTUAL, "all_events"),
     ],
 )

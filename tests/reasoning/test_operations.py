@@ -70,6 +70,7 @@ def chosen(facts: TableFacts, program: str) -> set[str]:
         ("objects start get_frame filter_stationary", {"0", "2", "3"}),
         (f"objects events {CYLINDER} filter_in unique get_frame filter_moving", {"0", "3"}),
         ("objects end get_frame filter_moving", {"1"}),
+        ("objects end query_frame filter_moving", {"1"}),
         ("objects end get_frame filter_stationary", {"0", "2"}),
         ("objects end get_frame filter_resting", {"0", "2"}),
         ("objects null filter_moving", {"0", "1", "3"}),
@@ -140,7 +141,10 @@ def test_a_pair_collides_once_and_times_decide_the_order() -> None:
     facts = video((collision(90, "0", "1"), collision(30, "0", "1"), collision(60, "0", "2")))
     assert answer(facts, "events objects filter_collision count") == 2
     assert (
-        answer(facts, f"events {RED_CUBE} filter_collision first filter_order {RED_CUBE} get_col_partner query_shape")
+        answer(
+            facts,
+            f"events {RED_CUBE} filter_collision first filter_order {RED_CUBE} query_collision_partner query_shape",
+        )
         == "sphere"
     )
 

@@ -9,7 +9,7 @@ Tokens = tuple[str, ...]
 
 ENTER = ("enters", "enter", "entering", "entered")
 EXIT = ("exits", "exit", "exiting", "exited", "leaves", "leave", "leaving", "left")
-COLLIDE = ("collides with", "collide with", "colliding with", "collided with")
+COLLIDE = ("collides with", "collide with", "colliding with", "collided with", "hits", "hit", "hitting")
 SCENE = ("the scene", "the video", "the picture", "the view")
 
 

@@ -107,7 +107,7 @@ def _existing(reader: Reader) -> Tokens:
         raise NoReadingError
     if reader.accept("that are", "that is"):
         return (*_stated_state(reader, phrase), "exist")
-    if reader.accept("that") or reader.next in ("entering", "exiting", "leaving", "colliding"):
+    if reader.accept("that") or reader.next in ("entering", "exiting", "leaving", "colliding", "hitting"):
         return (*_acting(reader, phrase), "exist")
     return (*reader.first(lambda: _stated_state(reader, phrase), lambda: _of_state(reader, phrase)), "exist")
 
@@ -223,7 +223,7 @@ def _responsible(reader: Reader) -> Tokens:
 
 
 def _next(reader: Reader) -> Tokens:
-    """'What will happen next?'."""
+    """'What will happen next?', 'What happens next?'."""
     reader.expect(*WHICH)
     negated = _happening(reader)
     reader.expect("next", "after the video ends", "after the video")
@@ -253,10 +253,12 @@ def _what_if(reader: Reader) -> Tokens:
 
 
 def _happening(reader: Reader) -> bool:
-    """'will not happen', in any form; whether it is negated."""
+    """'will not happen', 'happens', 'would have happened'; whether it is negated."""
+    if reader.accept("happens", "happen"):
+        return False
     reader.expect("will", "would", "could")
     negated = reader.accept("not")
-    reader.expect("happen")
+    reader.expect("happen", "have happened")
     return negated
 
 
@@ -269,7 +271,7 @@ def _change(reader: Reader) -> Tokens:
     reader.expect("is", "are", "was", "were", "had been")
     if reader.accept("removed", "taken away", "gone", "not there", "absent"):
         return (*changed, "get_counterfact")
-    reader.accept("five times", "much", "times")
+    reader.accept("five times", "5 times", "much", "times")
     return (*changed, reader.one_of({"heavier": "counterfact_heavier", "lighter": "counterfact_lighter"}))
 
 
@@ -279,9 +281,9 @@ def _yes_no_prediction(reader: Reader) -> Tokens:
     first = the_object(reader)
     if reader.accept("and"):
         second = the_object(reader)
-        reader.expect("collide")
+        reader.expect("collide", "have collided")
     else:
-        reader.expect("collide with")
+        reader.expect("collide with", "hit", "have collided with", "have hit")
         second = the_object(reader)
     meeting = collision(first, second, "all_events")
     if reader.place < len(reader.words) and not reader.accept("next", "after the video ends", "after the video"):

@@ -97,6 +97,24 @@ def test_a_small_share_of_the_draws_is_shown(content):
     assert "of the draws)" not in Outline(render(content)).text
 
 
+def test_limits_name_the_objects(content):
+    text = Outline(render(replace(content, warnings=("Objects 0, 4 never collide in view.",)))).text
+    assert "The cyan cube and the yellow sphere never collide in view." in text
+
+
+def test_legend_speaks_of_defaults_only_where_there_are_some(content, page):
+    assert "hollow dots" in page
+    objects = tuple(
+        replace(
+            learned,
+            mass=replace(learned.mass, status="identified"),
+            restitution=replace(learned.restitution, status="identified"),
+        )
+        for learned in content.objects
+    )
+    assert "hollow dots" not in render(replace(content, objects=objects))
+
+
 def test_an_uncertain_attribute_is_shown(content, page):
     said = "purple cube (material 55 % rubber, 45 % metal)"
     assert said in Outline(render(with_unsure_material(content))).text

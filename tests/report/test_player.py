@@ -151,6 +151,30 @@ def test_collisions_are_listed_and_lead_to_their_time(opened):
     assert opened.run(f"{part('label')}.textContent").startswith("2.4")
 
 
+def test_collisions_stand_over_a_time_axis(opened):
+    listed = "[...document.querySelectorAll('.pairs .mark')]"
+    marks = opened.run(f"{listed}.map((mark) => [mark.textContent, mark.style.left])")
+    assert [text for text, _ in marks] == ["0 s", "1 s", "2 s", "3 s", "4 s", "5 s"]
+    assert marks[0][1] == "0%"
+
+
+def test_the_removed_object_has_no_measured_positions(opened):
+    set_value(opened, "world", "removed:1", "change")
+    opened.wait(f"{part('canvas')}.ariaLabel.startsWith('Without')")
+    set_value(opened, "time", 0, "input")
+    count = opened.run(
+        "(() => {"
+        "  const drawn = CanvasRenderingContext2D.prototype.stroke; let strokes = 0;"
+        "  CanvasRenderingContext2D.prototype.stroke = function () { strokes += 1; return drawn.call(this); };"
+        "  const box = document.querySelector('[data-part=measured]'); const counts = [];"
+        "  for (let i = 0; i < 2; i++) { strokes = 0; box.click(); counts.push(strokes); }"
+        "  CanvasRenderingContext2D.prototype.stroke = drawn;"
+        "  return Math.abs(counts[0] - counts[1]);"
+        "})()"
+    )
+    assert count == 2  # of the two objects that are there at the start, one is removed: one cross of two strokes
+
+
 def test_question_bars_are_there_and_ordered(opened):
     entropies = opened.run("[...document.querySelectorAll('.question')].map((item) => +item.dataset.entropy)")
     assert entropies == sorted(entropies, reverse=True)

@@ -16,6 +16,7 @@ from vrdp_prob.report.wording import (
     percent_error,
     restitution_status,
     tags,
+    with_names,
 )
 from vrdp_prob.scene import Body, Shape
 
@@ -98,6 +99,16 @@ def test_lists_and_counts():
         "one object",
         "14 objects",
     ]
+
+
+def test_sentences_name_objects():
+    bodies = (body("3", "cyan"), body("4", "red"), body("13", "blue"), body("left puck"))
+    assert with_names("Objects 3, 4 never collide.", bodies) == "The cyan sphere and the red sphere never collide."
+    assert with_names("Object 13 stops at 3 s.", bodies) == "The blue sphere stops at 3 s."
+    assert (
+        with_names("as if objects 4 and left puck met", bodies) == "as if the red sphere and the sphere “left puck” met"
+    )
+    assert with_names("The objects 5 and 134 are others.", bodies) == "The objects 5 and 134 are others."
 
 
 def test_status_in_words():

@@ -36,6 +36,7 @@ from vrdp_prob.report.wording import (
     sentence,
     tags,
     uncertain_attributes,
+    with_names,
     world_label,
 )
 
@@ -97,7 +98,7 @@ def _opening(content: ReportContent) -> dict[str, Any]:
         "css": _asset("page.css"),
         "video": content.tracks.video,
         "summary": " ".join(summary(content)),
-        "limits": content.warnings,
+        "limits": [with_names(warning, content.tracks.bodies) for warning in content.warnings],
         "converged": content.convergence.converged,
         "objects": _objects(content),
         "still": still_figure(content),
@@ -217,7 +218,9 @@ def _estimates(content: ReportContent) -> dict[str, Any]:
     name = names(content.tracks.bodies)
     known = list(zip(content.tracks.bodies, content.objects, strict=True))
     pairs = content.restitution_pairs
+    parameters = [parameter for _, learned in known for parameter in (learned.mass, learned.restitution)]
     return {
+        "has_defaults": any(parameter.status == "default" for parameter in parameters),
         "mass_unit": "kg" if any(body.mass is not None for body, _ in known) else "relative to 1",
         "mass_axis": log_axis([learned.mass.summary for _, learned in known]),
         "masses": [

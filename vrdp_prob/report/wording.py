@@ -1,6 +1,7 @@
 """The report's words: names of objects and worlds, numbers rounded to what they mean, and sentences."""
 
 import math
+import re
 import string
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -45,6 +46,19 @@ def tags(bodies: Sequence[Body]) -> dict[str, str]:
     return {
         body.id: letters[index] if len(bodies) <= len(letters) else str(index + 1) for index, body in enumerate(bodies)
     }
+
+
+def with_names(text: str, bodies: Sequence[Body]) -> str:
+    """A sentence with 'object 3' or 'objects 3, 4' replaced by the names of these bodies."""
+    name = names(bodies)
+    one = "|".join(re.escape(identity) for identity in sorted(name, key=len, reverse=True))
+    many = re.compile(rf"\b([Oo])bjects? ((?:{one})(?:(?:, | and )(?:{one}))*)(?!\w)")
+
+    def named(found: re.Match[str]) -> str:
+        said = listed(f"the {name[identity]}" for identity in re.findall(rf"(?:{one})(?!\w)", found[2]))
+        return sentence(said) if found[1] == "O" else said
+
+    return many.sub(named, text)
 
 
 def uncertain_attributes(body: Body) -> str:

@@ -154,7 +154,8 @@ class Player {
     const list = this.part("pairs");
     list.style.setProperty("--seen", `${Math.min(100, this.share(this.data.seenUntil))}%`);
     const rows = this.world.pairs.map((pair) => this.pairRow(pair));
-    if (!rows.length) {
+    if (rows.length) rows.push(this.timeAxis());
+    else {
       const none = document.createElement("li");
       none.textContent = "No draw has a collision in this world.";
       rows.push(none);
@@ -172,6 +173,23 @@ class Player {
     button.addEventListener("click", () => { this.pause(); this.seek(pair.time); });
     const row = document.createElement("li");
     row.append(button);
+    return row;
+  }
+
+  /* Whole seconds under the strips; a screen reader hears the times from the rows. */
+  timeAxis() {
+    const marks = span("marks", "");
+    const { start, end } = this.world;
+    const step = [1, 2, 5, 10, 20, 50, 100].find((seconds) => (end - start) / seconds <= 6) || (end - start) / 4 || 1;
+    for (let time = Math.ceil(start / step - 1e-6) * step; time <= end + 1e-6; time += step) {
+      const mark = span("mark", `${Math.round(time)} s`);
+      mark.style.left = `${this.share(time)}%`;
+      marks.append(mark);
+    }
+    const row = document.createElement("li");
+    row.className = "scale";
+    row.setAttribute("aria-hidden", "true");
+    row.append(span("", ""), marks);
     return row;
   }
 

@@ -57,7 +57,7 @@ class Scene {
     if (paths) this.drawPaths(context, world);
     const centres = this.drawBodies(context, world, time, frame);
     this.drawFlashes(context, world, time);
-    if (measured) this.drawMeasured(context, time);
+    if (measured) this.drawMeasured(context, world, time);
     this.drawTags(context, centres);
   }
 
@@ -159,14 +159,15 @@ class Scene {
     context.globalAlpha = 1;
   }
 
-  drawMeasured(context, time) {
+  /* Where each body was seen; not that of a body which this world goes without. */
+  drawMeasured(context, world, time) {
     const { times, positions } = this.data.tracks;
     const tolerance = 0.75 / this.data.frameRate;
     let frame = 0;
     times.forEach((other, index) => { if (Math.abs(other - time) < Math.abs(times[frame] - time)) frame = index; });
     if (Math.abs(times[frame] - time) > tolerance) return;
     positions.forEach((column, body) => {
-      if (!column[frame]) return;
+      if (!column[frame] || (world.kind === "removed" && this.data.bodies[body].id === world.body)) return;
       const [u, v] = this.view.point(...column[frame], this.data.bodies[body].radius);
       for (const [color, width] of [[this.colors.paper, 4], [this.colors.ink, 1.5]]) {
         context.strokeStyle = color;

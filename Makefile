@@ -12,8 +12,10 @@ help:
 	@echo "make demo       the main job on the example that ships: a video in, a report out"
 	@echo "make test       the fast tests"
 	@echo "make test-slow  the statistical and large tests"
-	@echo "make lint       format, lint and types"
+	@echo "make lint       format and lint"
+	@echo "make types      types"
 	@echo "make bench      every benchmark, tables to the terminal and JSON to $(OUT)/"
+	@echo "make clean      remove the environment and caches; $(OUT)/ stays"
 
 setup: $(SETUP)
 
@@ -47,4 +49,4 @@ bench: $(SETUP)
 	done
 
 clean:
-	rm -rf $(VENV) $(OUT) .pytest_cache .mypy_cache .ruff_cache build dist
+	rm -rf $(VENV) .pytest_cache .mypy_cache .ruff_cache build dist

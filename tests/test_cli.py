@@ -11,7 +11,7 @@ import jsonschema
 import numpy as np
 import pytest
 
-from vrdp_prob import cli
+from vrdp_prob import __version__, cli
 from vrdp_prob.progress import Advance
 from vrdp_prob.reasoning import Answer, AskablePosterior, ChoiceAnswer
 from vrdp_prob.reasoning.answer import monte_carlo_error
@@ -237,6 +237,7 @@ def test_unusable_objects(folder: Path, capsys: pytest.CaptureFixture[str], old:
 def test_too_few_rows(folder: Path, capsys: pytest.CaptureFixture[str], rows: int, message: str) -> None:
     lines = two_discs().splitlines()[:rows]
     (folder / "tracks.csv").write_text("\n".join(lines) + "\n")
+    (folder / "objects.csv").write_text("".join(OBJECTS.splitlines(keepends=True)[:rows]))
     assert message in refused(capsys, "report", folder)
 
 
@@ -388,6 +389,18 @@ def test_a_report_that_cannot_be_written_leaves_the_old_one(
     assert {path.name: path.read_text() for path in out.iterdir()} == dict.fromkeys(
         ("posterior.nc", "report.html", "report.json"), "old"
     )
+
+
+def test_the_version(capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.run(["--version"]) == 0
+    assert capsys.readouterr().out == f"vrdp-prob {__version__}\n"
+
+
+def test_no_command_prints_the_help(capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.run([]) == 0
+    captured = capsys.readouterr()
+    assert "calibrate-camera" in captured.out
+    assert captured.err == ""
 
 
 class Interrupting:

@@ -11,6 +11,7 @@ from typing import Annotated
 
 import typer
 
+from vrdp_prob import __version__
 from vrdp_prob.datasets import load, load_all, read_questions, video_files, video_names
 from vrdp_prob.errors import InputError
 from vrdp_prob.files import check_writable
@@ -32,15 +33,18 @@ INTERRUPTED = 130
 DEFAULT_SAMPLER = "emcee"
 
 app = typer.Typer(
-    help="Fit a rigid-body simulator to a video and answer questions about it with probabilities.",
-    no_args_is_help=True,
     add_completion=False,
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
 )
 
 Input = Annotated[Path, typer.Argument(metavar="INPUT", help="A video, a tracks folder, or a CLEVRER annotation file.")]
-Model = Annotated[Path | None, typer.Option(metavar="FILE.toml", help="Physics model; the base model by default.")]
+Model = Annotated[
+    Path | None,
+    typer.Option(
+        metavar="FILE.toml", help="Physics model; by default the base model with a friction of its own for every body."
+    ),
+]
 Sampler = Annotated[str, typer.Option(metavar="|".join(SAMPLERS), help="How the posterior is drawn.")]
 Seed = Annotated[int, typer.Option(min=0, help="Same seed, same numbers.")]
 Quiet = Annotated[bool, typer.Option("--quiet", help="No progress bars, no closing lines.")]
@@ -52,6 +56,24 @@ CameraOption = Annotated[
     ),
 ]
 Video = Annotated[str | None, typer.Option(metavar="ID", help="Which video of a folder of several.")]
+
+
+def _tell_version(asked: bool) -> bool:
+    if asked:
+        print(f"vrdp-prob {__version__}")
+        raise typer.Exit
+    return asked
+
+
+@app.callback()
+def options(
+    *,
+    version: Annotated[
+        bool, typer.Option("--version", help="Print the version.", callback=_tell_version, is_eager=True)
+    ] = False,
+) -> None:
+    """Fit a rigid-body simulator to a video and answer questions about it with probabilities."""
+    del version
 
 
 @app.command()
@@ -194,7 +216,7 @@ def run(arguments: list[str]) -> int:
     Parameters
     ----------
     arguments
-        The words after `vrdp-prob`.
+        The words after `vrdp-prob`; without any the help is printed.
 
     Returns
     -------
@@ -202,7 +224,7 @@ def run(arguments: list[str]) -> int:
         The exit code: 0 done, 2 unusable input, 1 interrupted.
     """
     try:
-        result = app(arguments, prog_name="vrdp-prob", standalone_mode=False)
+        result = app(arguments or ["--help"], prog_name="vrdp-prob", standalone_mode=False)
     except InputError as error:
         return _refuse(str(error))
     except (KeyboardInterrupt, typer.Abort):

@@ -1,11 +1,13 @@
 """Models as files."""
 
+import re
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from vrdp_prob.errors import InputError
+from vrdp_prob.inference import default_model
 from vrdp_prob.models.model_file import known_effects
 from vrdp_prob.models.parameters import SLIDING_FRICTION
 from vrdp_prob.models.physics import PhysicsModel
@@ -62,7 +64,13 @@ def test_the_example_of_the_documentation_is_a_model(tmp_path: Path) -> None:
     path = tmp_path / "model.toml"
     path.write_text(text.split("```toml\n")[1].split("```")[0], encoding="utf-8")
     model = PhysicsModel.read(path)
-    assert [effect.name for effect in model.effects] == [effect.name for effect in PhysicsModel.base().effects]
+    assert model.name == default_model().name
+    assert [effect.name for effect in model.effects] == [effect.name for effect in default_model().effects]
+
+
+def test_the_documentation_lists_every_effect() -> None:
+    text = (Path(__file__).parents[2] / "docs" / "effects.md").read_text(encoding="utf-8")
+    assert set(re.findall(r"^\| `(\w+)` \|", text, flags=re.MULTILINE)) == set(known_effects())
 
 
 def test_a_file_that_is_not_there(tmp_path: Path) -> None:

@@ -108,7 +108,8 @@ def test_a_note_tells_apart_why_draws_are_left_out() -> None:
     assert re.sub(r"\d+ %", "N %", answer.notes[0]) == (
         "The material of the red cube is uncertain (N % rubber). "
         "The material of the blue cube is uncertain (N % rubber). "
-        "In N % of the draws there is no rubber cube, in N % there are two; the answer is from the other N %."
+        "In N % of the draws there is no rubber cube, in N % there are two rubber cubes; "
+        "the answer is from the other N %."
     )
     assert [int(share) for share in shares] == pytest.approx([50, 5, 47.5, 2.5, 50], abs=2.1)
 

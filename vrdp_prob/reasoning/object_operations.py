@@ -120,6 +120,6 @@ def _refusal(run: Run, chosen: ObjectSet, count: Int[np.ndarray, "draw"]) -> str
 
 
 def _clauses(chosen: ObjectSet, count: Int[np.ndarray, "draw"]) -> list[tuple[Bool[np.ndarray, "draw"], str]]:
-    several = sorted(set(count[count > 1].tolist()))
-    none = (count == 0, f"there is no {noun_phrase(chosen.words)}")
-    return [none, *((count == number, f"there are {number_word(number)}") for number in several)]
+    phrase, several = noun_phrase(chosen.words), sorted(set(count[count > 1].tolist()))
+    none = (count == 0, f"there is no {phrase}")
+    return [none, *((count == number, f"there are {number_word(number)} {phrase}s") for number in several)]

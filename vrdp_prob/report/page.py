@@ -287,5 +287,6 @@ def _diagnostics(content: ReportContent) -> list[tuple[str, str, str]]:
     if changes is not None:
         rows.append(("Other order of collisions", percent(changes), "of the draws, against the most probable world"))
     if content.worlds:
-        rows.append(("Draws in the player", counted(content.worlds[0].draws, "draw"), "a sample of the posterior"))
+        meaning = "a sample of the posterior; worlds that no question asks about were simulated in these alone"
+        rows.append(("Draws in the player", counted(content.worlds[0].draws, "draw"), meaning))
     return rows

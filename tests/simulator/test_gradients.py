@@ -81,7 +81,8 @@ def relative_errors(worlds: Worlds, seed: int, model: PhysicsModel) -> np.ndarra
     # Not on a frame: a body that is shown at the moment of its release has a derivative from each side only.
     worlds = worlds.released_at(worlds.release_time + 0.013)
     weight = tensor(generator.normal(size=(len(worlds), len(FRAMES), len(worlds.shapes), 3)))
-    leaves = {name: getattr(worlds, name).clone().requires_grad_() for name in FIELDS}
+    fields = [name for name in FIELDS if getattr(worlds, name).numel()]
+    leaves = {name: getattr(worlds, name).clone().requires_grad_() for name in fields}
     parameters = {name: value.clone().requires_grad_() for name, value in worlds.parameters.items()}
     rollout = simulate(replace(worlds, **leaves, parameters=parameters), FRAMES, model)
     (rollout.trajectory * weight).sum().backward()
@@ -105,7 +106,7 @@ def relative_errors(worlds: Worlds, seed: int, model: PhysicsModel) -> np.ndarra
             moved = {name: (value + sign * step * directions[name]).detach() for name, value in everything.items()}
             shifted = replace(
                 worlds,
-                **{name: moved[name] for name in FIELDS},
+                **{name: moved[name] for name in fields},
                 parameters={name: moved[name] for name in parameters},
             )
             other = simulate(shifted, FRAMES, model)

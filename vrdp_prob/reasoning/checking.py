@@ -7,7 +7,7 @@ import numpy as np
 
 from vrdp_prob.reasoning import object_operations
 from vrdp_prob.reasoning.events import EventTable, EventUniverse
-from vrdp_prob.reasoning.executor import ChoiceInput, _prepare
+from vrdp_prob.reasoning.executor import ChoiceInput, prepare
 from vrdp_prob.reasoning.facts import Motion, TableFacts
 from vrdp_prob.reasoning.program import Program
 from vrdp_prob.reasoning.run import Run
@@ -45,7 +45,7 @@ def check_question(
         If the question is not understood, needs choices and has none, or names by color, material and shape an object
         that is not in the tracks or that two objects fit.
     """
-    asked = _prepare(question, choices)
+    asked = prepare(question, choices)
     if tracks is None:
         return
     programs = [program for _, program in asked.options] or ([] if asked.program is None else [asked.program])

@@ -39,7 +39,7 @@ def answer_question(
         If the question cannot be understood, names an object that is not there or that two objects fit, or needs
         choices and has none.
     """
-    asked = _prepare(question, choices)
+    asked = prepare(question, choices)
     return _open_answer(facts, asked) if not asked.options else _choice_answer(facts, asked)
 
 
@@ -51,7 +51,7 @@ class _Asked:
     options: tuple[tuple[Choice, Program], ...]
 
 
-def _prepare(question: str | Sequence[str] | Question, choices: Sequence[ChoiceInput]) -> _Asked:
+def prepare(question: str | Sequence[str] | Question, choices: Sequence[ChoiceInput]) -> _Asked:
     stated = _as_question(question)
     program = stated.program if stated.program is not None else parse_question(stated.text)
     kind = stated.question_type or question_type(program)

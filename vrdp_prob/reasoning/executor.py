@@ -44,14 +44,17 @@ def answer_question(
 
 
 @dataclass(frozen=True)
-class _Asked:
+class PreparedQuestion:
+    """A question and its choices as checked programs; an open question has a program, a choice question options."""
+
     question: Question
     kind: QuestionType
     program: Program | None
     options: tuple[tuple[Choice, Program], ...]
 
 
-def prepare(question: str | Sequence[str] | Question, choices: Sequence[ChoiceInput]) -> _Asked:
+def prepare(question: str | Sequence[str] | Question, choices: Sequence[ChoiceInput]) -> PreparedQuestion:
+    """Understand a question and its choices; raises `InputError` as `answer_question` does."""
     stated = _as_question(question)
     program = stated.program if stated.program is not None else parse_question(stated.text)
     kind = stated.question_type or question_type(program)
@@ -59,10 +62,10 @@ def prepare(question: str | Sequence[str] | Question, choices: Sequence[ChoiceIn
     if not needs_choices(program):
         if given:
             raise InputError(f"'{stated.text}' is answered without choices; leave them out.")
-        return _Asked(stated, kind, check(program), ())
+        return PreparedQuestion(stated, kind, check(program), ())
     if not given:
         raise InputError(f"'{stated.text}' needs choices to judge; give at least one (--choice TEXT).")
-    return _Asked(stated, kind, None, tuple(_option(choice, program, kind) for choice in given))
+    return PreparedQuestion(stated, kind, None, tuple(_option(choice, program, kind) for choice in given))
 
 
 def _option(choice: Choice, question_program: Sequence[str], kind: QuestionType) -> tuple[Choice, Program]:
@@ -93,7 +96,7 @@ def _as_choice(number: int, choice: ChoiceInput) -> Choice:
     return Choice(number, " ".join(program), program)
 
 
-def _open_answer(facts: Facts, asked: _Asked) -> Answer:
+def _open_answer(facts: Facts, asked: PreparedQuestion) -> Answer:
     if asked.program is None:
         raise TypeError("an open question has a program of its own")
     run = Run(facts)
@@ -118,7 +121,7 @@ def _open_answer(facts: Facts, asked: _Asked) -> Answer:
     )
 
 
-def _choice_answer(facts: Facts, asked: _Asked) -> Answer:
+def _choice_answer(facts: Facts, asked: PreparedQuestion) -> Answer:
     runs, judged = [], []
     for choice, program in asked.options:
         run = Run(facts)
@@ -172,7 +175,7 @@ def _codes(value: Value) -> tuple[Int[np.ndarray, "draw"], tuple[str, ...]]:
     raise TypeError(f"a question cannot end with {type(value).__name__}, one of {ANSWERS} is needed")
 
 
-def _ids(asked: _Asked, vector: Bool[np.ndarray, "choice"]) -> str:
+def _ids(asked: PreparedQuestion, vector: Bool[np.ndarray, "choice"]) -> str:
     return ",".join(str(choice.choice_id) for (choice, _), yes in zip(asked.options, vector, strict=True) if yes)
 
 

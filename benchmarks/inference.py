@@ -21,6 +21,7 @@ from vrdp_prob.inference import SAMPLERS, default_model
 from vrdp_prob.inference.events import first_contacts
 from vrdp_prob.inference.map_fit import MapFit, fit_map
 from vrdp_prob.inference.samples import assess
+from vrdp_prob.models.simulator.rollout import compile_model
 from vrdp_prob.scene import Tracks
 
 DATA = Path(__file__).parents[2] / "shared" / "data" / "clevrer_bullet"
@@ -41,7 +42,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     checks: list[Check] = []
     if DATA.is_dir():
         videos = {tracks.video: tracks for tracks in load_all(DATA)}
-        warm_up(next(iter(videos.values())))
+        compile_model(default_model())
         checks += fits([videos[name(scene)] for scene in numbers(options.fits)])
         checks += samplers([videos[name(scene)] for scene in numbers(options.scenes)], options.samplers.split(","))
     else:
@@ -67,11 +68,6 @@ def numbers(text: str) -> list[int]:
 
 def check(title: str, value: float | str | None, goal: float | str, *, met: bool) -> Check:
     return {"name": title, "value": value, "goal": goal, "ok": met}
-
-
-def warm_up(tracks: Tracks) -> None:
-    """Compile the simulator outside the measurement."""
-    fit_map(tracks.until(float(tracks.times[10])), default_model(), np.random.default_rng(0))
 
 
 def fits(videos: Sequence[Tracks]) -> list[Check]:

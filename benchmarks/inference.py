@@ -136,7 +136,7 @@ def samplers(videos: Sequence[Tracks], names: Sequence[str]) -> list[Check]:
 
 def _sampler_checks(results: dict[str, list[tuple[float, float]]]) -> list[Check]:
     checks, rates = [], {}
-    for key, values in results.items():
+    for key, values in ((key, values) for key, values in results.items() if values):
         seconds, rate = (float(np.median(column)) for column in zip(*values, strict=True))
         checks.append(check(f"{key}: processor seconds, median", seconds, GOALS[key], met=seconds <= GOALS[key]))
         if key != "laplace":

@@ -15,7 +15,7 @@ from vrdp_prob import __version__
 from vrdp_prob.datasets import load, load_all, read_questions, video_files, video_names
 from vrdp_prob.errors import InputError
 from vrdp_prob.files import check_writable
-from vrdp_prob.inference import SAMPLERS, default_model
+from vrdp_prob.inference import SAMPLERS, check_sampler, default_model
 from vrdp_prob.models.physics import PhysicsModel
 from vrdp_prob.models.simulator.rollout import compile_model
 from vrdp_prob.progress import progress_display
@@ -93,7 +93,7 @@ def report(
 ) -> None:
     """Write an uncertainty report: report.html, report.json and posterior.nc."""
     progress = progress_display(quiet=quiet)
-    _check_sampler(sampler)
+    check_sampler(sampler)
     check_writable(out)
     physics = _model(model)
     names = [name for name in video_names(path) if video in (None, name)]
@@ -134,7 +134,7 @@ def ask_question(
     if not question.strip():
         raise InputError('the question is empty; ask one, for example "What will happen next?" with --choice options.')
     asked = Question(question, choices=tuple(Choice(number, text) for number, text in enumerate(choice or ())))
-    _check_sampler(sampler)
+    check_sampler(sampler)
     physics = _model(model)
     check_question(asked)
     tracks = load(path, video=video, camera=camera, progress=progress)
@@ -251,11 +251,6 @@ def _refuse(message: str) -> int:
 
 def _model(path: Path | None) -> PhysicsModel | None:
     return None if path is None else PhysicsModel.read(path)
-
-
-def _check_sampler(name: str) -> None:
-    if name not in SAMPLERS:
-        raise InputError(f"sampler '{name}' is not known; use one of {', '.join(SAMPLERS)}.")
 
 
 def _questions_of(path: Path, names: list[str]) -> dict[str, list[Question]]:

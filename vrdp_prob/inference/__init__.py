@@ -1,7 +1,7 @@
 """How we learn: MAP, Laplace draws, emcee, NUTS, identifiability, the posterior."""
 
 from vrdp_prob.inference.identifiability import BodyStatus, ParameterStatus, Status
-from vrdp_prob.inference.infer import SAMPLERS, default_model, infer
+from vrdp_prob.inference.infer import SAMPLERS, check_sampler, default_model, infer
 from vrdp_prob.inference.posterior import Posterior
 from vrdp_prob.inference.samples import Convergence
 from vrdp_prob.inference.summaries import ObjectSummary, PairSummary, ParameterSummary, Summary
@@ -17,6 +17,7 @@ __all__ = [
     "Posterior",
     "Status",
     "Summary",
+    "check_sampler",
     "default_model",
     "infer",
 ]

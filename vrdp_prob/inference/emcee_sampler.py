@@ -19,7 +19,7 @@ from numpy.random import RandomState
 
 from vrdp_prob.inference.curved_gaussian import CurvedGaussian
 from vrdp_prob.inference.hamiltonian_move import HamiltonianMove
-from vrdp_prob.inference.laplace import DEGREES_OF_FREEDOM, adapted, smoothed_weights
+from vrdp_prob.inference.laplace import DEGREES_OF_FREEDOM, adapted, starting_places, tail_log_density
 from vrdp_prob.inference.samples import (
     ESS_GOAL,
     R_HAT_GOAL,
@@ -116,7 +116,7 @@ class _Ensemble:
         self, density: LogDensity, start: CurvedGaussian, walkers: int, generator: np.random.Generator
     ) -> None:
         self._density, self._gaussian = density, start
-        self.evaluations = self.gradients = 0
+        self.evaluations, self.gradients = START_POOL * walkers, 0
         moves = [
             (HamiltonianMove(self._with_gradient), 0.4),
             (emcee.moves.MHMove(_independent), 0.2),
@@ -127,7 +127,7 @@ class _Ensemble:
             walkers, start.dimension, self._log_probability, moves=moves, vectorize=True
         )
         state = RandomState(int(generator.integers(2**31))).get_state()
-        places = self._starting_places(walkers, generator)
+        places = starting_places(density, start, walkers, START_POOL * walkers, generator)
         self._state = emcee.State(places, random_state=state)
 
     def _log_probability(self, whitened: Float[np.ndarray, "walker dimension"]) -> Float[np.ndarray, "walker"]:
@@ -140,18 +140,6 @@ class _Ensemble:
         self.evaluations += len(whitened)
         self.gradients += len(whitened)
         return evaluate_with_gradient(lambda places: self._density(self._gaussian.mapped(places)), whitened)
-
-    def _starting_places(self, walkers: int, generator: np.random.Generator) -> Float[np.ndarray, "walker dimension"]:
-        """Different points with support, drawn by importance from the Gaussian."""
-        pool = generator.standard_normal((START_POOL * walkers, self._gaussian.dimension))
-        values = self._log_probability(pool)
-        weights, _ = smoothed_weights(values + (pool**2).sum(axis=1) / 2)
-        supported = np.flatnonzero(np.isfinite(values))
-        if len(supported) < walkers:
-            return 0.01 * pool[:walkers]
-        flattened = weights[supported] ** 0.5 + 1e-12
-        chosen = generator.choice(supported, size=walkers, replace=False, p=flattened / flattened.sum())
-        return pool[chosen]
 
     def run(self, steps: int, *, tune: bool) -> None:
         self._state = self._sampler.run_mcmc(
@@ -191,9 +179,4 @@ def _independent(
     count, dimension = places.shape
     chi_square = random.chisquare(DEGREES_OF_FREEDOM, size=count) / DEGREES_OF_FREEDOM
     proposed = random.standard_normal((count, dimension)) / np.sqrt(chi_square)[:, None]
-
-    def log_density(whitened: Float[np.ndarray, "walker dimension"]) -> Float[np.ndarray, "walker"]:
-        power = (DEGREES_OF_FREEDOM + dimension) / 2
-        return -power * np.log1p((whitened**2).sum(axis=1) / DEGREES_OF_FREEDOM)
-
-    return proposed, log_density(places) - log_density(proposed)
+    return proposed, tail_log_density(places) - tail_log_density(proposed)

@@ -74,8 +74,7 @@ def infer(
     InputError
         If the sampler is unknown, fewer than 4 draws are asked for, the seed is negative or no object moves.
     """
-    if sampler not in SAMPLERS:
-        raise InputError(f"sampler '{sampler}' is not known; use one of {', '.join(SAMPLERS)}.")
+    check_sampler(sampler)
     if draws < 4:
         raise InputError(f"draws is {draws}; ask for at least 4.")
     if seed < 0:
@@ -87,6 +86,18 @@ def infer(
         fit.likelihood.log_density, fit.gaussian, draws=draws, generator=generator, progress=progress
     )
     return _posterior(fit, samples, sampler, seed=seed, draws=draws, generator=generator)
+
+
+def check_sampler(name: str) -> None:
+    """Refuse a sampler that does not exist.
+
+    Raises
+    ------
+    InputError
+        If there is none of that name.
+    """
+    if name not in SAMPLERS:
+        raise InputError(f"sampler '{name}' is not known; use one of {', '.join(SAMPLERS)}.")
 
 
 def _posterior(

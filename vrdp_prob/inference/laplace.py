@@ -27,6 +27,8 @@ FEWEST = 100.0
 """Where the weights leave fewer effective draws than this they are flattened, so that the draws at least spread; Pareto
 k then says that they are not to be trusted."""
 BATCH = 500
+NEAR_THE_MEAN = 0.01
+"""Scale of the starting places where hardly any has support."""
 
 
 def sample_laplace(
@@ -101,6 +103,29 @@ def adapted(
     return gaussian, evaluations
 
 
+def starting_places(
+    density: LogDensity, start: CurvedGaussian, count: int, pool_size: int, generator: np.random.Generator
+) -> Float[np.ndarray, "count dimension"]:
+    """Different whitened points with support for chains to set out from, drawn by importance from a pool.
+
+    Near the mean where the pool has too few with support.
+    """
+    pool = generator.standard_normal((pool_size, start.dimension))
+    values = evaluate(density, start.points(pool))
+    supported = np.flatnonzero(np.isfinite(values))
+    if len(supported) < count:
+        return NEAR_THE_MEAN * pool[:count]
+    weights, _ = smoothed_weights(values + (pool**2).sum(axis=1) / 2)
+    flattened = weights[supported] ** 0.5 + 1e-12
+    return pool[generator.choice(supported, size=count, replace=False, p=flattened / flattened.sum())]
+
+
+def tail_log_density(whitened: Float[np.ndarray, "draw dimension"]) -> Float[np.ndarray, "draw"]:
+    """Log density of the multivariate Student-t of the proposals, up to a constant."""
+    power = (DEGREES_OF_FREEDOM + whitened.shape[1]) / 2
+    return np.asarray(-power * np.log1p((whitened**2).sum(axis=1) / DEGREES_OF_FREEDOM))
+
+
 def effective_count(weights: Float[np.ndarray, "draw"]) -> float:
     """Number of equally weighted draws that are worth as much."""
     return float(1 / np.sum(weights**2))
@@ -161,8 +186,7 @@ def _proposals(
     whitened = normal / np.sqrt(chi_square)[:, None]
     constant = gammaln((DEGREES_OF_FREEDOM + dimension) / 2) - gammaln(DEGREES_OF_FREEDOM / 2)
     constant -= dimension / 2 * np.log(DEGREES_OF_FREEDOM * np.pi) + start.log_volume
-    shape = np.log1p((whitened**2).sum(axis=1) / DEGREES_OF_FREEDOM)
-    return whitened, constant - (DEGREES_OF_FREEDOM + dimension) / 2 * shape
+    return whitened, constant + tail_log_density(whitened)
 
 
 def _resample(weights: Float[np.ndarray, "draw"], count: int, generator: np.random.Generator) -> np.ndarray:

@@ -13,7 +13,7 @@ from pyro.infer.mcmc import MCMC, NUTS
 from torch import Tensor
 
 from vrdp_prob.inference.curved_gaussian import CurvedGaussian
-from vrdp_prob.inference.laplace import adapted, smoothed_weights
+from vrdp_prob.inference.laplace import adapted, starting_places
 from vrdp_prob.inference.samples import LogDensity, Samples, evaluate
 from vrdp_prob.progress import Advance, ProgressDisplay, SilentProgress
 
@@ -60,7 +60,7 @@ def sample_nuts(
     per_chain = -(-draws // CHAINS)
     start, adapting = adapted(density, start, generator, lambda _steps: None)
     potential = _Potential(density, start)
-    starts = _starting_points(density, start, generator)
+    starts = starting_places(density, start, CHAINS, START_POOL, generator)
     chains: list[np.ndarray] = []
     divergences = 0
     with (progress or SilentProgress()).stage("Sampling (NUTS)", total=CHAINS * (warm_up + per_chain)) as advance:
@@ -125,17 +125,3 @@ def _chain(
         torch.set_rng_state(state)
     diverging = sampler.diagnostics()["divergences"]
     return sampler.get_samples()["whitened"].detach().numpy(), sum(len(places) for places in diverging.values())
-
-
-def _starting_points(
-    density: LogDensity, start: CurvedGaussian, generator: np.random.Generator
-) -> list[Float[np.ndarray, "dimension"]]:
-    """Different starting points, drawn by importance, in whitened coordinates."""
-    pool = generator.standard_normal((START_POOL, start.dimension))
-    values = evaluate(density, start.points(pool))
-    if np.isfinite(values).sum() < CHAINS:
-        return [0.1 * place for place in pool[:CHAINS]]
-    weights, _ = smoothed_weights(values + (pool**2).sum(axis=1) / 2)
-    flattened = weights**0.5
-    chosen = generator.choice(START_POOL, size=CHAINS, replace=False, p=flattened / flattened.sum())
-    return [pool[index] for index in chosen]

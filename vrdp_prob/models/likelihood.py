@@ -109,16 +109,15 @@ class Likelihood:
     ) -> tuple[Float[Tensor, "point residual"], Bool[np.ndarray, "point"]]:
         observations = self.observations if frame_count is None else self.observations.until(frame_count)
         rollout = self._rollout(quantities, frame_count)
-        body_count = len(self.tracks.bodies)
         states = rollout.trajectory.flatten(1)
         # index_select, because its derivative is many times faster than that of indexing with several arrays.
-        position = states.index_select(1, observations.position_places(body_count)).reshape(len(states), -1, 2)
+        position = states.index_select(1, observations.position_places).reshape(len(states), -1, 2)
         difference = position - torch.from_numpy(observations.position)
         whitened = (torch.from_numpy(observations.whitening) * difference[:, :, None]).sum(dim=-1)
         parts = [whitened.flatten(1) / quantities[NOISE]]
         if len(observations.angle):
             zero = quantities["angle_zero"][:, observations.angle_body]
-            predicted = states.index_select(1, observations.angle_places(body_count)) + zero
+            predicted = states.index_select(1, observations.angle_places) + zero
             angle = (predicted - torch.from_numpy(observations.angle)) / observations.angle_reference
             parts.append(angle / quantities[ANGLE_NOISE])
         residuals = torch.cat(parts, dim=1)

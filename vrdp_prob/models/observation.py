@@ -1,6 +1,7 @@
 """How tracks are measured: which numbers were seen, how they are whitened, and the noise scales that are inferred."""
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import torch
@@ -39,6 +40,8 @@ class Observations:
         Frame, body and value (rad) of each measured angle that says something (the yaw of a sphere does not).
     angle_reference
         Standard deviation in rad that angle noise scale 1 stands for.
+    body_count
+        Number of bodies of the video.
     """
 
     frame: Int[np.ndarray, "observation"]
@@ -50,6 +53,7 @@ class Observations:
     angle_body: Int[np.ndarray, "angle"]
     angle: Float[np.ndarray, "angle"]
     angle_reference: float
+    body_count: int
 
     @classmethod
     def of(cls, tracks: Tracks) -> "Observations":
@@ -61,7 +65,8 @@ class Observations:
         angle_frame, angle_body = np.nonzero(angle_seen)
         angles = tracks.angles
         angle = np.zeros(0) if angles is None else angles[angle_frame, angle_body]
-        return cls(frame, body, position, whitening, reference, angle_frame, angle_body, angle, ANGLE_SD)
+        count = len(tracks.bodies)
+        return cls(frame, body, position, whitening, reference, angle_frame, angle_body, angle, ANGLE_SD, count)
 
     @property
     def angle_bodies(self) -> tuple[int, ...]:
@@ -81,16 +86,19 @@ class Observations:
             self.angle_body[angles],
             self.angle[angles],
             self.angle_reference,
+            self.body_count,
         )
 
-    def position_places(self, body_count: int) -> Int[Tensor, "coordinate"]:
+    @cached_property
+    def position_places(self) -> Int[Tensor, "coordinate"]:
         """Places of the seen coordinates (x and y in turn) in a flattened trajectory [time, body, (x, y, angle)]."""
-        first = 3 * (self.frame * body_count + self.body)
+        first = 3 * (self.frame * self.body_count + self.body)
         return torch.from_numpy(np.stack([first, first + 1], axis=1).ravel())
 
-    def angle_places(self, body_count: int) -> Int[Tensor, "angle"]:
+    @cached_property
+    def angle_places(self) -> Int[Tensor, "angle"]:
         """Places of the measured angles in a flattened trajectory."""
-        return torch.from_numpy(3 * (self.angle_frame * body_count + self.angle_body) + 2)
+        return torch.from_numpy(3 * (self.angle_frame * self.body_count + self.angle_body) + 2)
 
 
 def prior_noise(tracks: Tracks) -> float:

@@ -1,52 +1,71 @@
-"""Random scenes of discs against an independent simulator."""
+"""Trajectories of random scenes of all shapes against an independent simulator."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from tests.simulator import reference
-from tests.simulator.scenes import DISC, FRAMES, SPHERE, random_worlds
-from vrdp_prob.models.simulator.events import RolloutEventKind
-from vrdp_prob.models.simulator.rollout import simulate
+from tests.simulator.comparison import Comparison, compare, scenes
+from tests.simulator.scenes import CUBE, DISC, FRAMES, SPHERE, tensor
+from vrdp_prob.models.effects.contact_friction import ContactFriction
+from vrdp_prob.models.effects.linear_drag import LinearDrag
+from vrdp_prob.models.effects.surface_tilt import SurfaceTilt
+from vrdp_prob.models.physics import PhysicsModel
+from vrdp_prob.models.simulator.worlds import Worlds
 
-SHAPES = (DISC, SPHERE, DISC, SPHERE)
-
-
-def _deviations(count: int, seed: int) -> tuple[float, int]:
-    """Farthest deviation in m before the first grazing contact, and the number of contacts that were compared."""
-    worlds = random_worlds(count, SHAPES, seed, walls=False)
-    rollout = simulate(worlds, FRAMES)
-    trajectory, times = rollout.trajectory.numpy(), FRAMES.numpy()
-    farthest, compared = 0.0, 0
-    for index in range(count):
-        rolling = np.array([shape is SPHERE for shape in SHAPES])
-        friction = [float(worlds.parameters[name][index]) for name in ("sliding_friction", "rolling_resistance")]
-        scene = {
-            "position": worlds.position[index].numpy(),
-            "velocity": worlds.velocity[index].numpy(),
-            "mass": worlds.mass[index].numpy(),
-            "restitution": worlds.restitution[index].numpy(),
-            "radius": worlds.radius[index].numpy(),
-            "friction": np.where(rolling, friction[1], friction[0]),
-            "drag": float(worlds.parameters["air_drag"][index]),
-        }
-        expected, contacts, grazing = reference.rollout(scene, times)
-        before = times < grazing
-        farthest = max(farthest, np.abs(trajectory[index, before, :, :2] - expected[before]).max(initial=0.0))
-        events = rollout.events.of_world(index).of_kind(RolloutEventKind.COLLISION)
-        found = [pair for *pair, time in zip(events.first, events.second, events.time, strict=True) if time < grazing]
-        assert found == [[first, second] for time, first, second in contacts if time < grazing]
-        compared += len(found)
-    return farthest, compared
+Record = Callable[[str, object], None]
+MIXES = {
+    "discs": (DISC, SPHERE, DISC, SPHERE),
+    "mixed": (CUBE, DISC, CUBE, SPHERE, DISC),
+    "cubes": (CUBE, CUBE, CUBE),
+}
+EXTENDED = PhysicsModel.base().with_effect(SurfaceTilt()).with_effect(LinearDrag()).with_effect(ContactFriction())
+STRENGTHS = {
+    "tilt_x": (-0.005, 0.005),
+    "tilt_y": (-0.005, 0.005),
+    "linear_drag": (0, 0.3),
+    "contact_friction": (0, 0.5),
+}
+EXACT = 1e-6
+"""Farthest deviation in m that is allowed."""
 
 
-def test_discs_against_the_reference() -> None:
-    farthest, compared = _deviations(10, seed=21)
-    assert farthest < 1e-6
-    assert compared >= 10
+def with_strengths(worlds: Worlds, ranges: Mapping[str, tuple[float, float]], seed: int) -> Worlds:
+    """The worlds with random parameters of effects."""
+    generator = np.random.default_rng(seed)
+    more = {name: tensor(generator.uniform(*limits, len(worlds))) for name, limits in ranges.items()}
+    return replace(worlds, parameters={**worlds.parameters, **more})
+
+
+def _compared(count: int, shapes: Sequence[object], seed: int, model: PhysicsModel) -> Comparison:
+    """Half of the scenes with walls, the others with a body that appears late."""
+    total = Comparison()
+    for kind in range(2):
+        worlds = scenes(count // 2, shapes, seed + kind, walls=kind == 0, late=kind == 1)
+        worlds = with_strengths(worlds, STRENGTHS, seed) if model is EXTENDED else worlds
+        total += compare(worlds, FRAMES, model)
+    return total
+
+
+def _check(found: Comparison, record: Record) -> None:
+    print(found)
+    record("farthest_deviation_m", found.farthest)
+    record("found", str(found))
+    assert found.farthest < EXACT
+    assert found.missed == found.invented == 0
+    assert found.contacts > found.scenes
+    assert found.cut < found.scenes / 3
+
+
+@pytest.mark.parametrize("mix", MIXES)
+@pytest.mark.parametrize("model", [PhysicsModel.base(), EXTENDED], ids=["base", "extended"])
+def test_against_the_reference(mix: str, model: PhysicsModel, record_property: Record) -> None:
+    _check(_compared(24, MIXES[mix], 21, model), record_property)
 
 
 @pytest.mark.slow
-def test_many_discs_against_the_reference() -> None:
-    farthest, compared = _deviations(200, seed=22)
-    print(f"farthest deviation {farthest:.1e} m over {compared} contacts")
-    assert farthest < 1e-6
+@pytest.mark.parametrize("mix", MIXES)
+@pytest.mark.parametrize("model", [PhysicsModel.base(), EXTENDED], ids=["base", "extended"])
+def test_many_scenes_against_the_reference(mix: str, model: PhysicsModel, record_property: Record) -> None:
+    _check(_compared(300, MIXES[mix], 121, model), record_property)

@@ -11,6 +11,7 @@ from scipy.special import expit
 from torch import Tensor
 
 from vrdp_prob.errors import InputError
+from vrdp_prob.scene import Shape
 
 GRAVITY = 9.81
 """Gravitational acceleration in m/s^2."""
@@ -107,6 +108,8 @@ class Parameter:
         Value where nothing is known of the parameter.
     scope
         Whether there is one value per video or per body.
+    shapes
+        Shapes of the bodies whose motion depends on it; all where none are given.
     """
 
     name: str
@@ -116,6 +119,7 @@ class Parameter:
     prior: Prior
     default: float
     scope: Scope = Scope.SHARED
+    shapes: frozenset[Shape] = frozenset(Shape)
 
     def __post_init__(self) -> None:
         low, high = self.transform.support
@@ -124,10 +128,17 @@ class Parameter:
 
 
 def _log_parameter(
-    name: str, unit: str, description: str, *, median: float, log_sd: float, scope: Scope = Scope.SHARED
+    name: str,
+    unit: str,
+    description: str,
+    *,
+    median: float,
+    log_sd: float,
+    scope: Scope = Scope.SHARED,
+    shapes: frozenset[Shape] = frozenset(Shape),
 ) -> Parameter:
     prior = Prior(math.log(median), log_sd)
-    return Parameter(name, unit, description, Transform.LOG, prior, default=median, scope=scope)
+    return Parameter(name, unit, description, Transform.LOG, prior, default=median, scope=scope, shapes=shapes)
 
 
 MASS = _log_parameter("mass", "kg", "mass of a body", median=1.0, log_sd=0.7, scope=Scope.BODY)
@@ -149,10 +160,20 @@ WALL_RESTITUTION = Parameter(
     default=0.8,
 )
 SLIDING_FRICTION = _log_parameter(
-    "sliding_friction", "1", "friction coefficient of sliding cubes and cylinders", median=0.1, log_sd=1.0
+    "sliding_friction",
+    "1",
+    "friction coefficient of sliding cubes and cylinders",
+    median=0.1,
+    log_sd=1.0,
+    shapes=frozenset({Shape.CUBE, Shape.CYLINDER}),
 )
 ROLLING_RESISTANCE = _log_parameter(
-    "rolling_resistance", "1", "resistance coefficient of rolling spheres", median=0.03, log_sd=1.0
+    "rolling_resistance",
+    "1",
+    "resistance coefficient of rolling spheres",
+    median=0.03,
+    log_sd=1.0,
+    shapes=frozenset({Shape.SPHERE}),
 )
 AIR_DRAG = _log_parameter("air_drag", "1/m", "deceleration by the air per squared speed", median=0.02, log_sd=1.0)
 ANGULAR_DRAG = _log_parameter(

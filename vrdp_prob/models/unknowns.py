@@ -13,8 +13,6 @@ from vrdp_prob.models.parameters import (
     ANGULAR_DRAG,
     MASS,
     RESTITUTION,
-    ROLLING_RESISTANCE,
-    SLIDING_FRICTION,
     WALL_RESTITUTION,
     Prior,
     Scope,
@@ -108,18 +106,14 @@ def _matter(tracks: Tracks, structure: Structure) -> Iterator[Coordinate]:
 
 def _physics(tracks: Tracks, model: PhysicsModel, structure: Structure) -> Iterator[Coordinate]:
     """Parameters of the model that can have an effect on these bodies."""
-    shapes = {body.shape for body in tracks.bodies}
     turning = any(tracks.bodies[body].shape is Shape.CUBE for body in structure.colliding)
-    idle = {
-        SLIDING_FRICTION.name: shapes == {Shape.SPHERE},
-        ROLLING_RESISTANCE.name: Shape.SPHERE not in shapes,
-        ANGULAR_DRAG.name: not turning and not Observations.of(tracks).angle_bodies,
-    }
+    spin_matters = turning or bool(Observations.of(tracks).angle_bodies)
     for parameter in model.parameters:
-        if parameter.scope is Scope.SHARED and not idle.get(parameter.name, False):
+        concerned = [index for index, body in enumerate(tracks.bodies) if body.shape in parameter.shapes]
+        if parameter.scope is Scope.SHARED and concerned and (spin_matters or parameter.name != ANGULAR_DRAG.name):
             yield Coordinate.of(parameter)
         if parameter.scope is Scope.BODY and parameter.name not in (MASS.name, RESTITUTION.name):
-            for body in sorted(structure.moving | structure.colliding):
+            for body in sorted((structure.moving | structure.colliding).intersection(concerned)):
                 yield Coordinate.of(parameter, body)
 
 

@@ -1,16 +1,25 @@
 """What a physical cause may do: the hooks of an effect.
 
-An effect overrides the hooks it needs and leaves the others. Hooks that are laws (`acceleration`, `friction_factor`,
-...) are plain functions of numbers written with `vrdp_prob.models.simulator.mathematics`; they are compiled, with their
-derivative, from that one text. A law must not branch with `if` on its arguments; use `mathematics.where`.
+An effect overrides the hooks it needs and leaves the others. There are two sorts.
+
+*Laws* (`acceleration`, `friction_factor`, `tangential_impulse`, ...) are plain functions of numbers written with
+`vrdp_prob.models.simulator.mathematics`; they are compiled, with their derivative, from that one text. A law must not
+branch with `if` on its arguments; use `mathematics.where`.
+
+*Arrangements* (`obstacles`, `contact_radius`, `measured_times`, ...) are functions of tensors with the axis `world`,
+through which torch differentiates.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import ClassVar
 
+from jaxtyping import Float
+from torch import Tensor
+
 from vrdp_prob.models.parameters import Parameter
 from vrdp_prob.models.simulator.formula import Scalar
+from vrdp_prob.models.simulator.obstacle import Obstacle
 
 
 @dataclass(frozen=True)
@@ -36,6 +45,11 @@ class BodyView:
         1 for a sphere, else 0.
     parameters
         The body's own values of parameters with scope `body` that effects added.
+    slip_x, slip_y, slip_speed
+        Slip of a sphere against the table in m/s and its length (as `speed` is one), in models where spheres slip.
+    side
+        By the name of each effect with a `boundary`: 1 on the side where it is positive, else -1. Only where a body
+        moves, not in a contact.
     """
 
     x: Scalar
@@ -52,6 +66,10 @@ class BodyView:
     radius: Scalar
     is_sphere: Scalar
     parameters: Mapping[str, Scalar] = field(default_factory=dict)
+    slip_x: Scalar = 0.0
+    slip_y: Scalar = 0.0
+    slip_speed: Scalar = 0.0
+    side: Mapping[str, Scalar] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -113,6 +131,41 @@ class Effect:
         """Rate in rad/s^2 at which the spin about the vertical decays to rest (not past it)."""
         return 0.0
 
+    def slip_friction(self, time: Scalar, body: BodyView, parameters: Mapping[str, Scalar]) -> Scalar:
+        """Friction coefficient of a sphere while it slips on the table.
+
+        Where an effect has this, spheres have a spin about horizontal axes. They slip after their release and after
+        every contact until they roll; `friction_factor` then acts while they roll. The largest of all effects counts.
+        """
+        return 0.0
+
+    def pair_force(
+        self, time: Scalar, first: BodyView, second: BodyView, parameters: Mapping[str, Scalar]
+    ) -> tuple[Scalar, Scalar]:
+        """Force in N of the second body on the first, at a distance; its opposite acts on the second.
+
+        It is called once for each pair, in the order of the bodies, so it must be odd: exchanging the bodies must turn
+        its sign.
+        """
+        return 0.0, 0.0
+
+    def kick_time(self, parameters: Mapping[str, Scalar]) -> Scalar:
+        """Time in s at which the effect changes velocities at once; an effect with `kick` must have it."""
+        raise NotImplementedError(f"effect {self.name}: a kick needs a kick_time.")
+
+    def kick(
+        self, time: Scalar, body: BodyView, parameters: Mapping[str, Scalar]
+    ) -> tuple[Scalar, Scalar, Scalar]:
+        """Change of (vx, vy, spin) of a body in m/s and rad/s at the time of the kick."""
+        return 0.0, 0.0, 0.0
+
+    def boundary(self, body: BodyView, parameters: Mapping[str, Scalar]) -> Scalar:
+        """Number whose sign says on which side of a boundary a body is; laws read it as `body.side[name]`.
+
+        Motion goes exactly up to the boundary before another law holds, so a law may jump there.
+        """
+        return 1.0
+
     def restitution(
         self,
         closing_speed: Scalar,
@@ -129,3 +182,34 @@ class Effect:
     ) -> Scalar:
         """Impulse in kg m/s on the second body along the tangent of a contact."""
         return 0.0
+
+    def obstacles(self, parameters: Mapping[str, Float[Tensor, "world"]]) -> Sequence[Obstacle]:
+        """Fixed discs and straight walls that the effect adds to a scene."""
+        return ()
+
+    def contact_radius(
+        self, radius: Float[Tensor, "world body"], parameters: Mapping[str, Float[Tensor, "..."]]
+    ) -> Float[Tensor, "world body"]:
+        """Radius in m (half side) at which bodies touch, from what earlier effects of the model made of it."""
+        return radius
+
+    def rolling_velocity(
+        self, velocity: Float[Tensor, "world body 2"], parameters: Mapping[str, Float[Tensor, "..."]]
+    ) -> Float[Tensor, "world body 2"] | None:
+        """Velocity in m/s with which each sphere would roll by the spin that it is released with; None without."""
+        return None
+
+    def measured_times(
+        self, times: Float[Tensor, "world time"], parameters: Mapping[str, Float[Tensor, "..."]]
+    ) -> Float[Tensor, "world time"]:
+        """True times in s of the frames, from their time stamps."""
+        return times
+
+    def measured_positions(
+        self,
+        positions: Float[Tensor, "world time body 2"],
+        times: Float[Tensor, "world time"],
+        parameters: Mapping[str, Float[Tensor, "..."]],
+    ) -> Float[Tensor, "world time body 2"]:
+        """Positions in m as they are measured, from the true ones."""
+        return positions

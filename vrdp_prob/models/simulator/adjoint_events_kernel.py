@@ -9,29 +9,32 @@ from vrdp_prob.models.simulator.adjoint_kernel import (
     OF_B,
     ONE,
     RATE_A,
-    RATE_B,
     VALUE_A,
     VALUE_B,
     VELOCITIES,
+    clear,
     continue_legs,
     end_legs,
     load,
     load_touches,
+    product,
     read_frames,
     reverse_pieces,
     shift_of,
 )
-from vrdp_prob.models.simulator.cluster_kernel import ROOM_RATE, constraint_bar_states, set_constraints
+from vrdp_prob.models.simulator.cluster_kernel import ROOM_RATE, cluster_of, constraint_bar_states, set_constraints
 from vrdp_prob.models.simulator.laws_kernel import (
-    GROUP_SIZE,
     SLIPS,
     STATE_SIZE,
+    boundary_rate,
+    boundary_vjp,
     compiled,
     contact_law_vjp,
     gap_law_vjp,
+    kick_time_vjp,
+    kick_vjp,
 )
 from vrdp_prob.models.simulator.motion_kernel import take_states
-from vrdp_prob.models.simulator.tableau import DENSE
 from vrdp_prob.models.simulator.tape_kernel import (
     BEFORE_FIRST,
     BEFORE_SECOND,
@@ -42,11 +45,13 @@ from vrdp_prob.models.simulator.tape_kernel import (
     CONTACT,
     CONTACT_KIND,
     CONTINUE,
+    CROSS,
     FEATURE,
     FIRST,
     FRAME_BEGIN,
     FRAME_END,
     HOLDS,
+    KICK,
     KIND,
     PART,
     PIECE,
@@ -59,7 +64,6 @@ from vrdp_prob.models.simulator.tape_kernel import (
 )
 from vrdp_prob.models.simulator.world_kernel import (
     FIXED,
-    LENGTH,
     MOVING,
     PRESENT,
     REFERENCE_X,
@@ -67,31 +71,28 @@ from vrdp_prob.models.simulator.world_kernel import (
     RELEASE_TIME,
     SLIPPING,
     evaluate,
-    evaluate_rate,
     share_of,
 )
 
 
 @compiled
-def reverse_release(world, adjoint, body, t, has_before):
-    """The state with which a body is released, and its time."""
-    group = body // GROUP_SIZE
+def reverse_release(world, adjoint, body, other, t):
+    """The state with which a body is released, and its time; `other` is a body that moved on with it, or -1."""
     for c in range(STATE_SIZE):
         adjoint.start[body, c] += adjoint.state[body, c]
         adjoint.state[body, c] = 0.0
-    if has_before:
-        adjoint.start[body, RELEASE_TIME] += shift_of(world, adjoint, world.members[group, 1], t)
-        end_legs(world, adjoint, world.members[group, 1], t)
-    else:
-        adjoint.start[body, RELEASE_TIME] += adjoint.leg[group]
-        adjoint.leg[group] = 0.0
+    adjoint.start[body, RELEASE_TIME] += adjoint.leg[body]
+    adjoint.leg[body] = 0.0
+    if other >= 0:
+        cluster = cluster_of(world, other)
+        adjoint.start[body, RELEASE_TIME] += shift_of(world, adjoint, cluster, t)
+        end_legs(world, adjoint, cluster, t)
 
 
 @compiled
 def reverse_stop(world, adjoint, body, t):
     """A body stops, or begins to roll: what vanishes sets the time."""
-    group = body // GROUP_SIZE
-    cluster = world.members[group, 1]
+    cluster = cluster_of(world, body)
     phase, bar = world.phase[body], adjoint.state[body]
     rolls = SLIPS and phase[MOVING] == SLIPPING
     if rolls:
@@ -99,10 +100,11 @@ def reverse_stop(world, adjoint, body, t):
         bar[6], bar[7] = 0.0, 0.0
     else:
         bar[3], bar[4] = 0.0, 0.0
+        if SLIPS:
+            bar[6], bar[7] = 0.0, 0.0
     of_time = shift_of(world, adjoint, cluster, t)
+    product(world, adjoint, body, bar, t)
     rate = adjoint.local[RATE_A]
-    share = share_of(world, group, t)
-    evaluate_rate(world.polynomial[group], body - group * GROUP_SIZE, share, world.clock[group, LENGTH], rate)
     x, y = phase[REFERENCE_X], phase[REFERENCE_Y]
     falling = rate[3] * x + rate[4] * y
     if rolls:
@@ -118,16 +120,49 @@ def reverse_stop(world, adjoint, body, t):
 @compiled
 def reverse_spin_stop(world, adjoint, body, t):
     """A body stops to spin: its spin vanishes."""
-    group = body // GROUP_SIZE
-    cluster = world.members[group, 1]
+    cluster = cluster_of(world, body)
     bar = adjoint.state[body]
     bar[5] = 0.0
     of_time = shift_of(world, adjoint, cluster, t)
+    product(world, adjoint, body, bar, t)
     rate = adjoint.local[RATE_A]
-    share = share_of(world, group, t)
-    evaluate_rate(world.polynomial[group], body - group * GROUP_SIZE, share, world.clock[group, LENGTH], rate)
     if abs(rate[5]) > FLATTEST:
         bar[5] = -of_time / rate[5]
+    end_legs(world, adjoint, cluster, t)
+
+
+@compiled
+def reverse_cross(world, adjoint, body, which, t):
+    """A body crosses a boundary: what vanishes there sets the time."""
+    cluster = cluster_of(world, body)
+    bar, y = adjoint.state[body], adjoint.local[VALUE_A]
+    of_time = shift_of(world, adjoint, cluster, t)
+    product(world, adjoint, body, bar, t)
+    evaluate(world.polynomial[body], share_of(world, body, t), y)
+    rate = boundary_rate(which, y, adjoint.local[RATE_A], world.body[body], world.shared)
+    if abs(rate) > FLATTEST:
+        factor = -of_time / rate
+        boundary_vjp(which, y, world.body[body], world.shared, factor, bar, adjoint.body[body], adjoint.shared)
+    end_legs(world, adjoint, cluster, t)
+
+
+@compiled
+def reverse_kick(world, adjoint, body, which, t):
+    """A kick changes the velocities of a body at a time that the parameters set."""
+    cluster = cluster_of(world, body)
+    y, bar, of_body = adjoint.local[VALUE_A], adjoint.local[VELOCITIES], adjoint.local[OF_A]
+    evaluate(world.polynomial[body], share_of(world, body, t), y)
+    for c in range(STATE_SIZE):
+        of_body[c] = 0.0
+    for c in range(3):
+        bar[c] = adjoint.state[body, 3 + c]
+    one = adjoint.local[ONE]
+    one[0] = 0.0
+    kick_vjp(which, t, y, world.body[body], world.shared, bar, of_body, adjoint.body[body], adjoint.shared, one)
+    of_time = one[0] + product(world, adjoint, body, of_body, t) + shift_of(world, adjoint, cluster, t)
+    kick_time_vjp(which, world.shared, of_time, adjoint.shared)
+    for c in range(STATE_SIZE):
+        adjoint.state[body, c] += of_body[c]
     end_legs(world, adjoint, cluster, t)
 
 
@@ -171,26 +206,12 @@ def give_back(world, adjoint, body, of_body):
 
 
 @compiled
-def product(world, adjoint, body, of_body, t):
-    """Product of an adjoint of a body's state with its rate before a contact."""
-    group = body // GROUP_SIZE
-    rate = adjoint.local[RATE_B]
-    share = share_of(world, group, t)
-    evaluate_rate(world.polynomial[group], body - group * GROUP_SIZE, share, world.clock[group, LENGTH], rate)
-    total = 0.0
-    for c in range(STATE_SIZE):
-        total += of_body[c] * rate[c]
-    return total
-
-
-@compiled
 def reverse_contact(world, adjoint, kind, a, b, together, numbers, t):
     """A contact: the gap vanishes, the laws give the velocities after it; `together` in one cluster before it."""
-    group_a, group_b = a // GROUP_SIZE, b // GROUP_SIZE
     ya, yb = adjoint.local[VALUE_A], adjoint.local[VALUE_B]
     of_a, of_b, bar, one = adjoint.local[OF_A], adjoint.local[OF_B], adjoint.local[VELOCITIES], adjoint.local[ONE]
-    evaluate(world.polynomial[group_a], a - group_a * GROUP_SIZE, share_of(world, group_a, t), ya)
-    evaluate(world.polynomial[group_b], b - group_b * GROUP_SIZE, share_of(world, group_b, t), yb)
+    evaluate(world.polynomial[a], share_of(world, a, t), ya)
+    evaluate(world.polynomial[b], share_of(world, b, t), yb)
     feature = numbers[FEATURE : FEATURE + 7]
     take_velocities(world, adjoint, a, of_a, bar[0:3])
     take_velocities(world, adjoint, b, of_b, bar[3:6])
@@ -202,9 +223,9 @@ def reverse_contact(world, adjoint, kind, a, b, together, numbers, t):
     of_first = not world.kind[a, FIXED]
     of_second = not world.kind[b, FIXED] and not (of_first and together)
     if of_first:
-        of_time += shift_of(world, adjoint, world.members[group_a, 1], t)
+        of_time += shift_of(world, adjoint, cluster_of(world, a), t)
     if of_second:
-        of_time += shift_of(world, adjoint, world.members[group_b, 1], t)
+        of_time += shift_of(world, adjoint, cluster_of(world, b), t)
     one[0] = of_time / numbers[CLOSING_SPEED]
     gap_law_vjp(
         kind, ya, yb, world.body[a], world.body[b], feature, world.shared, one, of_a, of_b, body[a], body[b], shared
@@ -212,32 +233,36 @@ def reverse_contact(world, adjoint, kind, a, b, together, numbers, t):
     give_back(world, adjoint, a, of_a)
     give_back(world, adjoint, b, of_b)
     if of_first:
-        end_legs(world, adjoint, world.members[group_a, 1], t)
+        end_legs(world, adjoint, cluster_of(world, a), t)
     if of_second:
-        end_legs(world, adjoint, world.members[group_b, 1], t)
+        end_legs(world, adjoint, cluster_of(world, b), t)
 
 
 @compiled
-def read_unreleased(world, adjoint, times, states_bar):
+def read_unreleased(world, adjoint, times, trajectory_bar, velocity_bar):
     """Before its release, or where it is removed, a body shows the state of its release."""
-    for frame in range(times.shape[0]):
-        for body in range(world.kind.shape[0]):
-            if not world.kind[body, PRESENT] or times[frame] < world.start[body, RELEASE_TIME]:
-                for c in range(STATE_SIZE):
-                    adjoint.start[body, c] += states_bar[frame, body, c]
+    for body in range(trajectory_bar.shape[1]):
+        for frame in range(times.shape[0]):
+            if world.kind[body, PRESENT] and times[frame] >= world.start[body, RELEASE_TIME]:
+                break
+            for c in range(3):
+                adjoint.start[body, c] += trajectory_bar[frame, body, c]
+                if velocity_bar.shape[0] > 0:
+                    adjoint.start[body, 3 + c] += velocity_bar[frame, body, c]
 
 
 @compiled
-def reverse_world(world, adjoint, integers, numbers, times, states_bar):
+def reverse_world(world, adjoint, integers, numbers, times, trajectory_bar, velocity_bar):
     """Read the tape of a world backwards."""
-    read_unreleased(world, adjoint, times, states_bar)
-    clear_adjoint(world, adjoint)
+    read_unreleased(world, adjoint, times, trajectory_bar, velocity_bar)
+    clear_adjoint(adjoint)
     for row in range(integers.shape[0] - 1, -1, -1):
         entry = integers[row]
         kind, first = entry[KIND], entry[FIRST]
         if kind == PIECE:
             load(world, adjoint, integers, numbers, row)
-            read_frames(world, adjoint, first, entry[FRAME_BEGIN], entry[FRAME_END], times, states_bar)
+            begin, end = entry[FRAME_BEGIN], entry[FRAME_END]
+            read_frames(world, adjoint, first, begin, end, times, trajectory_bar, velocity_bar)
             if entry[BLOCK] == row:
                 reverse_pieces(world, adjoint, integers, numbers, row)
         elif kind != PRESS:
@@ -250,18 +275,13 @@ def reverse_world(world, adjoint, integers, numbers, times, states_bar):
 
 
 @compiled
-def clear_adjoint(world, adjoint):
+def clear_adjoint(adjoint):
     """Nothing read yet."""
-    for group in range(adjoint.leg.shape[0]):
-        adjoint.leg[group], adjoint.loaded[group] = 0.0, -1
-        for slot in range(GROUP_SIZE):
-            for c in range(STATE_SIZE):
-                adjoint.state[group * GROUP_SIZE + slot, c] = 0.0
-                for power in range(DENSE.shape[0]):
-                    adjoint.polynomial[group, power, slot, c] = 0.0
-    for body in range(adjoint.before.shape[0]):
-        for c in range(STATE_SIZE):
-            adjoint.before[body, c] = 0.0
+    clear(adjoint.state)
+    clear(adjoint.before)
+    for body in range(adjoint.leg.shape[0]):
+        adjoint.leg[body], adjoint.loaded[body] = 0.0, -1
+        clear(adjoint.polynomial[body])
 
 
 @compiled
@@ -271,19 +291,23 @@ def reverse_event(world, adjoint, integers, numbers, row):
     kind, first, second, t = entry[KIND], entry[FIRST], entry[SECOND], numbers[row, TIME]
     before, other = entry[BEFORE_FIRST], entry[BEFORE_SECOND]
     if kind == CONTINUE or (kind == PART and entry[HOLDS] < 0):
-        continue_legs(world, adjoint, world.members[first // GROUP_SIZE, 1], t)
+        continue_legs(world, adjoint, cluster_of(world, first), t)
     elif kind == RELEASE:
-        reverse_release(world, adjoint, first, t, before >= 0)
+        reverse_release(world, adjoint, first, second, t)
     elif kind == STOP:
         reverse_stop(world, adjoint, first, t)
     elif kind == SPIN_STOP:
         reverse_spin_stop(world, adjoint, first, t)
+    elif kind == CROSS:
+        reverse_cross(world, adjoint, first, second, t)
+    elif kind == KICK:
+        reverse_kick(world, adjoint, first, second, t)
     elif kind == PART:
         # Takes the contacts of the pieces that end here as those at hand; nothing else reads them until others are.
         block = integers[before, BLOCK]
         touches = integers[block, BLOCK_TOUCHES]
         load_touches(world, integers, numbers, block + integers[block, BLOCK_PIECES], touches)
-        reverse_slide(world, adjoint, world.members[first // GROUP_SIZE, 1], entry[HOLDS], t)
+        reverse_slide(world, adjoint, cluster_of(world, first), entry[HOLDS], t)
     elif kind == CONTACT:
         together = before >= 0 and other >= 0 and integers[before, BLOCK] == integers[other, BLOCK]
         reverse_contact(world, adjoint, entry[CONTACT_KIND], first, second, together, numbers[row], t)

@@ -22,26 +22,33 @@ from vrdp_prob.models.simulator.cluster_kernel import (
     TOUCH_FEATURE,
     TOUCH_KIND,
     constrain_vjp,
+    mobility,
     note_member,
     presses,
     set_touch_count,
     spread,
 )
 from vrdp_prob.models.simulator.laws_kernel import (
-    GROUP_SIZE,
+    COUPLED,
+    SLIPS,
     STATE_SIZE,
     compiled,
+    dense_output_vjp,
     motion_vjp,
+    pair_force_vjp,
+    stage_state_vjp,
 )
 from vrdp_prob.models.simulator.motion_kernel import (
     PARTS_OF_STEP,
     cluster_derivatives,
     compute_stages,
+    is_still,
     match_velocities,
+    pair_force_of,
     set_polynomial,
     stage_states,
 )
-from vrdp_prob.models.simulator.tableau import DENSE, NODES, WEIGHTS
+from vrdp_prob.models.simulator.tableau import DENSE, NODES
 from vrdp_prob.models.simulator.tape_kernel import (
     BLOCK,
     BLOCK_PIECES,
@@ -56,11 +63,13 @@ from vrdp_prob.models.simulator.tape_kernel import (
 from vrdp_prob.models.simulator.world_kernel import (
     ALIVE,
     FIXED,
+    INVERSE_MASS,
     LENGTH,
     MOVING,
     ORIGIN,
     PHASE_SIZE,
     RESTING,
+    SLIPPING,
     SPIN_SENSE,
     STAGES,
     WORK,
@@ -70,7 +79,7 @@ from vrdp_prob.models.simulator.world_kernel import (
 )
 
 # Rows of `local`.
-OF_A, OF_B, RATE_A, RATE_B, VALUE_A, VALUE_B, VELOCITIES, ONE = 0, 1, 2, 3, 4, 5, 6, 7
+OF_A, OF_B, RATE_A, VALUE_A, VALUE_B, VELOCITIES, ONE = 0, 1, 2, 3, 4, 5, 6
 FLATTEST = 1e-12
 """Rate below which the time of a stop has no derivative."""
 
@@ -81,13 +90,14 @@ class Adjoint(NamedTuple):
     body: np.ndarray  # [body, constant]
     shared: np.ndarray  # [parameter]
     start: np.ndarray  # [body, (state, release time)]
-    times: np.ndarray  # [time]
-    polynomial: np.ndarray  # [group, power, slot, state]
+    times: np.ndarray  # [time], or empty where nobody asks for it
+    polynomial: np.ndarray  # [body, power, state]
     state: np.ndarray  # [body, state], of the state with which the current piece begins
-    leg: np.ndarray  # [group], of the beginning of the current leg
-    loaded: np.ndarray  # [group], row of the piece whose polynomial is at hand
+    leg: np.ndarray  # [body], of the beginning of the current leg
+    loaded: np.ndarray  # [body], row of the piece whose polynomial is at hand
     stages: np.ndarray  # [stage, body, state], adjoints of the stages
     before: np.ndarray  # [body, state], of the state at which a stage or the contacts were evaluated
+    frames: np.ndarray  # [power, state], of the polynomial by the frames of one piece
     constraint: np.ndarray  # [8], of the constraint of one contact
     local: np.ndarray  # [8, 16]
 
@@ -110,9 +120,10 @@ def load_block(world, adjoint, integers, numbers, block):
     spread(world)
     moving = False
     for row in range(block, block + size):
-        group = integers[row, FIRST]
-        adjoint.loaded[group] = row
-        moving = load_states(world, group, numbers[row]) or moving
+        body = integers[row, FIRST]
+        adjoint.loaded[body] = row
+        load_state(world, body, numbers[row])
+        moving = moving or not is_still(world, body)
     load_touches(world, integers, numbers, block + size, touches)
     if moving:
         match_velocities(world, cluster)
@@ -123,19 +134,13 @@ def load_block(world, adjoint, integers, numbers, block):
 
 
 @compiled
-def load_states(world, group, numbers):
-    """States and phases with which a recorded piece begins; returns whether a body moves."""
-    moving = False
-    for slot in range(GROUP_SIZE):
-        phase = world.phase[group * GROUP_SIZE + slot]
-        at = 2 + slot * (STATE_SIZE + PHASE_SIZE)
-        for c in range(STATE_SIZE):
-            world.polynomial[group, 0, slot, c] = numbers[at + c]
-        for c in range(PHASE_SIZE):
-            phase[c] = numbers[at + STATE_SIZE + c]
-        moving = moving or phase[MOVING] != RESTING or phase[SPIN_SENSE] != 0.0
-    hold(world, group, numbers[TIME])
-    return moving
+def load_state(world, body, numbers):
+    """State and phase with which a recorded piece begins."""
+    for c in range(STATE_SIZE):
+        world.polynomial[body, 0, c] = numbers[2 + c]
+    for c in range(PHASE_SIZE):
+        world.phase[body, c] = numbers[2 + STATE_SIZE + c]
+    hold(world, body, numbers[TIME])
 
 
 @compiled
@@ -151,103 +156,140 @@ def load_touches(world, integers, numbers, begin, count):
 
 
 @compiled
-def read_frames(world, adjoint, group, begin, end, times, states_bar):
+def read_frames(world, adjoint, body, begin, end, times, trajectory_bar, velocity_bar):
     """Adjoint of the frames that a piece shows."""
-    rate = adjoint.local[RATE_A]
+    if begin == end or world.phase[body, ALIVE] == 0.0 or world.kind[body, FIXED]:
+        return
+    clear(adjoint.frames)
     for frame in range(begin, end):
-        share = share_of(world, group, times[frame])
-        for slot in range(GROUP_SIZE):
-            body = group * GROUP_SIZE + slot
-            if world.phase[body, ALIVE] != 0.0 and not world.kind[body, FIXED]:
-                bar = states_bar[frame, body]
-                evaluate_rate(world.polynomial[group], slot, share, world.clock[group, LENGTH], rate)
-                shift = read(adjoint, group, slot, share, bar, rate)
-                adjoint.times[frame] += shift
-                adjoint.leg[group] -= shift
+        share, factor = share_of(world, body, times[frame]), 1.0
+        for power in range(DENSE.shape[0]):
+            for c in range(3):
+                adjoint.frames[power, c] += factor * trajectory_bar[frame, body, c]
+                if velocity_bar.shape[0] > 0:
+                    adjoint.frames[power, 3 + c] += factor * velocity_bar[frame, body, c]
+            factor *= share
+    # What is read at fixed times changes against the rate of the motion when the leg begins later.
+    polynomial, total = world.polynomial[body], 0.0
+    for power in range(DENSE.shape[0]):
+        for c in range(6):
+            adjoint.polynomial[body, power, c] += adjoint.frames[power, c]
+            if power > 0:
+                total += power * polynomial[power, c] * adjoint.frames[power - 1, c]
+    adjoint.leg[body] -= total / world.clock[body, LENGTH]
+    if adjoint.times.shape[0] > 0:
+        read_times(world, adjoint, body, begin, end, times, trajectory_bar, velocity_bar)
 
 
 @compiled
-def read(adjoint, group, slot, share, bar, rate):
-    """Adjoint of a state that was read from a piece; returns its product with the rate of the state."""
-    shift = 0.0
-    for c in range(STATE_SIZE):
-        shift += bar[c] * rate[c]
+def read_times(world, adjoint, body, begin, end, times, trajectory_bar, velocity_bar):
+    """Adjoint of the times of the frames that a piece shows."""
+    rate = adjoint.local[RATE_A]
+    for frame in range(begin, end):
+        evaluate_rate(world.polynomial[body], share_of(world, body, times[frame]), world.clock[body, LENGTH], rate)
+        for c in range(3):
+            adjoint.times[frame] += trajectory_bar[frame, body, c] * rate[c]
+            if velocity_bar.shape[0] > 0:
+                adjoint.times[frame] += velocity_bar[frame, body, c] * rate[3 + c]
+
+
+@compiled
+def clear(values):
+    """Set the numbers of a matrix to 0."""
+    for row in range(values.shape[0]):
+        for c in range(values.shape[1]):
+            values[row, c] = 0.0
+
+
+@compiled
+def read(adjoint, body, share, bar):
+    """Adjoint of a state that was read from a piece."""
     factor = 1.0
     for power in range(DENSE.shape[0]):
-        out = adjoint.polynomial[group, power, slot]
         for c in range(STATE_SIZE):
-            out[c] += factor * bar[c]
+            adjoint.polynomial[body, power, c] += factor * bar[c]
         factor *= share
-    return shift
 
 
 @compiled
 def reverse_step(world, adjoint, cluster, t, h):
-    """Adjoints of the states with which the pieces of a cluster begin, from those of their polynomials."""
+    """Adjoints of the states with which the loaded pieces of a cluster begin, from those of their polynomials."""
     for place in range(world.members[cluster, 0]):
-        reverse_polynomial(adjoint, world.members[cluster, 1 + place], h)
+        body = world.members[cluster, 1 + place]
+        dense_output_vjp(adjoint.polynomial[body], body, h, adjoint.stages)
+        for c in range(STATE_SIZE):
+            adjoint.state[body, c] = adjoint.polynomial[body, 0, c]
     pressing = presses(world, cluster)
-    compute_stages(world, cluster, t, h, PARTS_OF_STEP[0], PARTS_OF_STEP[3])
     for stage in range(STAGES - 1, -1, -1):
         stage_states(world, cluster, stage, h)
+        time = t + NODES[stage] * h
         if pressing:
             # Computes the forces of this stage again.
-            cluster_derivatives(world, cluster, t + NODES[stage] * h, world.stages[stage])
+            cluster_derivatives(world, cluster, time, world.stages[stage])
         for place in range(world.members[cluster, 0]):
-            group = world.members[cluster, 1 + place]
-            for body in range(group * GROUP_SIZE, (group + 1) * GROUP_SIZE):
-                for c in range(STATE_SIZE):
-                    adjoint.before[body, c] = 0.0
+            body = world.members[cluster, 1 + place]
+            for c in range(STATE_SIZE):
+                adjoint.before[body, c] = 0.0
         if pressing:
             bars = adjoint.stages[stage]
             constrain_vjp(world, adjoint, cluster, world.stages[stage], bars, adjoint.before, 1.0)
+        if COUPLED:
+            pair_forces_vjp(world, adjoint, cluster, time, adjoint.stages[stage])
         for place in range(world.members[cluster, 0]):
-            reverse_stage(world, adjoint, world.members[cluster, 1 + place], t, h, stage)
+            reverse_stage(world, adjoint, world.members[cluster, 1 + place], time, h, stage)
 
 
 @compiled
-def reverse_polynomial(adjoint, group, h):
-    """Adjoints of the stages of a group's step from that of its polynomial."""
-    for slot in range(GROUP_SIZE):
-        body = group * GROUP_SIZE + slot
-        for c in range(STATE_SIZE):
-            adjoint.state[body, c] = adjoint.polynomial[group, 0, slot, c]
-        for stage in range(STAGES):
-            out = adjoint.stages[stage, body]
-            for c in range(STATE_SIZE):
-                out[c] = 0.0
-            for power in range(1, DENSE.shape[0]):
-                weight = h * DENSE[power, stage]
-                if weight != 0.0:
-                    for c in range(STATE_SIZE):
-                        out[c] += weight * adjoint.polynomial[group, power, slot, c]
-
-
-@compiled
-def reverse_stage(world, adjoint, group, t, h, stage):
-    """Pass the adjoint of a group's derivative in one stage on to the earlier ones and to the beginning."""
-    for body in range(group * GROUP_SIZE, (group + 1) * GROUP_SIZE):
-        phase, before = world.phase[body], adjoint.before[body]
-        if phase[MOVING] != RESTING or phase[SPIN_SENSE] != 0.0:
-            motion_vjp(
-                t + NODES[stage] * h,
-                world.stages[WORK, body],
-                phase,
-                world.body[body],
+def pair_forces_vjp(world, adjoint, cluster, t, bars):
+    """Pass the adjoints of the accelerations by forces between bodies on to their states and constants."""
+    force, bar, work = world.force[0], world.force[1], world.stages[WORK]
+    for place in range(world.members[cluster, 0]):
+        a = world.members[cluster, 1 + place]
+        for later in range(place + 1, world.members[cluster, 0]):
+            b = world.members[cluster, 1 + later]
+            pair_force_of(world, a, b, t, force)
+            for c in range(2):
+                of_a, of_b = mobility(world, a, c, 1.0) * bars[a, 3 + c], mobility(world, b, c, 1.0) * bars[b, 3 + c]
+                bar[c] = of_a - of_b
+                adjoint.body[a, INVERSE_MASS] += force[c] * of_a / world.body[a, INVERSE_MASS]
+                adjoint.body[b, INVERSE_MASS] -= force[c] * of_b / world.body[b, INVERSE_MASS]
+            pair_force_vjp(
+                t,
+                work[a],
+                work[b],
+                world.body[a],
+                world.body[b],
                 world.shared,
-                adjoint.stages[stage, body],
-                before,
-                adjoint.body[body],
+                bar,
+                adjoint.before[a],
+                adjoint.before[b],
+                adjoint.body[a],
+                adjoint.body[b],
                 adjoint.shared,
-                adjoint.leg[group : group + 1],
+                adjoint.leg[a : a + 1],
             )
-        for c in range(STATE_SIZE):
-            adjoint.state[body, c] += before[c]
-        for earlier in range(stage):
-            weight = h * WEIGHTS[stage, earlier]
-            if weight != 0.0:
-                for c in range(STATE_SIZE):
-                    adjoint.stages[earlier, body, c] += weight * before[c]
+
+
+@compiled
+def reverse_stage(world, adjoint, body, t, h, stage):
+    """Pass the adjoint of a body's derivative in one stage on to the earlier ones and to the beginning."""
+    before = adjoint.before[body]
+    if not is_still(world, body):
+        motion_vjp(
+            t,
+            world.stages[WORK, body],
+            world.phase[body],
+            world.body[body],
+            world.shared,
+            adjoint.stages[stage, body],
+            before,
+            adjoint.body[body],
+            adjoint.shared,
+            adjoint.leg[body : body + 1],
+        )
+    for c in range(STATE_SIZE):
+        adjoint.state[body, c] += before[c]
+    stage_state_vjp(before, adjoint.stages, body, stage, h)
 
 
 @compiled
@@ -258,9 +300,7 @@ def reverse_pieces(world, adjoint, integers, numbers, block):
         load_block(world, adjoint, integers, numbers, block)
     moving = False
     for place in range(world.members[cluster, 0]):
-        group = world.members[cluster, 1 + place]
-        for body in range(group * GROUP_SIZE, (group + 1) * GROUP_SIZE):
-            moving = moving or world.phase[body, MOVING] != RESTING or world.phase[body, SPIN_SENSE] != 0.0
+        moving = moving or not is_still(world, world.members[cluster, 1 + place])
     if moving:
         reverse_step(world, adjoint, cluster, world.clock[cluster, ORIGIN], world.clock[cluster, LENGTH])
         reverse_match(world, adjoint, numbers, block, cluster)
@@ -274,12 +314,10 @@ def reverse_match(world, adjoint, numbers, block, cluster):
     if not presses(world, cluster):
         return
     for place in range(world.members[cluster, 0]):
-        load_states(world, world.members[cluster, 1 + place], numbers[block + place])
+        load_state(world, world.members[cluster, 1 + place], numbers[block + place])
         adjoint.loaded[world.members[cluster, 1 + place]] = -1
     match_velocities(world, cluster)
-    for body in range(adjoint.before.shape[0]):
-        for c in range(STATE_SIZE):
-            adjoint.before[body, c] = 0.0
+    clear(adjoint.before)
     constrain_vjp(world, adjoint, cluster, world.stages[WORK], adjoint.state, adjoint.before, 0.0)
     for body in range(adjoint.before.shape[0]):
         for c in range(STATE_SIZE):
@@ -287,20 +325,29 @@ def reverse_match(world, adjoint, numbers, block, cluster):
 
 
 @compiled
-def reverse_beginning(world, adjoint, group, moving):
+def reverse_beginning(world, adjoint, body, moving):
     """The adjoint of a piece is read; a resting body was set to rest, whatever small velocity it came with."""
-    for slot in range(GROUP_SIZE):
-        phase = world.phase[group * GROUP_SIZE + slot]
-        bar = adjoint.state[group * GROUP_SIZE + slot]
-        for c in range(STATE_SIZE):
-            if not moving:
-                bar[c] = adjoint.polynomial[group, 0, slot, c]
-            for power in range(DENSE.shape[0]):
-                adjoint.polynomial[group, power, slot, c] = 0.0
-        if phase[MOVING] == RESTING:
-            bar[3], bar[4] = 0.0, 0.0
-        if phase[SPIN_SENSE] == 0.0:
-            bar[5] = 0.0
+    phase, bar = world.phase[body], adjoint.state[body]
+    for c in range(STATE_SIZE):
+        if not moving:
+            bar[c] = adjoint.polynomial[body, 0, c]
+    clear(adjoint.polynomial[body])
+    if phase[MOVING] == RESTING:
+        bar[3], bar[4] = 0.0, 0.0
+    if phase[SPIN_SENSE] == 0.0:
+        bar[5] = 0.0
+
+
+@compiled
+def fold(world, adjoint, cluster):
+    """While a body does not slip, its rolling velocity is its velocity; so are their adjoints before an event."""
+    if SLIPS:
+        for place in range(world.members[cluster, 0]):
+            body = world.members[cluster, 1 + place]
+            bar = adjoint.state[body]
+            if world.phase[body, MOVING] != SLIPPING:
+                bar[3], bar[4] = bar[3] + bar[6], bar[4] + bar[7]
+                bar[6], bar[7] = 0.0, 0.0
 
 
 @compiled
@@ -309,38 +356,39 @@ def shift_of(world, adjoint, cluster, t):
 
     The latter is the product of their adjoints with the rates before the event, of all bodies of a cluster.
     """
+    fold(world, adjoint, cluster)
     total = 0.0
-    rate = adjoint.local[RATE_A]
     for place in range(world.members[cluster, 0]):
-        group = world.members[cluster, 1 + place]
-        share = share_of(world, group, t)
-        total += adjoint.leg[group]
-        for slot in range(GROUP_SIZE):
-            evaluate_rate(world.polynomial[group], slot, share, world.clock[group, LENGTH], rate)
-            for c in range(STATE_SIZE):
-                total += adjoint.state[group * GROUP_SIZE + slot, c] * rate[c]
+        body = world.members[cluster, 1 + place]
+        total += adjoint.leg[body] + product(world, adjoint, body, adjoint.state[body], t)
+    return total
+
+
+@compiled
+def product(world, adjoint, body, bar, t):
+    """Product of the adjoint of a body's state with its rate before an event, which is left in `local`."""
+    rate, total = adjoint.local[RATE_A], 0.0
+    evaluate_rate(world.polynomial[body], share_of(world, body, t), world.clock[body, LENGTH], rate)
+    for c in range(STATE_SIZE):
+        total += bar[c] * rate[c]
     return total
 
 
 @compiled
 def end_legs(world, adjoint, cluster, t):
     """Read the states before an event from the pieces that it ended; the legs before it are the current ones then."""
-    rate = adjoint.local[RATE_A]
+    fold(world, adjoint, cluster)
     for place in range(world.members[cluster, 0]):
-        group = world.members[cluster, 1 + place]
-        share = share_of(world, group, t)
-        adjoint.leg[group] = 0.0
-        for slot in range(GROUP_SIZE):
-            evaluate_rate(world.polynomial[group], slot, share, world.clock[group, LENGTH], rate)
-            adjoint.leg[group] -= read(adjoint, group, slot, share, adjoint.state[group * GROUP_SIZE + slot], rate)
+        body = world.members[cluster, 1 + place]
+        bar = adjoint.state[body]
+        adjoint.leg[body] = -product(world, adjoint, body, bar, t)
+        read(adjoint, body, share_of(world, body, t), bar)
 
 
 @compiled
 def continue_legs(world, adjoint, cluster, t):
     """Read the states in which pieces go on from those before, within a leg."""
+    fold(world, adjoint, cluster)
     for place in range(world.members[cluster, 0]):
-        group = world.members[cluster, 1 + place]
-        share = share_of(world, group, t)
-        for slot in range(GROUP_SIZE):
-            rate = adjoint.local[RATE_A]
-            read(adjoint, group, slot, share, adjoint.state[group * GROUP_SIZE + slot], rate)
+        body = world.members[cluster, 1 + place]
+        read(adjoint, body, share_of(world, body, t), adjoint.state[body])

@@ -10,7 +10,7 @@ from numba import njit
 from vrdp_prob.models.simulator.adjoint_events_kernel import reverse_world
 from vrdp_prob.models.simulator.adjoint_kernel import Adjoint
 from vrdp_prob.models.simulator.detection_kernel import new_pairs
-from vrdp_prob.models.simulator.laws_kernel import GROUP_SIZE, STATE_SIZE, allocating, compiled
+from vrdp_prob.models.simulator.laws_kernel import STATE_SIZE, allocating, compiled
 from vrdp_prob.models.simulator.rollout_kernel import NOT_FINITE, TAPE_FULL, rollout_world
 from vrdp_prob.models.simulator.tableau import DENSE
 from vrdp_prob.models.simulator.tape_kernel import INTEGERS, NUMBERS, ROWS, Tape
@@ -50,13 +50,19 @@ def copy_rows(integers, numbers, begin, from_integers, from_numbers, rows):
             numbers[begin + row, c] = from_numbers[row, c]
 
 
+@compiled
+def row_of(values, index):
+    """Row of an array with one row for each world, or with one for all (or none)."""
+    return min(index, max(values.shape[0] - 1, 0))
+
+
 @njit(nogil=True, error_model="numpy", cache=True)
-def rollout_batch(kinds, bodies, shared, start, times, event_limit, states, outcomes):
-    """Simulate worlds into `states` and `outcomes`; returns the joined tapes and the first row of each world.
+def rollout_batch(kinds, bodies, shared, start, times, event_limit, trajectory, velocity, outcomes):
+    """Simulate worlds into the last three arrays; returns the joined tapes and the first row of each world.
 
     Arrays: `kinds` [world, body, (shape, fixed, present)], `bodies` [world, body, constant], `shared` [world,
-    parameter], `start` [world, body, (state, release time)], `times` [time] in s, `states` [world, time, body, state],
-    `outcomes` [world].
+    parameter], `start` [world, body, (state, release time)], `times` [world or 1, time] in s, `trajectory` and
+    `velocity` [world, time, shown body, 3], `outcomes` [world].
     """
     worlds, count = kinds.shape[0], kinds.shape[1]
     capacity = 256 + 64 * count
@@ -64,24 +70,22 @@ def rollout_batch(kinds, bodies, shared, start, times, event_limit, states, outc
     first_row = np.zeros(worlds + 1, np.int64)
     pairs = new_pairs(count)
     row_integers, row_numbers = np.zeros((capacity, INTEGERS), np.int64), np.zeros((capacity, NUMBERS))
-    counts, place, local = np.zeros(2, np.int64), np.zeros((count, 2), np.int64), np.zeros((3, 16))
+    counts, place, local = np.zeros(2, np.int64), np.zeros((count, 2), np.int64), np.zeros((4, 16))
     for index in range(worlds):
         world = new_world(kinds[index], bodies[index], shared[index], start[index])
-        tape = Tape(row_integers, row_numbers, counts, place, times, states[index], local)
+        of_world = times[row_of(times, index)], trajectory[index], velocity[index], local
+        tape = Tape(row_integers, row_numbers, counts, place, *of_world)
         if is_finite(bodies[index]) and is_finite(shared[index]) and is_finite(start[index]):
             outcomes[index] = rollout_world(world, pairs, tape, event_limit)
             while outcomes[index] == TAPE_FULL:
                 capacity = 2 * capacity
                 row_integers, row_numbers = np.zeros((capacity, INTEGERS), np.int64), np.zeros((capacity, NUMBERS))
-                tape = Tape(row_integers, row_numbers, counts, place, times, states[index], local)
+                tape = Tape(row_integers, row_numbers, counts, place, *of_world)
                 outcomes[index] = rollout_world(world, pairs, tape, event_limit)
         else:
             outcomes[index] = NOT_FINITE
             counts[ROWS] = 0
-            for frame in range(times.shape[0]):
-                for body in range(count):
-                    for c in range(STATE_SIZE):
-                        states[index, frame, body, c] = 0.0
+            trajectory[index], velocity[index] = 0.0, 0.0
         integers, numbers = joined(integers, numbers, first_row, index, tape)
     return integers[: first_row[-1]], numbers[: first_row[-1]], first_row
 
@@ -97,19 +101,22 @@ def reverse_batch(
     integers,
     numbers,
     first_row,
-    states_bar,
+    trajectory_bar,
+    velocity_bar,
     bodies_bar,
     shared_bar,
     start_bar,
     times_bar,
 ):
-    """Add the derivative of `states` times `states_bar` to the arrays ending in `_bar` (axes as in `rollout_batch`)."""
+    """Add the derivative to the last four arrays, from the adjoints of trajectory and velocity.
+
+    Axes are as in `rollout_batch`; `velocity_bar` and `times_bar` may have no frames where nobody needs them.
+    """
     count = kinds.shape[1]
-    groups = count // GROUP_SIZE
-    polynomial = np.zeros((groups, DENSE.shape[0], GROUP_SIZE, STATE_SIZE))
-    state, leg, loaded = np.zeros((count, STATE_SIZE)), np.zeros(groups), np.zeros(groups, np.int64)
+    polynomial, frames = np.zeros((count, DENSE.shape[0], STATE_SIZE)), np.zeros((DENSE.shape[0], STATE_SIZE))
+    state, leg, loaded = np.zeros((count, STATE_SIZE)), np.zeros(count), np.zeros(count, np.int64)
     stages, before = np.zeros((STAGES, count, STATE_SIZE)), np.zeros((count, STATE_SIZE))
-    constraint, local = np.zeros(8), np.zeros((8, 16))
+    constraint, local = np.zeros(8), np.zeros((7, 16))
     for index in range(kinds.shape[0]):
         if outcomes[index] == NOT_FINITE:
             continue
@@ -118,15 +125,17 @@ def reverse_batch(
             bodies_bar[index],
             shared_bar[index],
             start_bar[index],
-            times_bar,
+            times_bar[row_of(times_bar, index)],
             polynomial,
             state,
             leg,
             loaded,
             stages,
             before,
+            frames,
             constraint,
             local,
         )
         rows = slice(first_row[index], first_row[index + 1])
-        reverse_world(world, adjoint, integers[rows], numbers[rows], times, states_bar[index])
+        bars = trajectory_bar[index], velocity_bar[row_of(velocity_bar, index)]
+        reverse_world(world, adjoint, integers[rows], numbers[rows], times[row_of(times, index)], *bars)

@@ -1,4 +1,4 @@
-"""Compiled clusters: bodies that press on each other, and the forces that keep them in touch.
+"""Compiled clusters: bodies that press on each other (or attract each other), and the forces that keep them in touch.
 
 A lasting contact keeps its gap: the gap's second time derivative `J a + d` is 0, where `J` is the gradient of the gap
 by the positions of its two bodies, `a` their accelerations and `d` what the velocities alone contribute. The forces are
@@ -14,15 +14,25 @@ Source: D. Baraff, Fast contact force computation for nonpenetrating rigid bodie
 
 import math
 
-from vrdp_prob.models.simulator.laws_kernel import GROUP_SIZE, compiled, constraint_law, constraint_law_vjp
-from vrdp_prob.models.simulator.world_kernel import FIXED, MOVING, RESTING, SPIN_SENSE, WORK
+from vrdp_prob.models.simulator.laws_kernel import COUPLED, SLIPS, compiled, constraint_law, constraint_law_vjp
+from vrdp_prob.models.simulator.motion import ROLLING_SHARE
+from vrdp_prob.models.simulator.world_kernel import (
+    FIXED,
+    INVERSE_INERTIA,
+    INVERSE_MASS,
+    IS_SPHERE,
+    MOVING,
+    RESTING,
+    SLIPPING,
+    SPIN_SENSE,
+    WORK,
+)
 
 # Columns of `touching`. A contact has 7 numbers of features, as in a contact's law.
 TOUCH_A, TOUCH_B, TOUCH_KIND, TOUCH_FEATURE, HOLD, FORCE, GRADIENT, QUADRATIC, ROOM = 0, 1, 2, 3, 10, 11, 12, 18, 19
 ROOM_RATE = 20
 # How a contact holds: not any more; between bodies at rest; its velocities were matched only; it presses.
 PARTED, LEANS, MATCHES, PRESSES = 0.0, 1.0, 2.0, 3.0
-INVERSE_MASS, INVERSE_INERTIA = 1, 2
 RIDGE = 1e-10
 """Share by which the diagonal of the equations is raised, so that contacts which hold the same can share a force."""
 
@@ -41,8 +51,8 @@ def set_touch_count(world, count):
 
 @compiled
 def cluster_of(world, body):
-    """Cluster of a body, named by its first group."""
-    return world.members[body // GROUP_SIZE, 1]
+    """Cluster of a body, named by its first body."""
+    return world.members[body, 1]
 
 
 @compiled
@@ -62,76 +72,88 @@ def presses(world, cluster):
 
 
 @compiled
-def join(world, group, other):
-    """Make one cluster of the clusters of two groups; returns its name."""
-    first, second = world.members[group, 1], world.members[other, 1]
-    groups = world.clock.shape[0]
-    world.members[groups + 1, 0] = 0
-    for member in range(groups):
-        if world.members[member, 1] == first or world.members[member, 1] == second:
+def join(world, body, other):
+    """Make one cluster of the clusters of two bodies; returns its name."""
+    first, second = cluster_of(world, body), cluster_of(world, other)
+    count = world.clock.shape[0]
+    world.members[count + 1, 0] = 0
+    for member in range(count):
+        if cluster_of(world, member) in (first, second):
             note_member(world, member)
     spread(world)
-    return world.members[groups, 1]
+    return world.members[count, 1]
 
 
 @compiled
-def note_member(world, group):
-    """Append a group to the list in the row behind all groups, whose length stands in the row after it."""
-    groups = world.clock.shape[0]
-    size = world.members[groups + 1, 0] + 1
-    world.members[groups, size] = group
-    world.members[groups + 1, 0] = size
+def note_member(world, body):
+    """Append a body to the list in the row behind all bodies, whose length stands in the row after it."""
+    count = world.clock.shape[0]
+    size = world.members[count + 1, 0] + 1
+    world.members[count, size] = body
+    world.members[count + 1, 0] = size
 
 
 @compiled
 def spread(world):
-    """Give the noted list of groups to all of them."""
-    groups = world.clock.shape[0]
-    size = world.members[groups + 1, 0]
+    """Give the noted list of bodies to all of them."""
+    count = world.clock.shape[0]
+    size = world.members[count + 1, 0]
     for place in range(size):
-        row = world.members[world.members[groups, 1 + place]]
+        row = world.members[world.members[count, 1 + place]]
         row[0] = size
         for other in range(size):
-            row[1 + other] = world.members[groups, 1 + other]
+            row[1 + other] = world.members[count, 1 + other]
 
 
 @compiled
 def split(world, cluster):
     """Split a cluster into what its lasting contacts connect.
 
-    The last row gets the new cluster of each group, or -1 for a group that was not in the old one.
+    The last row gets the new cluster of each body, or -1 for a body that was not in the old one.
     """
-    groups = world.clock.shape[0]
-    labels = world.members[groups + 1]
-    for group in range(groups):
-        labels[1 + group] = group if world.members[group, 1] == cluster else -1
-    changed = True
+    count = world.clock.shape[0]
+    labels = world.members[count + 1]
+    for body in range(count):
+        inside = cluster_of(world, body) == cluster
+        labels[1 + body] = (cluster if COUPLED else body) if inside else -1
+    changed = not COUPLED
     while changed:
         changed = False
         for touch in range(touch_count(world)):
             a, b = int(world.touching[touch, TOUCH_A]), int(world.touching[touch, TOUCH_B])
             if world.kind[a, FIXED] or world.kind[b, FIXED] or cluster_of_touch(world, touch) != cluster:
                 continue
-            first, second = 1 + a // GROUP_SIZE, 1 + b // GROUP_SIZE
-            if labels[first] != labels[second]:
-                labels[first] = labels[second] = min(labels[first], labels[second])
+            if labels[1 + a] != labels[1 + b]:
+                labels[1 + a] = labels[1 + b] = min(labels[1 + a], labels[1 + b])
                 changed = True
-    for group in range(groups):
-        if labels[1 + group] == group:
+    for body in range(count):
+        if labels[1 + body] == body:
             labels[0] = 0
-            for member in range(groups):
-                if labels[1 + member] == group:
+            for member in range(count):
+                if labels[1 + member] == body:
                     note_member(world, member)
             spread(world)
 
 
 @compiled
-def mobility(world, body, c):
-    """Change of a velocity (vx, vy, spin) per impulse: 0 for what is fixed or held by friction at rest."""
+def push_mobility(world, body):
+    """Acceleration of a body per force; a sphere that may slip rolls along, which takes part of the force."""
+    rolls = SLIPS and world.body[body, IS_SPHERE] != 0.0 and world.phase[body, MOVING] != SLIPPING
+    return world.body[body, INVERSE_MASS] * (ROLLING_SHARE if rolls else 1.0)
+
+
+@compiled
+def mobility(world, body, c, curved):
+    """Change of a velocity (vx, vy, spin) per impulse, or (`curved` is 1.0) of an acceleration per force.
+
+    It is 0 for what is fixed or held by friction at rest. The table's friction has no time to act during an impulse.
+    """
     phase = world.phase[body]
     if c == 2:
         return 0.0 if phase[SPIN_SENSE] == 0.0 else world.body[body, INVERSE_INERTIA]
-    return 0.0 if phase[MOVING] == RESTING else world.body[body, INVERSE_MASS]
+    if phase[MOVING] == RESTING:
+        return 0.0
+    return push_mobility(world, body) if curved != 0.0 else world.body[body, INVERSE_MASS]
 
 
 @compiled
@@ -172,7 +194,7 @@ def product_with(world, touch, values):
 
 
 @compiled
-def coupling(world, touch, other):
+def coupling(world, touch, other, curved):
     """Change of the rate of one gap per impulse in another contact (or the same)."""
     row, column = world.touching[touch], world.touching[other]
     total = 0.0
@@ -182,7 +204,7 @@ def coupling(world, touch, other):
             if int(column[TOUCH_A + other_side]) == body:
                 for c in range(3):
                     of_row, of_column = row[GRADIENT + 3 * side + c], column[GRADIENT + 3 * other_side + c]
-                    total += of_row * of_column * mobility(world, body, c)
+                    total += of_row * of_column * mobility(world, body, c, curved)
     return total
 
 
@@ -193,7 +215,7 @@ def factor(world, cluster, curved):
     for k in range(count):
         used = takes_part(world, k, cluster, curved)
         for m in range(k + 1):
-            total = coupling(world, k, m) if used and takes_part(world, m, cluster, curved) else 0.0
+            total = coupling(world, k, m, curved) if used and takes_part(world, m, cluster, curved) else 0.0
             if k == m:
                 total = total * (1.0 + RIDGE) if total > 0.0 else 1.0
             for n in range(m):
@@ -236,7 +258,7 @@ def constrain(world, cluster, values, curved):
             for side in range(2):
                 body = int(row[TOUCH_A + side])
                 for c in range(3):
-                    values[body, 3 + c] += mobility(world, body, c) * row[GRADIENT + 3 * side + c] * row[FORCE]
+                    values[body, 3 + c] += mobility(world, body, c, curved) * row[GRADIENT + 3 * side + c] * row[FORCE]
 
 
 @compiled
@@ -256,7 +278,7 @@ def constrain_vjp(world, adjoint, cluster, values, bars, before, curved):
                 body = int(row[TOUCH_A + side])
                 for c in range(3):
                     gradient = row[GRADIENT + 3 * side + c]
-                    matrix[touch, last] += gradient * mobility(world, body, c) * bars[body, 3 + c]
+                    matrix[touch, last] += gradient * mobility(world, body, c, curved) * bars[body, 3 + c]
     substitute(matrix, count)
     for touch in range(count):
         if takes_part(world, touch, cluster, curved):
@@ -277,11 +299,11 @@ def constraint_bars(world, adjoint, touch, values, bars, before, of_right, curve
     for side in range(2):
         body = a if side == 0 else b
         for c in range(3):
-            pull = mobility(world, body, c) * bars[body, 3 + c]
+            pull = mobility(world, body, c, curved) * bars[body, 3 + c]
             bar[3 * side + c] = row[FORCE] * pull + of_right * values[body, 3 + c]
             if pull != 0.0:
                 which = INVERSE_INERTIA if c == 2 else INVERSE_MASS
-                adjoint.body[body, which] += bars[body, 3 + c] * row[GRADIENT + 3 * side + c] * row[FORCE]
+                adjoint.body[body, which] += pull / world.body[body, which] * row[GRADIENT + 3 * side + c] * row[FORCE]
     bar[6] = of_right * curved
     bar[7] = 0.0
     constraint_bar_states(world, adjoint, touch, before)

@@ -17,7 +17,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vrdp_prob.models.simulator.laws_kernel import GROUP_SIZE, allocating, compiled
+from vrdp_prob.models.simulator.laws_kernel import allocating, compiled
 from vrdp_prob.models.simulator.world_kernel import LENGTH, share_of
 
 TOUCHING = 1e-12
@@ -67,11 +67,11 @@ def set_look(pairs, gap, rate, curvature):
 
 
 @compiled
-def restrict(polynomial, slot, c, offset, scale, sign, work, out):
+def restrict(polynomial, c, offset, scale, sign, work, out):
     """Add `sign` times a coordinate, as a polynomial of `s` with share = offset + scale * s, to `out`."""
     degree = polynomial.shape[0] - 1
     for power in range(degree + 1):
-        work[power] = polynomial[power, slot, c]
+        work[power] = polynomial[power, c]
     if offset != 0.0:
         for low in range(degree):
             for power in range(degree - 1, low - 1, -1):
@@ -85,10 +85,8 @@ def restrict(polynomial, slot, c, offset, scale, sign, work, out):
 @compiled
 def add_path(world, body, t, duration, sign, c, work, out):
     """Add a coordinate of a body on [t, t + duration], as a polynomial of the share of `duration`, to `out`."""
-    group = body // GROUP_SIZE
-    slot = body - group * GROUP_SIZE
-    scale = duration / world.clock[group, LENGTH]
-    restrict(world.polynomial[group], slot, c, share_of(world, group, t), scale, sign, work, out)
+    scale = duration / world.clock[body, LENGTH]
+    restrict(world.polynomial[body], c, share_of(world, body, t), scale, sign, work, out)
 
 
 @compiled

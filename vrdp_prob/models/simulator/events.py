@@ -14,7 +14,13 @@ class RolloutEventKind(IntEnum):
     COLLISION = 0
     WALL = 1
     STOP = 2
+    """A body comes to rest, or a sphere begins to roll."""
     SPIN_STOP = 3
+    OBSTACLE = 4
+    """A contact with an obstacle that an effect adds."""
+    KICK = 5
+    CROSSING = 6
+    """A body crosses the boundary of an effect."""
 
 
 class Tapes(NamedTuple):
@@ -25,7 +31,7 @@ class Tapes(NamedTuple):
     first_row: Int[np.ndarray, "world_and_one"]
 
 
-_STOP, _SPIN_STOP, _CONTACT = 3, 4, 5
+_STOP, _SPIN_STOP, _CONTACT, _KICK, _CROSS = 3, 4, 5, 8, 9
 
 
 @dataclass(frozen=True)
@@ -41,15 +47,16 @@ class EventTable:
     kind
         A `RolloutEventKind`.
     first, second
-        Bodies that take part (`first` < `second`); for a wall `second` is the wall's number, for a stop it is -1.
+        Bodies that take part (`first` < `second`); for a wall or an obstacle `second` is its number, for a kick or a
+        crossing that of the effect among those that have one, for a stop it is -1.
     point
-        Touching point in m (0 for a stop).
+        Touching point in m (0 without contact).
     normal
-        Unit vector from the first to the second (0 for a stop).
+        Unit vector from the first to the second (0 without contact).
     impulse
-        Impulse along the normal in kg m/s (0 for a stop).
+        Impulse along the normal in kg m/s (0 without contact).
     closing_speed
-        Speed in m/s at which the touching points approached each other (0 for a stop).
+        Speed in m/s at which the touching points approached each other (0 without contact).
     """
 
     world: Int[np.ndarray, "event"]
@@ -78,19 +85,27 @@ class EventTable:
         return EventTable(*(getattr(self, name)[keep] for name in self.__dataclass_fields__))
 
     @classmethod
-    def of(cls, tapes: Tapes, body_count: int) -> "EventTable":
-        """The events that the kernel recorded; bodies from `body_count` on are walls."""
+    def of(cls, tapes: Tapes, body_count: int, wall_count: int) -> "EventTable":
+        """The events that the kernel recorded; bodies from `body_count` on are walls, then obstacles."""
         kinds = tapes.integers[:, 0]
-        rows = np.flatnonzero(np.isin(kinds, (_STOP, _SPIN_STOP, _CONTACT)))
+        rows = np.flatnonzero(np.isin(kinds, (_STOP, _SPIN_STOP, _CONTACT, _KICK, _CROSS)))
         kinds, numbers = kinds[rows], tapes.numbers[rows]
         contact = kinds == _CONTACT
         first, second = tapes.integers[rows, 1], tapes.integers[rows, 2]
         swap = contact & (first > second)
         first, second = np.where(swap, second, first), np.where(swap, first, second)
-        wall = contact & (second >= body_count)
+        obstacle = contact & (second >= body_count + wall_count)
+        wall = contact & (second >= body_count) & ~obstacle
         kind = np.select(
-            [wall, contact, kinds == _STOP],
-            [RolloutEventKind.WALL, RolloutEventKind.COLLISION, RolloutEventKind.STOP],
+            [obstacle, wall, contact, kinds == _STOP, kinds == _KICK, kinds == _CROSS],
+            [
+                RolloutEventKind.OBSTACLE,
+                RolloutEventKind.WALL,
+                RolloutEventKind.COLLISION,
+                RolloutEventKind.STOP,
+                RolloutEventKind.KICK,
+                RolloutEventKind.CROSSING,
+            ],
             RolloutEventKind.SPIN_STOP,
         )
         numbers = np.where(contact[:, None], numbers, np.eye(1, numbers.shape[1]) * numbers)
@@ -99,7 +114,7 @@ class EventTable:
             time=numbers[:, 0],
             kind=kind.astype(np.int64),
             first=first,
-            second=np.where(wall, second - body_count, second),
+            second=second - np.select([obstacle, wall], [body_count + wall_count, body_count], 0),
             point=numbers[:, 10:12],
             normal=np.where(swap[:, None], -1.0, 1.0) * numbers[:, 12:14],
             impulse=numbers[:, 9],

@@ -230,6 +230,11 @@ def vector_jacobian(outputs: Sequence[Scalar], bars: Sequence[Symbol], inputs: S
     return [adjoint.get(symbol.number, recorder.constant(0)) for symbol in inputs]
 
 
+def depends(outputs: Sequence[Scalar], on: Symbol) -> bool:
+    """Whether one of the outputs of a recorded law depends on an input."""
+    return any(step is on for step in _ordered(output for output in outputs if isinstance(output, Symbol)))
+
+
 def assignments(outputs: Mapping[str, Scalar], *, add: bool = False) -> list[str]:
     """Source lines that compute the outputs and assign them (or add them) to the given targets.
 

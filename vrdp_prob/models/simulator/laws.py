@@ -6,19 +6,31 @@ from dataclasses import dataclass
 from vrdp_prob.models.effects.effect import BodyView, Effect
 from vrdp_prob.models.parameters import Parameter, Scope
 from vrdp_prob.models.simulator.contact import ContactKind, Feature, contact, contact_geometry, room_on_feature
-from vrdp_prob.models.simulator.formula import Recorder, Scalar, Symbol, assignments, vector_jacobian
+from vrdp_prob.models.simulator.formula import Recorder, Scalar, Symbol, assignments, depends, vector_jacobian
 from vrdp_prob.models.simulator.mathematics import length, where
 from vrdp_prob.models.simulator.motion import (
+    SLIPPING_ABOVE,
     Phase,
     derivative,
     external_acceleration,
     friction_limit,
+    rolling_share,
+    slips,
     spin_deceleration,
 )
 
 STATE = ("x", "y", "angle", "vx", "vy", "spin")
+ROLLING = ("rolling_x", "rolling_y")
+"""Numbers of a body's state behind `STATE` in models where spheres slip."""
 CONSTANTS = ("mass", "inverse_mass", "inverse_inertia", "restitution", "radius", "is_sphere")
 """Constants of a body that every model has, in the order of the kernel's array."""
+_SIDES = 6
+"""First column of the sides in the kernel's phases."""
+
+
+def state_size(effects: Sequence[Effect]) -> int:
+    """Numbers in a body's state."""
+    return len(STATE) + (len(ROLLING) if slips(effects) else 0)
 
 
 @dataclass(frozen=True)
@@ -47,69 +59,196 @@ class Layout:
 class _Inputs:
     """Symbols for the arrays of a compiled law."""
 
-    def __init__(self, layout: Layout) -> None:
-        self.layout = layout
+    def __init__(self, effects: Sequence[Effect], layout: Layout) -> None:
+        self.effects, self.layout = effects, layout
         self.recorder = Recorder()
+        self.time = self.recorder.input("t")
         self.shared = {name: self.recorder.input(f"shared[{i}]") for i, name in enumerate(layout.shared)}
 
     def array(self, text: str, size: int) -> list[Symbol]:
         return [self.recorder.input(f"{text}[{index}]") for index in range(size)]
 
+    def state(self, text: str) -> list[Symbol]:
+        return self.array(text, state_size(self.effects))
+
+    def constants(self, text: str) -> list[Symbol]:
+        return self.array(text, len(self.layout.constants))
+
     def view(
-        self, state: Sequence[Symbol], constants: Sequence[Symbol], reference: tuple[Scalar, Scalar] | None = None
+        self, state: Sequence[Symbol], constants: Sequence[Symbol], phase: Sequence[Symbol] | None = None
     ) -> BodyView:
-        values = dict(zip(STATE, state, strict=True))
+        values = dict(zip(STATE, state[: len(STATE)], strict=True))
         speed = length(values["vx"], values["vy"])
-        if reference is not None:
-            along = values["vx"] * reference[0] + values["vy"] * reference[1]
-            speed = where(along < 0, -1.0, 1.0) * speed
+        slip = [values["vx"] - state[6], values["vy"] - state[7]] if slips(self.effects) else [0.0, 0.0]
+        slip_speed = length(*slip) if slips(self.effects) else 0.0
+        side: dict[str, Scalar] = {}
+        if phase is not None:
+            ahead = _ahead(values["vx"], values["vy"], phase)
+            if slips(self.effects):
+                slipping = phase[0] > SLIPPING_ABOVE
+                ahead = where(slipping, 1.0, ahead)
+                slip_speed = where(slipping, _ahead(*slip, phase), 1.0) * slip_speed
+            speed = ahead * speed
+            side = {effect.name: phase[_SIDES + k] for k, effect in enumerate(with_boundary(self.effects))}
         named = dict(zip(self.layout.constants, constants, strict=True))
         own = {name: named.pop(name) for name in self.layout.constants[len(CONSTANTS) :]}
-        return BodyView(**values, speed=speed, **named, parameters=own)
+        return BodyView(
+            **values,
+            speed=speed,
+            **named,
+            parameters=own,
+            slip_x=slip[0],
+            slip_y=slip[1],
+            slip_speed=slip_speed,
+            side=side,
+        )
+
+
+def _ahead(x: Scalar, y: Scalar, phase: Sequence[Symbol]) -> Scalar:
+    """1 where a vector points along the reference direction of a phase, else -1."""
+    return where(x * phase[1] + y * phase[2] < 0, -1.0, 1.0)
+
+
+def with_boundary(effects: Sequence[Effect]) -> list[Effect]:
+    """Effects with a boundary, in the order of the kernel's sides."""
+    return [effect for effect in effects if effect.overrides("boundary")]
+
+
+def with_kick(effects: Sequence[Effect]) -> list[Effect]:
+    """Effects with a kick, in the order of the kernel's kicks."""
+    return [effect for effect in effects if effect.overrides("kick")]
 
 
 def _function(name: str, arguments: str, lines: Sequence[str], ending: str = "") -> str:
     body = [*lines, ending] if ending else [*lines]
-    return "\n".join(["@compiled", f"def {name}({arguments}):", *(f"    {line}" for line in body), "\n"])
+    return "\n".join(["@compiled", f"def {name}({arguments}):", *(f"    {line}" for line in body or ["pass"]), "\n"])
 
 
 def _targets(name: str, values: Sequence[Scalar]) -> dict[str, Scalar]:
     return {f"{name}[{index}]": value for index, value in enumerate(values)}
 
 
+def _vjp_lines(
+    outputs: Sequence[Scalar], bars: Sequence[Symbol], arrays: dict[str, Sequence[Symbol]]
+) -> list[str]:
+    """Lines that add the adjoints of inputs to arrays, by the names of these."""
+    adjoints = iter(vector_jacobian(outputs, bars, [symbol for symbols in arrays.values() for symbol in symbols]))
+    targets = {target: next(adjoints) for array, symbols in arrays.items() for target in _targets(array, symbols)}
+    return assignments(targets, add=True)
+
+
 def _motion_source(effects: Sequence[Effect], layout: Layout) -> str:
-    inputs = _Inputs(layout)
-    time = inputs.recorder.input("t")
-    state, constants = inputs.array("y", len(STATE)), inputs.array("body", len(layout.constants))
-    phase = inputs.array("phase", 4)
-    body = inputs.view(state, constants, (phase[1], phase[2]))
-    outputs = derivative(effects, time, body, Phase(phase[0], phase[3]), inputs.shared)
+    inputs = _Inputs(effects, layout)
+    state, constants = inputs.state("y"), inputs.constants("body")
+    phase = inputs.array("phase", _SIDES + len(with_boundary(effects)))
+    body = inputs.view(state, constants, phase)
+    outputs = derivative(effects, inputs.time, body, Phase(phase[0], phase[3]), inputs.shared)
     arguments = "t, y, phase, body, shared"
     value = _function("motion", f"{arguments}, out", assignments(_targets("out", outputs)))
-    shared = list(inputs.shared.values())
-    adjoints = vector_jacobian(outputs, inputs.array("bar", len(STATE)), [*state, *constants, *shared, time])
-    split = len(state), len(state) + len(constants)
-    lines = assignments(
-        {
-            **_targets("y_bar", adjoints[: split[0]]),
-            **_targets("body_bar", adjoints[split[0] : split[1]]),
-            **_targets("shared_bar", adjoints[split[1] : -1]),
-            "t_bar[0]": adjoints[-1],
-        },
-        add=True,
-    )
-    return value + _function("motion_vjp", f"{arguments}, bar, y_bar, body_bar, shared_bar, t_bar", lines or ["pass"])
+    arrays = {
+        "y_bar": state,
+        "body_bar": constants,
+        "shared_bar": list(inputs.shared.values()),
+        "t_bar": [inputs.time],
+    }
+    lines = _vjp_lines(outputs, inputs.array("bar", len(state)), arrays)
+    return value + _function("motion_vjp", f"{arguments}, bar, y_bar, body_bar, shared_bar, t_bar", lines)
+
+
+def _external(effects: Sequence[Effect], inputs: _Inputs) -> list[Scalar]:
+    """Acceleration without friction of a body that does not slip, what friction holds, and the brake of its spin."""
+    phase = inputs.array("phase", _SIDES + len(with_boundary(effects)))
+    body = inputs.view(inputs.state("y"), inputs.constants("body"), phase)
+    ax, ay = external_acceleration(effects, inputs.time, body, inputs.shared)
+    share = rolling_share(effects, body)
+    limit = friction_limit(effects, inputs.time, body, inputs.shared)
+    return [share * ax, share * ay, limit, spin_deceleration(effects, inputs.time, body, inputs.shared)]
 
 
 def _external_source(effects: Sequence[Effect], layout: Layout) -> str:
-    inputs = _Inputs(layout)
-    time = inputs.recorder.input("t")
-    body = inputs.view(inputs.array("y", len(STATE)), inputs.array("body", len(layout.constants)))
-    push = external_acceleration(effects, time, body, inputs.shared)
-    limit = friction_limit(effects, time, body, inputs.shared)
-    braking = spin_deceleration(effects, time, body, inputs.shared)
-    lines = assignments(_targets("out", [*push, limit, braking]))
+    lines = assignments(_targets("out", _external(effects, _Inputs(effects, layout))))
     return _function("external", "t, y, phase, body, shared, out", lines)
+
+
+def is_timed(effects: Sequence[Effect], layout: Layout) -> bool:
+    """Whether what pushes a body at rest, or its friction, changes with time."""
+    inputs = _Inputs(effects, layout)
+    return depends(_external(effects, inputs), inputs.time) or depends(_pair_force(effects, inputs), inputs.time)
+
+
+def _pair_force(effects: Sequence[Effect], inputs: _Inputs) -> list[Scalar]:
+    a = inputs.view(inputs.state("ya"), inputs.constants("body_a"))
+    b = inputs.view(inputs.state("yb"), inputs.constants("body_b"))
+    total: list[Scalar] = [0.0, 0.0]
+    for effect in effects:
+        force = effect.pair_force(inputs.time, a, b, inputs.shared)
+        total = [total[0] + force[0], total[1] + force[1]]
+    return total
+
+
+def _pair_source(effects: Sequence[Effect], layout: Layout) -> str:
+    inputs = _Inputs(effects, layout)
+    force = _pair_force(effects, inputs)
+    arguments = "t, ya, yb, body_a, body_b, shared"
+    value = _function("pair_force", f"{arguments}, out", assignments(_targets("out", force)))
+    arrays = {
+        "ya_bar": inputs.state("ya"),
+        "yb_bar": inputs.state("yb"),
+        "body_a_bar": inputs.constants("body_a"),
+        "body_b_bar": inputs.constants("body_b"),
+        "shared_bar": list(inputs.shared.values()),
+        "t_bar": [inputs.time],
+    }
+    lines = _vjp_lines(force, inputs.array("bar", 2), arrays)
+    return value + _function("pair_force_vjp", f"{arguments}, bar, {', '.join(arrays)}", lines)
+
+
+def _by_number(name: str, arguments: str, blocks: Sequence[Sequence[str]], nothing: str) -> str:
+    """Function that does what belongs to the number `which`."""
+    lines = []
+    for number, block in enumerate(blocks):
+        lines += [f"if which == {number}:", *(f"    {line}" for line in block or ["pass"])]
+    return _function(name, f"which, {arguments}", lines, nothing)
+
+
+def _kick_source(effects: Sequence[Effect], layout: Layout) -> str:
+    times, of_times, changes, of_changes = [], [], [], []
+    for effect in with_kick(effects):
+        inputs = _Inputs(effects, layout)
+        shared, state, constants = list(inputs.shared.values()), inputs.state("y"), inputs.constants("body")
+        time = inputs.recorder.constant(0.0) + effect.kick_time(inputs.shared)
+        change = effect.kick(inputs.time, inputs.view(state, constants), inputs.shared)
+        times.append([*assignments({"time": time}), "return time"])
+        of_times.append(_vjp_lines([time], [inputs.recorder.input("bar")], {"shared_bar": shared}))
+        changes.append(assignments(_targets("out", change)))
+        arrays = {"y_bar": state, "body_bar": constants, "shared_bar": shared, "t_bar": [inputs.time]}
+        of_changes.append(_vjp_lines(change, inputs.array("bar", 3), arrays))
+    arguments = "t, y, body, shared"
+    return (
+        _by_number("kick_time", "shared", times, "return math.inf")
+        + _by_number("kick_time_vjp", "shared, bar, shared_bar", of_times, "return")
+        + _by_number("kick", f"{arguments}, out", changes, "return")
+        + _by_number("kick_vjp", f"{arguments}, bar, y_bar, body_bar, shared_bar, t_bar", of_changes, "return")
+    )
+
+
+def _boundary_source(effects: Sequence[Effect], layout: Layout) -> str:
+    values, rates, of_values = [], [], []
+    for effect in with_boundary(effects):
+        inputs = _Inputs(effects, layout)
+        shared, state, constants = list(inputs.shared.values()), inputs.state("y"), inputs.constants("body")
+        value = inputs.recorder.constant(0.0) + effect.boundary(inputs.view(state, constants), inputs.shared)
+        slopes = vector_jacobian([value], [inputs.recorder.constant(1.0)], state)
+        products = [slope * rate for slope, rate in zip(slopes, inputs.state("rate"), strict=True)]
+        values.append([*assignments({"value": value}), "return value"])
+        rates.append([*assignments({"rate_of": sum(products[1:], products[0])}), "return rate_of"])
+        arrays = {"y_bar": state, "body_bar": constants, "shared_bar": shared}
+        of_values.append(_vjp_lines([value], [inputs.recorder.input("bar")], arrays))
+    return (
+        _by_number("boundary", "y, body, shared", values, "return 1.0")
+        + _by_number("boundary_rate", "y, rate, body, shared", rates, "return 0.0")
+        + _by_number("boundary_vjp", "y, body, shared, bar, y_bar, body_bar, shared_bar", of_values, "return")
+    )
 
 
 _CONTACT_ARGUMENTS = "ya, yb, body_a, body_b, feature, shared"
@@ -117,10 +256,9 @@ _CONTACT_BARS = "bar, ya_bar, yb_bar, body_a_bar, body_b_bar, shared_bar"
 
 
 def _contact_source(kind: ContactKind, effects: Sequence[Effect], layout: Layout) -> str:
-    inputs = _Inputs(layout)
-    state_a, state_b = inputs.array("ya", len(STATE)), inputs.array("yb", len(STATE))
-    constants_a = inputs.array("body_a", len(layout.constants))
-    constants_b = inputs.array("body_b", len(layout.constants))
+    inputs = _Inputs(effects, layout)
+    state_a, state_b = inputs.state("ya"), inputs.state("yb")
+    constants_a, constants_b = inputs.constants("body_a"), inputs.constants("body_b")
     feature = inputs.array("feature", 7)
     a, b = inputs.view(state_a, constants_a), inputs.view(state_b, constants_b)
     of_a, of_b = Feature(*feature[:3]), Feature(*feature[3:6])
@@ -139,7 +277,7 @@ def _contact_source(kind: ContactKind, effects: Sequence[Effect], layout: Layout
         f"{_CONTACT_ARGUMENTS}, out",
         assignments(_targets("out", [*constraint, _rate(room, state_a, state_b)])),
     )
-    sizes = {
+    arrays = {
         "ya_bar": state_a,
         "yb_bar": state_b,
         "body_a_bar": constants_a,
@@ -147,10 +285,7 @@ def _contact_source(kind: ContactKind, effects: Sequence[Effect], layout: Layout
         "shared_bar": list(inputs.shared.values()),
     }
     for part, outputs in (("contact", velocities), ("gap", [geometry.gap]), ("constraint", constraint)):
-        wanted = [symbol for symbols in sizes.values() for symbol in symbols]
-        adjoints = iter(vector_jacobian(outputs, inputs.array("bar", len(outputs)), wanted))
-        targets = {target: next(adjoints) for array, symbols in sizes.items() for target in _targets(array, symbols)}
-        lines = assignments(targets, add=True)
+        lines = _vjp_lines(outputs, inputs.array("bar", len(outputs)), arrays)
         text += _function(f"{part}_{name}_vjp", f"{_CONTACT_ARGUMENTS}, {_CONTACT_BARS}", lines)
     return text
 
@@ -185,6 +320,9 @@ def law_source(effects: Sequence[Effect], layout: Layout) -> str:
     parts = [
         _motion_source(effects, layout),
         _external_source(effects, layout),
+        _pair_source(effects, layout),
+        _kick_source(effects, layout),
+        _boundary_source(effects, layout),
         *(_contact_source(kind, effects, layout) for kind in ContactKind),
         _choice_source("contact", "", "out"),
         _choice_source("constraint", "", "out"),

@@ -21,12 +21,34 @@ allocating = compiled
 """How the few functions are compiled that make arrays."""
 STATE_SIZE = 6
 """Numbers in a body's state."""
-GROUP_SIZE = 1
-"""Bodies that move together: 1, or all of them where an effect couples their motion."""
 SLIPS = False
 """Whether spheres may slip, so that their state has a rolling velocity."""
 RUBS = False
 """Whether contacts have friction, so that bodies which press do not move together but hop."""
+COUPLED = False
+"""Whether forces act between bodies that do not touch, so that all of them move together."""
+TIMED = False
+"""Whether what pushes a body at rest, or friction, changes with time."""
+KICKS = 0
+"""Number of effects that change velocities at one time."""
+BOUNDARIES = 0
+"""Number of effects with a boundary, beyond which other laws hold."""
+
+
+def stage_state(y: Any, stages: Any, body: Any, stage: Any, h: Any, out: Any) -> None:
+    """State of a body at which a stage of a step of length `h` from `y` is evaluated, from the earlier stages."""
+
+
+def stage_state_vjp(before: Any, bars: Any, body: Any, stage: Any, h: Any) -> None:
+    """Add the adjoint `before` of that state to those of the earlier stages."""
+
+
+def dense_output(stages: Any, body: Any, h: Any, out: Any) -> None:
+    """Write the polynomial of a step, constant term apart, from its stages."""
+
+
+def dense_output_vjp(bar: Any, body: Any, h: Any, bars: Any) -> None:
+    """Write the adjoints of the stages from that of the polynomial."""
 
 
 def motion(t: Any, y: Any, phase: Any, body: Any, shared: Any, out: Any) -> None:
@@ -41,6 +63,60 @@ def motion_vjp(
 
 def external(t: Any, y: Any, phase: Any, body: Any, shared: Any, out: Any) -> None:
     """Acceleration without dry friction (2 numbers), what dry friction can hold, and the deceleration of the spin."""
+
+
+def pair_force(t: Any, ya: Any, yb: Any, body_a: Any, body_b: Any, shared: Any, out: Any) -> None:
+    """Force (2 numbers, N) of the second body on the first."""
+
+
+def pair_force_vjp(
+    t: Any,
+    ya: Any,
+    yb: Any,
+    body_a: Any,
+    body_b: Any,
+    shared: Any,
+    bar: Any,
+    ya_bar: Any,
+    yb_bar: Any,
+    body_a_bar: Any,
+    body_b_bar: Any,
+    shared_bar: Any,
+    t_bar: Any,
+) -> None:
+    """Derivative of `pair_force`."""
+
+
+def kick_time(which: Any, shared: Any) -> Any:
+    """Time in s of a kick."""
+
+
+def kick_time_vjp(which: Any, shared: Any, bar: Any, shared_bar: Any) -> None:
+    """Derivative of `kick_time`."""
+
+
+def kick(which: Any, t: Any, y: Any, body: Any, shared: Any, out: Any) -> None:
+    """Write the change of a body's velocities (3 numbers)."""
+
+
+def kick_vjp(
+    which: Any, t: Any, y: Any, body: Any, shared: Any, bar: Any, y_bar: Any, body_bar: Any, shared_bar: Any, t_bar: Any
+) -> None:
+    """Derivative of `kick`."""
+
+
+def boundary(which: Any, y: Any, body: Any, shared: Any) -> Any:
+    """Number whose sign tells on which side of a boundary a body is."""
+
+
+def boundary_rate(which: Any, y: Any, rate: Any, body: Any, shared: Any) -> Any:
+    """Time derivative of `boundary` where the state changes at a rate."""
+
+
+def boundary_vjp(
+    which: Any, y: Any, body: Any, shared: Any, bar: Any, y_bar: Any, body_bar: Any, shared_bar: Any
+) -> None:
+    """Derivative of `boundary`."""
 
 
 def contact_law(kind: Any, ya: Any, yb: Any, body_a: Any, body_b: Any, feature: Any, shared: Any, out: Any) -> None:

@@ -9,23 +9,42 @@ import math
 import numpy as np
 
 from vrdp_prob.models.simulator.cluster_kernel import (
+    cluster_of,
     constrain,
+    mobility,
     presses,
+    push_mobility,
     set_constraints,
 )
-from vrdp_prob.models.simulator.laws_kernel import GROUP_SIZE, SLIPS, STATE_SIZE, compiled, external, motion
-from vrdp_prob.models.simulator.tableau import DENSE, ERRORS, NODES, WEIGHTS
+from vrdp_prob.models.simulator.laws_kernel import (
+    BOUNDARIES,
+    COUPLED,
+    SLIPS,
+    STATE_SIZE,
+    boundary,
+    compiled,
+    dense_output,
+    external,
+    motion,
+    pair_force,
+    stage_state,
+)
+from vrdp_prob.models.simulator.tableau import DENSE, ERRORS, NODES
 from vrdp_prob.models.simulator.world_kernel import (
     ALIVE,
+    BRAKE,
     CONTINUES,
+    CROSSES,
     ENDING,
     ENDING_BODY,
     FIXED,
+    IS_SPHERE,
     MOVING,
     PUSH,
     REFERENCE_X,
     REFERENCE_Y,
     RESTING,
+    SIDES,
     SLIDING,
     SLIPPING,
     SPIN_SENSE,
@@ -48,7 +67,10 @@ The force of the others turns its motion ever faster while it slows down, which 
 """
 SLOWEST = 1e-10
 """Speed in m/s (or rad/s) below which a body rests, and with which it starts when a force moves it."""
-IS_SPHERE = 5
+SMALLEST_SHARE = 1e-16
+"""Relative change of a root at which its search ends."""
+CROSSING_LOOKS = 32
+"""Places in a step at which is looked on which side of a boundary a body is."""
 PARTS_OF_STEP = np.array([0, 1, 12, STAGES])
 """First stages of the parts of a step: its beginning, what its error needs, and its polynomial; and the last and one.
 
@@ -57,16 +79,20 @@ An array, because numba compiles a variant of a function for every integer that 
 
 
 @compiled
-def derivatives(world, group, t, rates):
-    """Time derivatives of the bodies of a group without lasting contacts, at the states at hand, into `rates`."""
-    for body in range(group * GROUP_SIZE, (group + 1) * GROUP_SIZE):
-        phase = world.phase[body]
-        out = rates[body]
-        if phase[MOVING] == RESTING and phase[SPIN_SENSE] == 0.0:
-            for c in range(STATE_SIZE):
-                out[c] = 0.0
-        else:
-            motion(t, world.stages[WORK, body], phase, world.body[body], world.shared, out)
+def is_still(world, body):
+    """Whether a body neither moves nor spins."""
+    return world.phase[body, MOVING] == RESTING and world.phase[body, SPIN_SENSE] == 0.0
+
+
+@compiled
+def derivatives(world, body, t, rates):
+    """Time derivative of a body apart from forces of other bodies, at the state at hand, into `rates`."""
+    out = rates[body]
+    if is_still(world, body):
+        for c in range(STATE_SIZE):
+            out[c] = 0.0
+    else:
+        motion(t, world.stages[WORK, body], world.phase[body], world.body[body], world.shared, out)
 
 
 @compiled
@@ -74,31 +100,40 @@ def cluster_derivatives(world, cluster, t, rates):
     """Time derivative of all bodies of a cluster at the states in the work row, into `rates`."""
     for place in range(world.members[cluster, 0]):
         derivatives(world, world.members[cluster, 1 + place], t, rates)
+    if COUPLED:
+        add_pair_forces(world, cluster, t, rates)
     if presses(world, cluster):
         set_constraints(world, cluster)
         constrain(world, cluster, rates, 1.0)
 
 
 @compiled
-def stage_state(world, group, stage, h):
-    """State at which a stage is evaluated, into the work row."""
-    for slot in range(GROUP_SIZE):
-        body = group * GROUP_SIZE + slot
-        out = world.stages[WORK, body]
-        for c in range(STATE_SIZE):
-            out[c] = world.polynomial[group, 0, slot, c]
-        for earlier in range(stage):
-            weight = h * WEIGHTS[stage, earlier]
-            if weight != 0.0:
-                for c in range(STATE_SIZE):
-                    out[c] += weight * world.stages[earlier, body, c]
+def add_pair_forces(world, cluster, t, rates):
+    """Add the accelerations by forces between the bodies of a cluster."""
+    force = world.force[0]
+    for place in range(world.members[cluster, 0]):
+        a = world.members[cluster, 1 + place]
+        for later in range(place + 1, world.members[cluster, 0]):
+            b = world.members[cluster, 1 + later]
+            pair_force_of(world, a, b, t, force)
+            for c in range(2):
+                rates[a, 3 + c] += mobility(world, a, c, 1.0) * force[c]
+                rates[b, 3 + c] -= mobility(world, b, c, 1.0) * force[c]
+
+
+@compiled
+def pair_force_of(world, a, b, t, force):
+    """Force of the second body on the first, at the states in the work row."""
+    work = world.stages[WORK]
+    pair_force(t, work[a], work[b], world.body[a], world.body[b], world.shared, force)
 
 
 @compiled
 def stage_states(world, cluster, stage, h):
     """States of a cluster at which a stage is evaluated, into the work row."""
     for place in range(world.members[cluster, 0]):
-        stage_state(world, world.members[cluster, 1 + place], stage, h)
+        body = world.members[cluster, 1 + place]
+        stage_state(world.polynomial[body, 0], world.stages, body, stage, h, world.stages[WORK, body])
 
 
 @compiled
@@ -113,9 +148,8 @@ def compute_stages(world, cluster, t, h, begin, end):
 def take_states(world, cluster, share):
     """States of the bodies of a cluster at a share of their pieces, into the work row."""
     for place in range(world.members[cluster, 0]):
-        group = world.members[cluster, 1 + place]
-        for slot in range(GROUP_SIZE):
-            evaluate(world.polynomial[group], slot, share, world.stages[WORK, group * GROUP_SIZE + slot])
+        body = world.members[cluster, 1 + place]
+        evaluate(world.polynomial[body], share, world.stages[WORK, body])
 
 
 @compiled
@@ -126,97 +160,81 @@ def match_velocities(world, cluster):
         set_constraints(world, cluster)
         constrain(world, cluster, world.stages[WORK], 0.0)
         for place in range(world.members[cluster, 0]):
-            group = world.members[cluster, 1 + place]
-            for slot in range(GROUP_SIZE):
-                for c in range(3, 6):
-                    world.polynomial[group, 0, slot, c] = world.stages[WORK, group * GROUP_SIZE + slot, c]
+            body = world.members[cluster, 1 + place]
+            for c in range(3, 6):
+                world.polynomial[body, 0, c] = world.stages[WORK, body, c]
 
 
 @compiled
-def step_error(world, group, h):
+def step_error(world, body, h):
     """Error of a step relative to the tolerance (Hairer's combination of two estimates)."""
     worst = 0.0
-    for body in range(group * GROUP_SIZE, (group + 1) * GROUP_SIZE):
-        for c in range(STATE_SIZE):
-            third, fifth = 0.0, 0.0
-            for stage in range(12):
-                if ERRORS[1, stage] != 0.0:
-                    third += ERRORS[0, stage] * world.stages[stage, body, c]
-                    fifth += ERRORS[1, stage] * world.stages[stage, body, c]
-            scale = math.sqrt(fifth * fifth + 0.01 * third * third)
-            if not math.isfinite(scale):
-                return math.inf
-            if scale > 0.0:
-                worst = max(worst, abs(h) * fifth * fifth / (scale * TOLERANCE))
+    for c in range(STATE_SIZE):
+        third, fifth = 0.0, 0.0
+        for stage in range(12):
+            if ERRORS[1, stage] != 0.0:
+                third += ERRORS[0, stage] * world.stages[stage, body, c]
+                fifth += ERRORS[1, stage] * world.stages[stage, body, c]
+        scale = math.sqrt(fifth * fifth + 0.01 * third * third)
+        if not math.isfinite(scale):
+            return math.inf
+        if scale > 0.0:
+            worst = max(worst, abs(h) * fifth * fifth / (scale * TOLERANCE))
     return worst
 
 
 @compiled
-def set_polynomial(world, group, h):
-    """Turn the stages of a step into the polynomial of its motion."""
+def set_polynomial(world, body, h):
+    """Turn the stages of a step into the polynomial of a body's motion, and bound how far it comes."""
+    polynomial = world.polynomial[body]
+    dense_output(world.stages, body, h, polynomial)
+    x, y = 0.0, 0.0
     for power in range(1, DENSE.shape[0]):
-        for slot in range(GROUP_SIZE):
-            out = world.polynomial[group, power, slot]
-            for c in range(STATE_SIZE):
-                out[c] = 0.0
-            for stage in range(STAGES):
-                weight = h * DENSE[power, stage]
-                if weight != 0.0:
-                    for c in range(STATE_SIZE):
-                        out[c] += weight * world.stages[stage, group * GROUP_SIZE + slot, c]
-    note_travel(world, group)
+        x += abs(polynomial[power, 0])
+        y += abs(polynomial[power, 1])
+    world.phase[body, TRAVEL] = math.hypot(x, y)
 
 
 @compiled
-def note_travel(world, group):
-    """Bound how far each body of a group comes from where its piece begins."""
-    for slot in range(GROUP_SIZE):
-        x, y = 0.0, 0.0
-        for power in range(1, DENSE.shape[0]):
-            x += abs(world.polynomial[group, power, slot, 0])
-            y += abs(world.polynomial[group, power, slot, 1])
-        world.phase[group * GROUP_SIZE + slot, TRAVEL] = math.hypot(x, y)
+def coefficient(polynomial, phase, power, of_spin):
+    """Coefficient of what vanishes when a body stops (to spin), or begins to roll."""
+    if of_spin != 0.0:
+        return polynomial[power, 5] * phase[SPIN_SENSE]
+    x, y = polynomial[power, 3], polynomial[power, 4]
+    if SLIPS and phase[MOVING] == SLIPPING:
+        x, y = x - polynomial[power, 6], y - polynomial[power, 7]
+    return x * phase[REFERENCE_X] + y * phase[REFERENCE_Y]
 
 
 @compiled
-def along(polynomial, slot, phase, share):
-    """What vanishes when a body stops (its velocity along the reference direction) or begins to roll (its slip)."""
-    total = 0.0
-    slipping = SLIPS and phase[MOVING] == SLIPPING
+def vanishing(polynomial, phase, share, of_spin):
+    """What vanishes when a body stops to move (or to spin), or begins to roll, and its derivative by the share.
+
+    For the motion that is the velocity, or the slip, along the reference direction.
+    """
+    value, slope = 0.0, 0.0
     for power in range(polynomial.shape[0] - 1, -1, -1):
-        coefficients = polynomial[power, slot]
-        x, y = coefficients[3], coefficients[4]
-        if slipping:
-            x, y = x - coefficients[6], y - coefficients[7]
-        total = total * share + x * phase[REFERENCE_X] + y * phase[REFERENCE_Y]
-    return total
+        slope = slope * share + value
+        value = value * share + coefficient(polynomial, phase, power, of_spin)
+    return value, slope
 
 
 @compiled
-def spin_along(polynomial, slot, phase, share):
-    """What vanishes when a spinning body stops to spin."""
-    total = 0.0
-    for power in range(polynomial.shape[0] - 1, -1, -1):
-        total = total * share + polynomial[power, slot, 5] * phase[SPIN_SENSE]
-    return total
-
-
-@compiled
-def vanishing_share(polynomial, slot, phase, of_spin, least):
-    """Share of the step at which `along` (or `spin_along`) falls to `least`, by bisection to the last digit."""
-    low, high = 0.0, 1.0
+def vanishing_share(polynomial, phase, of_spin, least):
+    """Share of the step at which `vanishing` falls to `least`, by Newton's method kept between bounds."""
+    low, high, share = 0.0, 1.0, 1.0
     while True:
-        middle = 0.5 * (low + high)
-        if middle <= low or middle >= high:
-            return high
-        if of_spin != 0.0:
-            value = spin_along(polynomial, slot, phase, middle)
-        else:
-            value = along(polynomial, slot, phase, middle)
+        value, slope = vanishing(polynomial, phase, share, of_spin)
         if value > least:
-            low = middle
+            low = share
         else:
-            high = middle
+            high = share
+        following = share - (value - least) / slope
+        if not low < following < high:
+            following = 0.5 * (low + high)
+        if following in (low, high) or abs(following - share) <= SMALLEST_SHARE * following:
+            return following
+        share = following
 
 
 @compiled
@@ -228,9 +246,11 @@ def settle(world, body, t, y):
     if world.kind[body, FIXED]:
         return
     push = world.stages[PUSH, body]
-    external(t, y, phase, world.body[body], world.shared, push)
+    if COUPLED:
+        take_states(world, cluster_of(world, body), 0.0)
+    set_push_at(world, body, t, y)
     # What no friction holds at rest counts as moving with speed 0: its derivative by the velocity does not vanish.
-    if abs(y[5]) > SLOWEST or push[3] == 0.0:
+    if abs(y[5]) > SLOWEST or push[BRAKE] == 0.0:
         phase[SPIN_SENSE] = math.copysign(1.0, y[5])
     else:
         y[5] = 0.0
@@ -244,7 +264,7 @@ def settle(world, body, t, y):
     if math.hypot(y[3], y[4]) > SLOWEST:
         return
     y[3], y[4] = 0.0, 0.0
-    external(t, y, phase, world.body[body], world.shared, push)
+    set_push_at(world, body, t, y)
     size = math.hypot(push[0], push[1])
     if size > push[2]:
         y[3], y[4] = SLOWEST * push[0] / size, SLOWEST * push[1] / size
@@ -255,29 +275,46 @@ def settle(world, body, t, y):
 
 
 @compiled
-def set_references(world, group):
-    """Take the velocities (or slips) at the start of a piece as reference directions."""
-    for slot in range(GROUP_SIZE):
-        phase = world.phase[group * GROUP_SIZE + slot]
-        y = world.polynomial[group, 0, slot]
-        if phase[MOVING] != RESTING:
-            phase[REFERENCE_X], phase[REFERENCE_Y] = y[3], y[4]
-        if SLIPS and phase[MOVING] == SLIPPING:
-            phase[REFERENCE_X], phase[REFERENCE_Y] = y[3] - y[6], y[4] - y[7]
+def set_push_at(world, body, t, y):
+    """Note what pushes a body in state `y` without contacts (2 numbers, m/s^2), what friction holds, and the brake.
+
+    The states of other bodies are those in the work row.
+    """
+    push = world.stages[PUSH, body]
+    external(t, y, world.phase[body], world.body[body], world.shared, push)
+    if COUPLED:
+        force, cluster = world.force[0], cluster_of(world, body)
+        for place in range(world.members[cluster, 0]):
+            other = world.members[cluster, 1 + place]
+            if other != body:
+                state = world.stages[WORK, other]
+                pair_force(t, y, state, world.body[body], world.body[other], world.shared, force)
+                for c in range(2):
+                    push[c] += push_mobility(world, body) * force[c]
 
 
 @compiled
-def first_step(world, group, h, most):
-    """Limit a step to a multiple of the time in which friction stops the first body."""
-    for body in range(group * GROUP_SIZE, (group + 1) * GROUP_SIZE):
-        phase, rate = world.phase[body], world.stages[0, body]
-        x, y = rate[3], rate[4]
-        if SLIPS and phase[MOVING] == SLIPPING:
-            x, y = x - rate[6], y - rate[7]
-        braking = -(x * phase[REFERENCE_X] + y * phase[REFERENCE_Y])
-        square = phase[REFERENCE_X] ** 2 + phase[REFERENCE_Y] ** 2
-        if phase[MOVING] != RESTING and braking > 0.0 and h * braking > most * square:
-            h = most * square / braking
+def set_references(world, body):
+    """Take the velocity (or slip) at the start of a piece as reference direction."""
+    phase = world.phase[body]
+    y = world.polynomial[body, 0]
+    if phase[MOVING] != RESTING:
+        phase[REFERENCE_X], phase[REFERENCE_Y] = y[3], y[4]
+    if SLIPS and phase[MOVING] == SLIPPING:
+        phase[REFERENCE_X], phase[REFERENCE_Y] = y[3] - y[6], y[4] - y[7]
+
+
+@compiled
+def first_step(world, body, h, most):
+    """Limit a step to a multiple of the time in which friction stops the body."""
+    phase, rate = world.phase[body], world.stages[0, body]
+    x, y = rate[3], rate[4]
+    if SLIPS and phase[MOVING] == SLIPPING:
+        x, y = x - rate[6], y - rate[7]
+    braking = -(x * phase[REFERENCE_X] + y * phase[REFERENCE_Y])
+    square = phase[REFERENCE_X] ** 2 + phase[REFERENCE_Y] ** 2
+    if phase[MOVING] != RESTING and braking > 0.0 and h * braking > most * square:
+        h = most * square / braking
     return h
 
 
@@ -292,7 +329,7 @@ def cut(world, cluster, share, root, ending, what):
 
 @compiled
 def stopping_level(world, cluster, phase):
-    """Value of `along` at which a body stops."""
+    """Value of `vanishing` at which a body stops."""
     if world.members[cluster, 0] == 1:
         return 0.0
     speed = math.hypot(phase[REFERENCE_X], phase[REFERENCE_Y])
@@ -300,22 +337,59 @@ def stopping_level(world, cluster, phase):
 
 
 @compiled
-def find_ending(world, cluster, group, share):
-    """Share of the step, at most `share`, at which a body of a group first stops to move or to spin."""
-    polynomial = world.polynomial[group]
-    for slot in range(GROUP_SIZE):
-        body = group * GROUP_SIZE + slot
-        phase = world.phase[body]
-        spins = phase[SPIN_SENSE] != 0.0 and polynomial[0, slot, 5] != 0.0
-        if spins and spin_along(polynomial, slot, phase, 1.0) <= 0.0:
-            root = vanishing_share(polynomial, slot, phase, 1.0, 0.0)
-            share = cut(world, cluster, share, root, SPIN_STOPS, body)
-        moves = phase[REFERENCE_X] != 0.0 or phase[REFERENCE_Y] != 0.0
-        level = stopping_level(world, cluster, phase)
-        if moves and along(polynomial, slot, phase, 1.0) <= level:
-            root = vanishing_share(polynomial, slot, phase, 0.0, level)
-            share = cut(world, cluster, share, root, STOPS, body)
+def find_ending(world, cluster, body, share):
+    """Share of the step, at most `share`, at which a body first stops to move or to spin."""
+    polynomial, phase = world.polynomial[body], world.phase[body]
+    spins = phase[SPIN_SENSE] != 0.0 and polynomial[0, 5] != 0.0
+    if spins and vanishing(polynomial, phase, 1.0, 1.0)[0] <= 0.0:
+        root = vanishing_share(polynomial, phase, 1.0, 0.0)
+        share = cut(world, cluster, share, root, SPIN_STOPS, body)
+    moves = phase[REFERENCE_X] != 0.0 or phase[REFERENCE_Y] != 0.0
+    level = stopping_level(world, cluster, phase)
+    if moves and vanishing(polynomial, phase, 1.0, 0.0)[0] <= level:
+        root = vanishing_share(polynomial, phase, 0.0, level)
+        share = cut(world, cluster, share, root, STOPS, body)
     return share
+
+
+@compiled
+def find_crossing(world, cluster, body, share):
+    """Share of the step, at most `share`, at which a body first crosses a boundary."""
+    y, phase = world.stages[WORK, body], world.phase[body]
+    for which in range(BOUNDARIES):
+        side, low = phase[SIDES + which], 0.0
+        for index in range(1, CROSSING_LOOKS + 1):
+            high = share * index / CROSSING_LOOKS
+            evaluate(world.polynomial[body], high, y)
+            if side * boundary(which, y, world.body[body], world.shared) < 0.0:
+                root = crossing_share(world, body, which, low, high)
+                share = cut(world, cluster, share, root, CROSSES, body * BOUNDARIES + which)
+                break
+            low = high
+    return share
+
+
+@compiled
+def crossing_share(world, body, which, low, high):
+    """Share of the step between two at which a body crosses a boundary, by bisection; the first place behind it."""
+    y, side = world.stages[WORK, body], world.phase[body, SIDES + which]
+    while True:
+        middle = 0.5 * (low + high)
+        if middle <= low or middle >= high:
+            return high
+        evaluate(world.polynomial[body], middle, y)
+        if side * boundary(which, y, world.body[body], world.shared) < 0.0:
+            high = middle
+        else:
+            low = middle
+
+
+@compiled
+def set_sides(world, body, y):
+    """Note on which side of each boundary a body is."""
+    for which in range(BOUNDARIES):
+        value = boundary(which, y, world.body[body], world.shared)
+        world.phase[body, SIDES + which] = math.copysign(1.0, value)
 
 
 @compiled
@@ -324,21 +398,9 @@ def really_stops(world, cluster, share):
     if world.clock[cluster, ENDING] != STOPS:
         return True
     body = int(world.clock[cluster, ENDING_BODY])
-    group = body // GROUP_SIZE
-    slot = body - group * GROUP_SIZE
     y = world.stages[WORK, body]
     vanished = VANISHED if world.members[cluster, 0] == 1 else 2.0 * LINGERING
-    evaluate(world.polynomial[group], slot, share, y)
+    evaluate(world.polynomial[body], share, y)
     if SLIPS and world.phase[body, MOVING] == SLIPPING:
         return math.hypot(y[3] - y[6], y[4] - y[7]) <= vanished
     return math.hypot(y[3], y[4]) <= vanished
-
-
-@compiled
-def is_still(world, group):
-    """Whether no body of a group moves or spins."""
-    for slot in range(GROUP_SIZE):
-        phase = world.phase[group * GROUP_SIZE + slot]
-        if phase[MOVING] != RESTING or phase[SPIN_SENSE] != 0.0:
-            return False
-    return True

@@ -9,8 +9,6 @@ from vrdp_prob.models.simulator.cluster_kernel import (
     FORCE,
     GRADIENT,
     HOLD,
-    INVERSE_INERTIA,
-    INVERSE_MASS,
     LEANS,
     MATCHES,
     PARTED,
@@ -23,24 +21,30 @@ from vrdp_prob.models.simulator.cluster_kernel import (
     constrain,
     coupling,
     product_with,
+    push_mobility,
     set_constraints,
     set_touch_count,
     touch_count,
 )
-from vrdp_prob.models.simulator.laws_kernel import GROUP_SIZE, compiled, external
+from vrdp_prob.models.simulator.laws_kernel import COUPLED, compiled
 from vrdp_prob.models.simulator.motion_kernel import (
     SLOWEST,
     VANISHED,
+    add_pair_forces,
     cluster_derivatives,
     derivatives,
+    set_push_at,
     settle,
     take_states,
 )
 from vrdp_prob.models.simulator.world_kernel import (
+    BRAKE,
     CONTINUES,
     ENDING,
     ENDING_BODY,
     FIXED,
+    INVERSE_INERTIA,
+    LEANING,
     MOVING,
     PARTS,
     PUSH,
@@ -50,6 +54,7 @@ from vrdp_prob.models.simulator.world_kernel import (
     SLIDING,
     SPARE,
     SPIN_SENSE,
+    TURN,
     TURNS,
     WORK,
     YIELDS,
@@ -66,13 +71,12 @@ FAINT = 1e-9
 """Relative acceleration in m/s^2 that must bring two bodies together for their contact to last."""
 BLOCKED = 1e-6
 """Relative excess of a push over friction below which a body stays at rest that others stop."""
+PATIENCE = 0.02
+"""Time in s between two looks at bodies at rest whose forces change with time."""
 LOOKS = 4
 """Places in a step at which lasting contacts are looked at."""
 STOPPING = 1e-3
 """Last part of a step, in which a body stops, that is not looked at: the direction of its friction is lost there."""
-# What pushes a body: its acceleration without friction (2 numbers), what friction holds, the same for its spin; and
-# whether it leans on others at rest.
-BRAKE, TURN, LEANING = 3, 4, 5
 ROOM_COUNTS = TOUCH_FEATURE + 6
 
 
@@ -99,13 +103,10 @@ def pull(world, body, c):
 def set_push(world, body, t):
     """Note what pushes a body that friction holds (2 numbers, m/s^2), what friction holds, and both for its spin."""
     push = world.stages[PUSH, body]
-    external(t, world.stages[WORK, body], world.phase[body], world.body[body], world.shared, push)
-    for c in range(3):
-        force = pull(world, body, c)
-        if c == 2:
-            push[TURN] = force * world.body[body, INVERSE_INERTIA]
-        else:
-            push[c] += force * world.body[body, INVERSE_MASS]
+    set_push_at(world, body, t, world.stages[WORK, body])
+    for c in range(2):
+        push[c] += pull(world, body, c) * push_mobility(world, body)
+    push[TURN] = pull(world, body, 2) * world.body[body, INVERSE_INERTIA]
 
 
 @compiled
@@ -132,16 +133,13 @@ def failure(world, cluster, t):
             if row[ROOM_COUNTS] != 0.0 and row[ROOM] < 0.0:
                 return SLIDES_OFF, touch
     for place in range(world.members[cluster, 0]):
-        first = world.members[cluster, 1 + place] * GROUP_SIZE
-        for body in range(first, first + GROUP_SIZE):
-            phase, push = world.phase[body], world.stages[PUSH, body]
-            if world.kind[body, FIXED]:
-                continue
-            set_push(world, body, t)
-            if phase[MOVING] == RESTING and push[LEANING] == 0.0 and yields(push, 0.0):
-                return YIELDS, body
-            if phase[SPIN_SENSE] == 0.0 and turns(push):
-                return TURNS, body
+        body = world.members[cluster, 1 + place]
+        phase, push = world.phase[body], world.stages[PUSH, body]
+        set_push(world, body, t)
+        if phase[MOVING] == RESTING and push[LEANING] == 0.0 and yields(push, 0.0):
+            return YIELDS, body
+        if phase[SPIN_SENSE] == 0.0 and turns(push):
+            return TURNS, body
     return CONTINUES, -1
 
 
@@ -159,6 +157,14 @@ def find_parting(world, cluster, t, h, share):
         low = high
     if ending == CONTINUES:
         return share
+    return failing_share(world, cluster, t, h, low, high)
+
+
+@compiled
+def failing_share(world, cluster, t, h, low, high):
+    """Share of the step between two at which the contacts of a cluster no longer hold as they do, by bisection."""
+    take_states(world, cluster, high)
+    ending, what = failure(world, cluster, t + high * h)
     while True:
         middle = 0.5 * (low + high)
         if middle <= low or middle >= high:
@@ -173,11 +179,23 @@ def find_parting(world, cluster, t, h, share):
 
 
 @compiled
+def find_yielding(world, cluster, t, horizon):
+    """Let bodies at rest stay until forces that change with time move one of them; returns the time of that."""
+    begin = t
+    while begin < horizon:
+        end = min(begin + PATIENCE, horizon)
+        take_states(world, cluster, 0.0)
+        ending, _ = failure(world, cluster, end)
+        if ending != CONTINUES:
+            return begin + (end - begin) * failing_share(world, cluster, begin, end - begin, 0.0, 1.0)
+        begin = end
+    return math.inf
+
+
+@compiled
 def start(world, body):
     """Let a body at rest move the way it is pushed."""
-    group = body // GROUP_SIZE
-    y = world.polynomial[group, 0, body - group * GROUP_SIZE]
-    push = world.stages[PUSH, body]
+    y, push = world.polynomial[body, 0], world.stages[PUSH, body]
     size = math.hypot(push[0], push[1])
     world.phase[body, MOVING] = SLIDING
     y[3], y[4] = 2.0 * VANISHED * push[0] / size, 2.0 * VANISHED * push[1] / size
@@ -186,10 +204,9 @@ def start(world, body):
 @compiled
 def start_spin(world, body):
     """Let a body that does not spin do so the way it is pushed."""
-    group = body // GROUP_SIZE
     sense = math.copysign(1.0, world.stages[PUSH, body, TURN])
     world.phase[body, SPIN_SENSE] = sense
-    world.polynomial[group, 0, body - group * GROUP_SIZE, 5] = 2.0 * SLOWEST * sense
+    world.polynomial[body, 0, 5] = 2.0 * SLOWEST * sense
 
 
 @compiled
@@ -197,18 +214,15 @@ def loosened(world, cluster, t):
     """Let bodies at rest move, or not spinning turn, that are pushed too hard; returns whether any does."""
     changed = False
     for place in range(world.members[cluster, 0]):
-        group = world.members[cluster, 1 + place]
-        for body in range(group * GROUP_SIZE, (group + 1) * GROUP_SIZE):
-            phase, push = world.phase[body], world.stages[PUSH, body]
-            if world.kind[body, FIXED]:
-                continue
-            set_push(world, body, t)
-            if phase[MOVING] == RESTING and push[LEANING] == 0.0 and yields(push, 0.0):
-                start(world, body)
-                changed = True
-            if phase[SPIN_SENSE] == 0.0 and turns(push):
-                start_spin(world, body)
-                changed = True
+        body = world.members[cluster, 1 + place]
+        phase, push = world.phase[body], world.stages[PUSH, body]
+        set_push(world, body, t)
+        if phase[MOVING] == RESTING and push[LEANING] == 0.0 and yields(push, 0.0):
+            start(world, body)
+            changed = True
+        if phase[SPIN_SENSE] == 0.0 and turns(push):
+            start_spin(world, body)
+            changed = True
     return changed
 
 
@@ -217,19 +231,18 @@ def blocked(world, cluster):
     """Let bodies rest that others stop and friction then holds; returns whether any does, or slides off instead."""
     changed = False
     for place in range(world.members[cluster, 0]):
-        group = world.members[cluster, 1 + place]
-        for body in range(group * GROUP_SIZE, (group + 1) * GROUP_SIZE):
-            phase, push, y = world.phase[body], world.stages[PUSH, body], world.stages[WORK, body]
-            slow = math.hypot(y[3], y[4]) <= VANISHED and push[2] > 0.0
-            if world.kind[body, FIXED] or phase[MOVING] == RESTING or not slow:
-                continue
-            changed = True
-            # A body that others stop is pushed just as hard as friction holds.
-            if yields(push, BLOCKED):
-                start(world, body)
-            else:
-                at_rest = world.polynomial[group, 0, body - group * GROUP_SIZE]
-                phase[MOVING], at_rest[3], at_rest[4], push[LEANING] = RESTING, 0.0, 0.0, 1.0
+        body = world.members[cluster, 1 + place]
+        phase, push, y = world.phase[body], world.stages[PUSH, body], world.stages[WORK, body]
+        slow = math.hypot(y[3], y[4]) <= VANISHED and push[2] > 0.0
+        if phase[MOVING] != SLIDING or not slow:
+            continue
+        changed = True
+        # A body that others stop is pushed just as hard as friction holds.
+        if yields(push, BLOCKED):
+            start(world, body)
+        else:
+            at_rest = world.polynomial[body, 0]
+            phase[MOVING], at_rest[3], at_rest[4], push[LEANING] = RESTING, 0.0, 0.0, 1.0
     return changed
 
 
@@ -249,14 +262,14 @@ def match(world, cluster):
         row = world.touching[touch]
         if cluster_of_touch(world, touch) == cluster:
             a, b = int(row[TOUCH_A]), int(row[TOUCH_B])
-            if coupling(world, touch, touch) == 0.0:
+            if coupling(world, touch, touch, 0.0) == 0.0:
                 row[HOLD] = LEANS
             elif product_with(world, touch, world.stages[WORK]) < -gentle_speed(world, a, b):
                 row[HOLD] = PARTED
     while True:
         take_states(world, cluster, 0.0)
         constrain(world, cluster, world.stages[WORK], 0.0)
-        if not drop(world, cluster, -OPENING, PARTED):
+        if not drop(world, cluster, -OPENING, PARTED, 0.0):
             return
 
 
@@ -266,19 +279,21 @@ def press(world, cluster, t):
     while True:
         for place in range(world.members[cluster, 0]):
             derivatives(world, world.members[cluster, 1 + place], t, world.stages[SPARE])
+        if COUPLED:
+            add_pair_forces(world, cluster, t, world.stages[SPARE])
         constrain(world, cluster, world.stages[SPARE], 1.0)
-        if not drop(world, cluster, FAINT, MATCHES):
+        if not drop(world, cluster, FAINT, MATCHES, 1.0):
             return
 
 
 @compiled
-def drop(world, cluster, least, hold):
+def drop(world, cluster, least, hold, curved):
     """Give up the contact that pulls most, if any does what is less than `least`; whether one was."""
     worst = -1
     for touch in range(touch_count(world)):
         row = world.touching[touch]
         if row[HOLD] > hold and row[HOLD] != LEANS and cluster_of_touch(world, touch) == cluster:
-            effect = row[FORCE] * coupling(world, touch, touch)
+            effect = row[FORCE] * coupling(world, touch, touch, curved)
             if effect < least:
                 least, worst = effect, touch
     if worst >= 0:
@@ -292,9 +307,8 @@ def leans(world, touch, t):
     for side in range(2):
         body = int(world.touching[touch, TOUCH_A + side])
         if not world.kind[body, FIXED]:
-            push = world.stages[PUSH, body]
-            external(t, world.stages[WORK, body], world.phase[body], world.body[body], world.shared, push)
-            if yields(push, 0.0):
+            set_push_at(world, body, t, world.stages[WORK, body])
+            if yields(world.stages[PUSH, body], 0.0):
                 return True
     return False
 
@@ -307,10 +321,9 @@ def choose_contacts(world, cluster, t):
     that is held by others leans on them, and no longer pushes them while all are at rest.
     """
     for place in range(world.members[cluster, 0]):
-        group = world.members[cluster, 1 + place]
-        for slot in range(GROUP_SIZE):
-            settle(world, group * GROUP_SIZE + slot, t, world.polynomial[group, 0, slot])
-            world.stages[PUSH, group * GROUP_SIZE + slot, LEANING] = 0.0
+        body = world.members[cluster, 1 + place]
+        settle(world, body, t, world.polynomial[body, 0])
+        world.stages[PUSH, body, LEANING] = 0.0
     for _ in range(4 * world.members[cluster, 0] + 4):
         for touch in range(touch_count(world)):
             if cluster_of_touch(world, touch) == cluster:

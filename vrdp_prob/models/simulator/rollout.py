@@ -31,7 +31,7 @@ class Rollout:
     Parameters
     ----------
     times
-        Times in s.
+        Times in s, one row where they are the same in all worlds.
     trajectory
         x and y in m and angle in rad; before its release a body is shown in the state it is released with, and so is a
         removed body.
@@ -43,19 +43,22 @@ class Rollout:
         How the simulation of each world ended.
     tapes
         What the kernel recorded.
+    wall_count
+        Number of walls of the scene; what effects add comes after them.
     """
 
-    times: Float[Tensor, "time"]
+    times: Float[Tensor, "world_or_one time"]
     trajectory: Float[Tensor, "world time body 3"]
     velocity: Float[Tensor, "world time body 3"]
     exists: Bool[Tensor, "world time body"]
     outcome: tuple[Outcome, ...]
     tapes: Tapes
+    wall_count: int
 
     @cached_property
     def events(self) -> EventTable:
-        """Collisions, contacts with walls, and stops."""
-        return EventTable.of(self.tapes, self.exists.shape[-1])
+        """Collisions, contacts with walls and obstacles, stops, and what else changed the motion at once."""
+        return EventTable.of(self.tapes, self.exists.shape[-1], self.wall_count)
 
     @property
     def fine(self) -> Bool[np.ndarray, "world"]:
@@ -65,7 +68,7 @@ class Rollout:
 
 def simulate(
     worlds: Worlds,
-    times: Float[Tensor, "time"],
+    times: Float[Tensor, "time"] | Float[Tensor, "world time"],
     model: PhysicsModel | None = None,
     *,
     event_limit: int = EVENT_LIMIT,
@@ -77,7 +80,7 @@ def simulate(
     worlds
         The worlds; their tensors may be of any floating type and device, the computation is in float64 on the CPU.
     times
-        Times in s, increasing.
+        Times in s, increasing; of all worlds, or of each.
     model
         The physics, the base model where none is given.
     event_limit
@@ -94,69 +97,90 @@ def simulate(
         If the times are not finite and increasing, or a parameter of the model is missing.
     """
     model = model if model is not None else PhysicsModel.base()
-    detached = times.detach()
-    if len(times) == 0 or not torch.isfinite(detached).all() or (detached.diff() <= 0).any():
-        raise InputError("simulate: the times must be finite and increasing, at least one.")
-    arrays = kernel_arrays(worlds, model.layout, float(detached[0]))
-    flat = (arrays.bodies, arrays.shared, arrays.start, times.to(torch.float64))
-    run = _Run(model.kernel, arrays, event_limit)
+    rows = times[None] if times.ndim == 1 else times
+    _check(rows.detach(), len(worlds))
+    arrays = kernel_arrays(worlds, model.effects, model.layout, float(rows.detach().min()))
+    flat = (arrays.bodies, arrays.shared, arrays.start, rows.to(torch.float64))
+    run = _Run(model.kernel, arrays, len(worlds.shapes), event_limit)
     # torch does not annotate Function.apply.
-    states: Tensor = _Simulation.apply(run, *(tensor.cpu() for tensor in flat))  # type: ignore[no-untyped-call]
-    states = states[:, :, : len(worlds.shapes)].to(worlds.position)
-    released = times.to(worlds.release_time)[None, :, None] >= worlds.release_time[:, None, :]
+    states: tuple[Tensor, Tensor] = _Simulation.apply(  # type: ignore[no-untyped-call]
+        run, *(tensor.cpu() for tensor in flat)
+    )
+    released = rows.to(worlds.release_time)[:, :, None] >= worlds.release_time[:, None, :]
     return Rollout(
-        times=times,
-        trajectory=states[..., :3],
-        velocity=states[..., 3:],
+        times=rows,
+        trajectory=states[0].to(worlds.position),
+        velocity=states[1].to(worlds.position),
         exists=released.detach() & worlds.present[:, None, :],
         outcome=tuple(Outcome(int(code)) for code in run.outcomes),
         tapes=run.tapes,
+        wall_count=len(worlds.walls),
     )
+
+
+def _check(times: Float[Tensor, "world_or_one time"], world_count: int) -> None:
+    if times.shape[1] == 0 or not torch.isfinite(times).all() or (times.diff(dim=1) <= 0).any():
+        raise InputError("simulate: the times must be finite and increasing, at least one.")
+    if len(times) not in (1, world_count):
+        raise InputError(f"simulate: there are times of {len(times)} worlds, but {world_count} worlds; give one row each.")
 
 
 class _Run:
     """One call of the kernel, and what its derivative needs to know of it."""
 
-    def __init__(self, kernel: ModuleType, arrays: KernelArrays, event_limit: int) -> None:
-        self.kernel, self.kinds, self.event_limit = kernel, arrays.kinds, event_limit
+    def __init__(self, kernel: ModuleType, arrays: KernelArrays, shown: int, event_limit: int) -> None:
+        self.kernel, self.kinds, self.shown, self.event_limit = kernel, arrays.kinds, shown, event_limit
         self.outcomes: Int[np.ndarray, "world"] = np.zeros(len(arrays.kinds), dtype=np.int64)
         self.tapes: Tapes
 
-    def forward(self, inputs: Sequence[Tensor]) -> Tensor:
-        """States [world, time, body, state] of bodies and walls."""
+    def forward(self, inputs: Sequence[Tensor]) -> tuple[Tensor, Tensor]:
+        """Trajectory and velocity [world, time, body, 3]."""
         bodies, shared, start, times = (tensor.detach().contiguous().numpy() for tensor in inputs)
-        states = np.empty((*self.kinds.shape[:1], len(times), self.kinds.shape[1], start.shape[2] - 1))
+        trajectory, velocity = (np.empty((len(self.kinds), times.shape[1], self.shown, 3)) for _ in range(2))
         rows = self.kernel.rollout_batch(
-            self.kinds, bodies, shared, start, times, self.event_limit, states, self.outcomes
+            self.kinds, bodies, shared, start, times, self.event_limit, trajectory, velocity, self.outcomes
         )
         self.tapes = Tapes(*rows)
-        return torch.from_numpy(states)
+        return torch.from_numpy(trajectory), torch.from_numpy(velocity)
 
-    def backward(self, inputs: Sequence[Tensor], bar: Tensor) -> tuple[Tensor, ...]:
-        """Derivative by all inputs of the sum of states times `bar`."""
-        arrays = [tensor.detach().contiguous().numpy() for tensor in inputs]
-        bars = [np.zeros_like(array) for array in arrays]
+    def backward(
+        self, inputs: Sequence[Tensor], bars: Sequence[Tensor | None], *, of_times: bool
+    ) -> tuple[Tensor | None, ...]:
+        """Derivative by all inputs of the sum of trajectory and velocity times `bars`; None where that is 0."""
+        bodies, shared, start, times = (tensor.detach().contiguous().numpy() for tensor in inputs)
+        results = [np.zeros_like(array) for array in (bodies, shared, start)]
+        # Empty where nobody asks, which the kernel takes as a sign.
+        results.append(np.zeros_like(times) if of_times else np.zeros((1, 0)))
+        shape = len(self.kinds), times.shape[1], self.shown, 3
+        seen = [_contiguous(bars[0]) if bars[0] is not None else np.zeros(shape)]
+        seen.append(_contiguous(bars[1]) if bars[1] is not None else np.zeros((1, 0, self.shown, 3)))
         self.kernel.reverse_batch(
-            self.kinds, *arrays, self.outcomes, *self.tapes, bar.to(torch.float64).contiguous().numpy(), *bars
+            self.kinds, bodies, shared, start, times, self.outcomes, *self.tapes, *seen, *results
         )
-        return tuple(torch.from_numpy(array) for array in bars)
+        gradients = [torch.from_numpy(array) for array in results]
+        return (*gradients[:3], gradients[3] if of_times else None)
+
+
+def _contiguous(bar: Tensor) -> Float[np.ndarray, "..."]:
+    return bar.detach().to(torch.float64).contiguous().numpy()
 
 
 class _Simulation(torch.autograd.Function):
     """The kernel as a differentiable function of the tensors `bodies`, `shared`, `start` and `times`."""
 
     @staticmethod
-    def forward(ctx: Any, run: _Run, *inputs: Tensor) -> Tensor:
+    def forward(ctx: Any, run: _Run, *inputs: Tensor) -> tuple[Tensor, Tensor]:
         ctx.run = run
+        ctx.set_materialize_grads(False)
         ctx.save_for_backward(*inputs)
         return run.forward(inputs)
 
     @staticmethod
-    def backward(ctx: Any, bar: Tensor) -> tuple[Tensor | None, ...]:
+    def backward(ctx: Any, *bars: Tensor | None) -> tuple[Tensor | None, ...]:
         # Grad mode is on in a backward pass only where somebody wants to differentiate its result.
         if torch.is_grad_enabled():
             raise RuntimeError("simulate has a first derivative only; call backward or grad with create_graph=False.")
-        return None, *ctx.run.backward(ctx.saved_tensors, bar)
+        return None, *ctx.run.backward(ctx.saved_tensors, bars, of_times=ctx.needs_input_grad[4])
 
 
 def compile_model(model: PhysicsModel | None = None) -> None:

@@ -34,8 +34,18 @@ from vrdp_prob.models.simulator.detection_kernel import (
     PAIR_KIND,
     SLACK,
 )
-from vrdp_prob.models.simulator.laws_kernel import GROUP_SIZE, RUBS, SLIPS, STATE_SIZE, compiled, contact_law
-from vrdp_prob.models.simulator.motion_kernel import LINGERING, cluster_derivatives, settle, take_states
+from vrdp_prob.models.simulator.laws_kernel import (
+    BOUNDARIES,
+    COUPLED,
+    KICKS,
+    RUBS,
+    SLIPS,
+    STATE_SIZE,
+    compiled,
+    contact_law,
+    kick,
+)
+from vrdp_prob.models.simulator.motion_kernel import LINGERING, cluster_derivatives, set_sides, settle, take_states
 from vrdp_prob.models.simulator.pressing_kernel import (
     ROOM_COUNTS,
     choose_contacts,
@@ -45,21 +55,25 @@ from vrdp_prob.models.simulator.pressing_kernel import (
     start,
     start_spin,
 )
-from vrdp_prob.models.simulator.search_kernel import depth, search_group, search_pair
+from vrdp_prob.models.simulator.search_kernel import depth, search_body, search_pair
 from vrdp_prob.models.simulator.step_kernel import advance
 from vrdp_prob.models.simulator.tape_kernel import (
+    BEFORE_SECOND,
     CLOSING_SPEED,
     CONTACT,
     CONTACT_KIND,
     CONTINUE,
+    CROSS,
     EVENTS,
     FEATURE,
     HOLDS,
+    KICK,
     PART,
     RELEASE,
     RESULT,
     ROW,
     ROWS,
+    SECOND,
     SPIN_STOP,
     STATE_A,
     STATE_B,
@@ -76,6 +90,7 @@ from vrdp_prob.models.simulator.tape_kernel import (
 from vrdp_prob.models.simulator.world_kernel import (
     ALIVE,
     CONTINUES,
+    CROSSES,
     ENDING,
     ENDING_BODY,
     FIXED,
@@ -84,7 +99,10 @@ from vrdp_prob.models.simulator.world_kernel import (
     PRESENT,
     RELEASE_TIME,
     RESTING,
+    SIDES,
     SLIDES_OFF,
+    SLIDING,
+    SLIPPING,
     SPARE,
     SPIN_SENSE,
     SPIN_STOPS,
@@ -108,21 +126,20 @@ ROWS_PER_EVENT = 16
 
 
 @compiled
-def leave_piece(world, tape, group, t):
-    """Finish the current piece of a group at a time and put its state there into the constant term."""
-    write_frames(tape, world, group, t)
-    share = share_of(world, group, t)
-    for slot in range(GROUP_SIZE):
-        y = tape.local[STATE_A]
-        evaluate(world.polynomial[group], slot, share, y)
-        phase = world.phase[group * GROUP_SIZE + slot]
-        if phase[MOVING] == RESTING:
-            y[3], y[4] = 0.0, 0.0
-        if phase[SPIN_SENSE] == 0.0:
-            y[5] = 0.0
-        for c in range(STATE_SIZE):
-            world.polynomial[group, 0, slot, c] = y[c]
-    hold(world, group, t)
+def leave_piece(world, tape, body, t):
+    """Finish the current piece of a body at a time and put its state there into the constant term."""
+    write_frames(tape, world, body, t)
+    phase, y = world.phase[body], tape.local[STATE_A]
+    evaluate(world.polynomial[body], share_of(world, body, t), y)
+    if phase[MOVING] == RESTING:
+        y[3], y[4] = 0.0, 0.0
+    if phase[SPIN_SENSE] == 0.0:
+        y[5] = 0.0
+    if SLIPS and phase[MOVING] != SLIPPING:
+        y[6], y[7] = y[3], y[4]
+    for c in range(STATE_SIZE):
+        world.polynomial[body, 0, c] = y[c]
+    hold(world, body, t)
 
 
 @compiled
@@ -155,16 +172,20 @@ def forget(world, pairs, cluster, hold, t):
 @compiled
 def begin_clusters(world, pairs, tape, cluster, t, horizon):
     """Start the pieces of all clusters that a former one falls into; all move on before any looks for contacts."""
+    if world.members[cluster, 0] == 1 and touch_count(world) == 0:
+        outcome = begin_pieces(world, tape, cluster, t, horizon)
+        search_body(world, pairs, cluster, t, horizon)
+        return outcome
     split(world, cluster)
     labels = world.members[world.clock.shape[0] + 1]
     outcome = OK
-    for group in range(world.clock.shape[0]):
-        if labels[1 + group] == group:
-            outcome = max(outcome, begin_pieces(world, tape, group, t, horizon))
-            forget(world, pairs, group, MATCHES, t)
-    for group in range(world.clock.shape[0]):
-        if labels[1 + group] >= 0:
-            search_group(world, pairs, group, t, horizon)
+    for body in range(world.clock.shape[0]):
+        if labels[1 + body] == body:
+            outcome = max(outcome, begin_pieces(world, tape, body, t, horizon))
+            forget(world, pairs, body, MATCHES, t)
+    for body in range(world.clock.shape[0]):
+        if labels[1 + body] >= 0:
+            search_body(world, pairs, body, t, horizon)
     return outcome
 
 
@@ -186,23 +207,33 @@ def overlaps(world, pairs, body, t):
 def release(world, pairs, tape, body, horizon):
     """Let a body into the world; returns an outcome."""
     t = world.start[body, RELEASE_TIME]
-    group = body // GROUP_SIZE
-    slot = body - group * GROUP_SIZE
-    add_row(tape, RELEASE, body, t)
-    if tape.place[group, ROW] >= 0:
-        leave_piece(world, tape, group, t)
-    y = world.polynomial[group, 0, slot]
+    row = add_row(tape, RELEASE, body, t)
+    y = world.polynomial[body, 0]
     for c in range(STATE_SIZE):
         y[c] = world.start[body, c]
     world.phase[body, ALIVE] = 1.0
     skip_frames(tape, body, t)
+    hold(world, body, t)
+    world.clock[body, STEP] = math.inf
+    set_sides(world, body, y)
+    cluster = body
+    if COUPLED and not world.kind[body, FIXED]:
+        cluster = join_others(world, tape, row, body, t)
     settle(world, body, t, y)
-    hold(world, group, t)
-    world.clock[group, STEP] = math.inf
     outcome = overlaps(world, pairs, body, t)
-    result = begin_pieces(world, tape, world.members[group, 1], t, horizon)
-    search_group(world, pairs, group, t, horizon)
-    return max(outcome, result)
+    return max(outcome, begin_clusters(world, pairs, tape, cluster, t, horizon))
+
+
+@compiled
+def join_others(world, tape, row, body, t):
+    """Let a body that appears move with all others; returns their cluster."""
+    cluster = body
+    for other in range(world.clock.shape[0]):
+        if other != body and world.phase[other, ALIVE] != 0.0 and not world.kind[other, FIXED]:
+            tape.integers[row, SECOND], tape.integers[row, BEFORE_SECOND] = other, tape.place[other, ROW]
+            leave_piece(world, tape, other, t)
+            cluster = join(world, body, other)
+    return cluster
 
 
 @compiled
@@ -211,7 +242,7 @@ def end_pieces(world, pairs, tape, cluster, horizon):
     t, ending = world.clock[cluster, UNTIL], world.clock[cluster, ENDING]
     what = int(world.clock[cluster, ENDING_BODY])
     if ending == CONTINUES:
-        add_row(tape, CONTINUE, cluster * GROUP_SIZE, t)
+        add_row(tape, CONTINUE, cluster, t)
         leave_pieces(world, tape, cluster, t)
         return begin_clusters(world, pairs, tape, cluster, t, horizon)
     if ending in (STOPS, SPIN_STOPS):
@@ -219,6 +250,8 @@ def end_pieces(world, pairs, tape, cluster, horizon):
         tape.counts[EVENTS] += 1
         leave_pieces(world, tape, cluster, t)
         stop(world, cluster, what, t, ending == STOPS)
+    elif ending == CROSSES:
+        cross(world, tape, cluster, what, t)
     else:
         change_contacts(world, pairs, tape, cluster, t, ending, what)
     return restart(world, pairs, tape, cluster, t, horizon)
@@ -227,20 +260,52 @@ def end_pieces(world, pairs, tape, cluster, horizon):
 @compiled
 def stop(world, cluster, body, t, moves):
     """Let a body stop to move, or only to spin; what moves with it as slowly stops too."""
-    group = body // GROUP_SIZE
-    y = world.polynomial[group, 0, body - group * GROUP_SIZE]
+    y = world.polynomial[body, 0]
     if not moves:
         y[5] = 0.0
-    elif SLIPS and world.phase[body, MOVING] == 2.0:
+    elif SLIPS and world.phase[body, MOVING] == SLIPPING:
         y[6], y[7] = y[3], y[4]
     else:
         y[3], y[4] = 0.0, 0.0
         for place in range(world.members[cluster, 0] if world.members[cluster, 0] > 1 else 0):
-            for slot in range(GROUP_SIZE):
-                other = world.polynomial[world.members[cluster, 1 + place], 0, slot]
-                if math.hypot(other[3], other[4]) <= 2.0 * LINGERING:
-                    other[3], other[4] = 0.0, 0.0
+            member = world.members[cluster, 1 + place]
+            other = world.polynomial[member, 0]
+            if world.phase[member, MOVING] == SLIDING and math.hypot(other[3], other[4]) <= 2.0 * LINGERING:
+                other[3], other[4] = 0.0, 0.0
     settle(world, body, t, y)
+
+
+@compiled
+def cross(world, tape, cluster, what, t):
+    """Let a body pass to the other side of a boundary."""
+    body = what // max(BOUNDARIES, 1)
+    which = what - body * BOUNDARIES
+    row = add_row(tape, CROSS, body, t)
+    tape.integers[row, SECOND] = which
+    leave_pieces(world, tape, cluster, t)
+    world.phase[body, SIDES + which] = -world.phase[body, SIDES + which]
+    settle(world, body, t, world.polynomial[body, 0])
+
+
+@compiled
+def kick_bodies(world, pairs, tape, which, horizon):
+    """Change the velocities of all bodies at the time of a kick; returns an outcome."""
+    t, change, outcome = world.kicks[which], tape.local[RESULT], OK
+    world.kicks[which] = math.inf
+    for body in range(world.kind.shape[0]):
+        if world.kind[body, FIXED] or world.phase[body, ALIVE] == 0.0:
+            continue
+        row = add_row(tape, KICK, body, t)
+        tape.integers[row, SECOND] = which
+        cluster = cluster_of(world, body)
+        leave_pieces(world, tape, cluster, t)
+        y = world.polynomial[body, 0]
+        kick(which, t, y, world.body[body], world.shared, change)
+        for c in range(3):
+            y[3 + c] += change[c]
+        settle(world, body, t, y)
+        outcome = max(outcome, restart(world, pairs, tape, cluster, t, horizon))
+    return outcome
 
 
 @compiled
@@ -256,7 +321,7 @@ def pressing_place(world, cluster, touch):
 @compiled
 def change_contacts(world, pairs, tape, cluster, t, ending, what):
     """A contact parts or slides off its feature, or a body at rest is pushed to move or to spin."""
-    row = add_row(tape, PART, cluster * GROUP_SIZE, t)
+    row = add_row(tape, PART, cluster, t)
     tape.integers[row, HOLDS] = -1
     if ending == SLIDES_OFF:
         tape.integers[row, HOLDS] = pressing_place(world, cluster, what)
@@ -277,8 +342,7 @@ def change_contacts(world, pairs, tape, cluster, t, ending, what):
 @compiled
 def resume(world, body, t, result):
     """Give a body the velocities after a contact."""
-    group = body // GROUP_SIZE
-    y = world.polynomial[group, 0, body - group * GROUP_SIZE]
+    y = world.polynomial[body, 0]
     for c in range(3):
         y[3 + c] = result[c]
     settle(world, body, t, y)
@@ -345,7 +409,7 @@ def collide(world, pairs, tape, i, j, horizon):
         leave_pieces(world, tape, cluster_of(world, a), t)
     leave_pieces(world, tape, cluster, t)
     if not world.kind[a, FIXED] and not world.kind[b, FIXED]:
-        cluster = join(world, a // GROUP_SIZE, b // GROUP_SIZE)
+        cluster = join(world, a, b)
     if feature[6] != 0.0 and not RUBS:
         hold_contact(world, a, b, kind, feature)
     if not world.kind[a, FIXED]:
@@ -357,16 +421,19 @@ def collide(world, pairs, tape, i, j, horizon):
 
 @compiled
 def next_event(world, pairs):
-    """Time, kind (0 release, 1 piece end, 2 contact) and participants of the earliest event."""
+    """Time, kind (0 release, 1 piece end, 2 contact, 3 kick) and participants of the earliest event."""
     count = world.kind.shape[0]
     time, kind, first, second = math.inf, -1, -1, -1
     for body in range(count):
         release_time = world.start[body, RELEASE_TIME]
         if world.kind[body, PRESENT] and world.phase[body, ALIVE] == 0.0 and release_time < time:
             time, kind, first = release_time, 0, body
-    for group in range(world.clock.shape[0]):
-        if world.clock[group, UNTIL] < time:
-            time, kind, first = world.clock[group, UNTIL], 1, group
+    for cluster in range(count):
+        if world.clock[cluster, UNTIL] < time:
+            time, kind, first = world.clock[cluster, UNTIL], 1, cluster
+    for which in range(KICKS):
+        if world.kicks[which] < time:
+            time, kind, first = world.kicks[which], 3, which
     for i in range(count):
         for j in range(i + 1, count):
             if pairs.table[i, j, CONTACT_TIME] < time:
@@ -405,6 +472,8 @@ def rollout_world(world, pairs, tape, event_limit):
                 result = release(world, pairs, tape, first, horizon)
             elif kind == 1:
                 result = end_pieces(world, pairs, tape, first, horizon)
+            elif kind == 3:
+                result = kick_bodies(world, pairs, tape, first, horizon)
             else:
                 result = collide(world, pairs, tape, first, second, horizon)
         outcome = max(outcome, result)

@@ -37,7 +37,7 @@ from vrdp_prob.models.simulator.detection_kernel import (
     touching_walk,
     walk,
 )
-from vrdp_prob.models.simulator.laws_kernel import GROUP_SIZE, compiled
+from vrdp_prob.models.simulator.laws_kernel import compiled
 from vrdp_prob.models.simulator.pressing_kernel import touches
 from vrdp_prob.models.simulator.world_kernel import (
     ALIVE,
@@ -69,9 +69,7 @@ def outer_radius(world, body):
 @compiled
 def distance_of_pieces(world, i, j):
     """Lower bound on the distance of two centres over their whole pieces."""
-    group_i, group_j = i // GROUP_SIZE, j // GROUP_SIZE
-    first = world.polynomial[group_i, 0, i - group_i * GROUP_SIZE]
-    second = world.polynomial[group_j, 0, j - group_j * GROUP_SIZE]
+    first, second = world.polynomial[i, 0], world.polynomial[j, 0]
     return (
         math.sqrt((first[0] - second[0]) ** 2 + (first[1] - second[1]) ** 2)
         - world.phase[i, TRAVEL]
@@ -230,14 +228,13 @@ def search_pair(world, pairs, body, other, t, horizon):
     if touches(world, i, j) and (world.kind[i, SHAPE] == DISC or world.kind[j, SHAPE] == DISC):
         return
     note_touches(world, pairs, i, j)
-    end = min(world.clock[i // GROUP_SIZE, UNTIL], world.clock[j // GROUP_SIZE, UNTIL], horizon)
+    end = min(world.clock[i, UNTIL], world.clock[j, UNTIL], horizon)
     search(world, pairs, i, j, t, end)
 
 
 @compiled
-def search_group(world, pairs, group, t, horizon):
-    """Search the contacts of all bodies of a group with all others from a time on."""
-    for body in range(group * GROUP_SIZE, (group + 1) * GROUP_SIZE):
-        for other in range(world.kind.shape[0]):
-            if other != body and (other // GROUP_SIZE != group or other > body):
-                search_pair(world, pairs, body, other, t, horizon)
+def search_body(world, pairs, body, t, horizon):
+    """Search the contacts of a body with all others from a time on."""
+    for other in range(world.kind.shape[0]):
+        if other != body:
+            search_pair(world, pairs, body, other, t, horizon)

@@ -19,7 +19,9 @@ from vrdp_prob.files import write_atomically
 from vrdp_prob.models.effects.effect import Effect
 from vrdp_prob.models.simulator import tableau
 from vrdp_prob.models.simulator.contact import rubs
-from vrdp_prob.models.simulator.laws import STATE, Layout, law_source
+from vrdp_prob.models.simulator.laws import Layout, is_timed, law_source, state_size, with_boundary, with_kick
+from vrdp_prob.models.simulator.motion import ROLLING_SHARE, slips
+from vrdp_prob.models.simulator.stages import step_source
 
 CACHE_VARIABLE = "VRDP_PROB_CACHE"
 """Environment variable that names another folder for compiled kernels."""
@@ -56,11 +58,15 @@ def assemble(effects: Sequence[Effect], layout: Layout) -> str:
         "import math\nfrom typing import NamedTuple\n\nimport numpy as np\nfrom numba import njit\n\n",
         f"compiled = njit(nogil=True, error_model='numpy', {_LIGHT}, _nrt=False)\n",
         f"allocating = njit(nogil=True, error_model='numpy', {_LIGHT})\n",
-        f"STATE_SIZE, GROUP_SIZE, SLIPS, RUBS = {len(STATE)}, 1, False, {rubs(effects)}\n",
+        f"STATE_SIZE, SLIPS, RUBS = {state_size(effects)}, {slips(effects)}, {rubs(effects)}\n",
+        f"ROLLING_SHARE = {ROLLING_SHARE!r}\n",
+        f"COUPLED, TIMED = {_is_coupled(effects)}, {is_timed(effects, layout)}\n",
+        f"KICKS, BOUNDARIES = {len(with_kick(effects))}, {len(with_boundary(effects))}\n",
         *(
             f"{name} = np.array({getattr(tableau, name).tolist()!r})\n"
-            for name in ("DENSE", "ERRORS", "NODES", "WEIGHTS")
+            for name in ("DENSE", "ERRORS", "NODES")
         ),
+        step_source(),
         law_source(effects, layout),
     ]
     for name in _KERNELS:
@@ -68,6 +74,10 @@ def assemble(effects: Sequence[Effect], layout: Layout) -> str:
         if file.is_file():
             parts.append(_without_imports(file.read_text(encoding="utf-8")))
     return "\n".join(parts)
+
+
+def _is_coupled(effects: Sequence[Effect]) -> bool:
+    return any(effect.overrides("pair_force") for effect in effects)
 
 
 def cache_folder() -> Path:

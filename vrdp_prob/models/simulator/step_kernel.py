@@ -4,30 +4,29 @@
 # mypy: disable-error-code="no-untyped-def"
 
 from vrdp_prob.models.simulator.cluster_kernel import presses
-from vrdp_prob.models.simulator.laws_kernel import GROUP_SIZE, compiled
+from vrdp_prob.models.simulator.laws_kernel import BOUNDARIES, COUPLED, TIMED, compiled
 from vrdp_prob.models.simulator.motion_kernel import (
     LINGERING,
     PARTS_OF_STEP,
     compute_stages,
+    find_crossing,
     find_ending,
     first_step,
+    is_still,
     match_velocities,
     really_stops,
     set_polynomial,
     set_references,
     step_error,
 )
-from vrdp_prob.models.simulator.pressing_kernel import find_parting
+from vrdp_prob.models.simulator.pressing_kernel import find_parting, find_yielding
 from vrdp_prob.models.simulator.world_kernel import (
     CONTINUES,
     ENDING,
     LENGTH,
-    MOVING,
     ORIGIN,
     REFERENCE_X,
     REFERENCE_Y,
-    RESTING,
-    SPIN_SENSE,
     STEP,
     UNTIL,
     hold,
@@ -40,13 +39,11 @@ APPROACH = 0.5
 
 
 @compiled
-def is_still(world, cluster):
+def rests(world, cluster):
     """Whether no body of a cluster moves or spins."""
     for place in range(world.members[cluster, 0]):
-        group = world.members[cluster, 1 + place]
-        for body in range(group * GROUP_SIZE, (group + 1) * GROUP_SIZE):
-            if world.phase[body, MOVING] != RESTING or world.phase[body, SPIN_SENSE] != 0.0:
-                return False
+        if not is_still(world, world.members[cluster, 1 + place]):
+            return False
     return True
 
 
@@ -58,6 +55,18 @@ def hold_cluster(world, cluster, t):
 
 
 @compiled
+def rest(world, cluster, t, horizon):
+    """Let a cluster rest, where forces change with time until they move a body."""
+    hold_cluster(world, cluster, t)
+    if TIMED:
+        world.clock[cluster, ENDING] = CONTINUES
+        until = find_yielding(world, cluster, t, horizon)
+        for place in range(world.members[cluster, 0]):
+            clock = world.clock[world.members[cluster, 1 + place]]
+            clock[UNTIL], clock[ENDING] = until, world.clock[cluster, ENDING]
+
+
+@compiled
 def begin_step(world, cluster, t, horizon):
     """First stage of a step; returns a length to try."""
     h = max(horizon - t, SMALLEST_STEP)
@@ -66,20 +75,20 @@ def begin_step(world, cluster, t, horizon):
         set_references(world, world.members[cluster, 1 + place])
     compute_stages(world, cluster, t, 0.0, PARTS_OF_STEP[0], PARTS_OF_STEP[1])
     for place in range(world.members[cluster, 0]):
-        group = world.members[cluster, 1 + place]
-        h = first_step(world, group, min(h, world.clock[group, STEP]), reach_of_step(world, cluster, group))
+        body = world.members[cluster, 1 + place]
+        h = first_step(world, body, min(h, world.clock[body, STEP]), reach_of_step(world, cluster, body))
     return h
 
 
 @compiled
-def reach_of_step(world, cluster, group):
+def reach_of_step(world, cluster, body):
     """Length of a step in units of the time in which friction stops a body.
 
     A little more than 1, so that a body alone stops within it. Where bodies press, how their directions change becomes
     singular at the stop; the error of a straight motion does not show that, but its derivative needs shorter steps.
     """
-    first = world.phase[group * GROUP_SIZE]
-    slow = first[REFERENCE_X] ** 2 + first[REFERENCE_Y] ** 2 < (4.0 * LINGERING) ** 2
+    phase = world.phase[body]
+    slow = phase[REFERENCE_X] ** 2 + phase[REFERENCE_Y] ** 2 < (4.0 * LINGERING) ** 2
     return 1.25 if world.members[cluster, 0] == 1 or slow else APPROACH
 
 
@@ -96,17 +105,20 @@ def try_step(world, cluster, t, h):
     share = 1.0
     world.clock[cluster, ENDING] = CONTINUES
     for place in range(world.members[cluster, 0]):
-        group = world.members[cluster, 1 + place]
-        set_polynomial(world, group, h)
-        share = find_ending(world, cluster, group, share)
+        body = world.members[cluster, 1 + place]
+        set_polynomial(world, body, h)
+        share = find_ending(world, cluster, body, share)
+    if BOUNDARIES > 0:
+        for place in range(world.members[cluster, 0]):
+            share = find_crossing(world, cluster, world.members[cluster, 1 + place], share)
     return error, share
 
 
 @compiled
 def advance(world, cluster, t, horizon):
     """Compute the next piece of motion of a cluster from the states in the constant terms; False where that fails."""
-    if is_still(world, cluster):
-        hold_cluster(world, cluster, t)
+    if rests(world, cluster):
+        rest(world, cluster, t, horizon)
         return True
     h = begin_step(world, cluster, t, horizon)
     while h >= SMALLEST_STEP:
@@ -116,7 +128,7 @@ def advance(world, cluster, t, horizon):
         elif not really_stops(world, cluster, share):
             h *= 0.5 * max(share, 0.1)
         else:
-            if presses(world, cluster):
+            if COUPLED or presses(world, cluster):
                 share = find_parting(world, cluster, t, h, share)
             for place in range(world.members[cluster, 0]):
                 clock = world.clock[world.members[cluster, 1 + place]]

@@ -39,8 +39,8 @@ class SlipToRoll(Effect):
     name: ClassVar = "slip_to_roll"
     sentence: ClassVar = "Spheres slide after they start and after they are hit, until they roll."
     law: ClassVar = (
-        "while a sphere slips with s = v - u against the table, v changes at -slip_friction g s/|s| and u, the velocity "
-        "at which it would roll by its spin, at 5/2 of the opposite; contacts change v only"
+        "while a sphere slips with s = v - u on the table, v changes at -slip_friction g s/|s| and u, the velocity at "
+        "which it would roll by its spin, at 5/2 of the opposite; contacts change v only"
     )
     source: ClassVar = "A. Sommerfeld, Mechanics (Lectures on theoretical physics 1), section 27: the billiard ball"
     parameters: ClassVar = (SLIP_FRICTION, RELEASE_ROLLING)

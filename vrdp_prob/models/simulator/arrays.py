@@ -39,9 +39,7 @@ class KernelArrays:
     start: Float[Tensor, "world all state_and_time"]
 
 
-def kernel_arrays(
-    worlds: Worlds, effects: "Sequence[Effect]", layout: Layout, first_time: float
-) -> KernelArrays:
+def kernel_arrays(worlds: Worlds, effects: "Sequence[Effect]", layout: Layout, first_time: float) -> KernelArrays:
     """Arrays of a batch.
 
     Raises

@@ -1,6 +1,6 @@
 """The laws of a model as compiled source: every hook is recorded once and written down with its derivative."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from vrdp_prob.models.effects.effect import BodyView, Effect
@@ -87,7 +87,7 @@ class _Inputs:
             if slips(self.effects):
                 slipping = phase[0] > SLIPPING_ABOVE
                 ahead = where(slipping, 1.0, ahead)
-                slip_speed = where(slipping, _ahead(*slip, phase), 1.0) * slip_speed
+                slip_speed = where(slipping, _ahead(slip[0], slip[1], phase), 1.0) * slip_speed
             speed = ahead * speed
             side = {effect.name: phase[_SIDES + k] for k, effect in enumerate(with_boundary(self.effects))}
         named = dict(zip(self.layout.constants, constants, strict=True))
@@ -128,9 +128,7 @@ def _targets(name: str, values: Sequence[Scalar]) -> dict[str, Scalar]:
     return {f"{name}[{index}]": value for index, value in enumerate(values)}
 
 
-def _vjp_lines(
-    outputs: Sequence[Scalar], bars: Sequence[Symbol], arrays: dict[str, Sequence[Symbol]]
-) -> list[str]:
+def _vjp_lines(outputs: Sequence[Scalar], bars: Sequence[Symbol], arrays: Mapping[str, Sequence[Symbol]]) -> list[str]:
     """Lines that add the adjoints of inputs to arrays, by the names of these."""
     adjoints = iter(vector_jacobian(outputs, bars, [symbol for symbols in arrays.values() for symbol in symbols]))
     targets = {target: next(adjoints) for array, symbols in arrays.items() for target in _targets(array, symbols)}

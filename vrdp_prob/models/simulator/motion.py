@@ -108,9 +108,14 @@ def derivative(
     braking = friction_limit(effects, time, body, parameters) / body.speed
     if not slips(effects):
         moves = phase.moving
-        return moves * body.vx, moves * body.vy, body.spin, moves * (ax - braking * body.vx), moves * (
-            ay - braking * body.vy
-        ), spin
+        return (
+            moves * body.vx,
+            moves * body.vy,
+            body.spin,
+            moves * (ax - braking * body.vx),
+            moves * (ay - braking * body.vy),
+            spin,
+        )
     moves, slipping = minimum(phase.moving, 1.0), phase.moving > SLIPPING_ABOVE
     share = rolling_share(effects, body)
     against = slip_deceleration(effects, time, body, parameters) / body.slip_speed

@@ -2,6 +2,7 @@
 
 # numba infers types, and compiled functions take their arrays one by one and by position.
 # mypy: disable-error-code="no-untyped-def"
+# ruff: noqa: PLR0917
 
 import math
 
@@ -151,7 +152,7 @@ def find_parting(world, cluster, t, h, share):
     for index in range(1, LOOKS + 1):
         high = until * index / LOOKS
         take_states(world, cluster, high)
-        ending, what = failure(world, cluster, t + high * h)
+        ending, _ = failure(world, cluster, t + high * h)
         if ending != CONTINUES:
             break
         low = high

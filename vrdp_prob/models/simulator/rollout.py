@@ -122,7 +122,9 @@ def _check(times: Float[Tensor, "world_or_one time"], world_count: int) -> None:
     if times.shape[1] == 0 or not torch.isfinite(times).all() or (times.diff(dim=1) <= 0).any():
         raise InputError("simulate: the times must be finite and increasing, at least one.")
     if len(times) not in (1, world_count):
-        raise InputError(f"simulate: there are times of {len(times)} worlds, but {world_count} worlds; give one row each.")
+        raise InputError(
+            f"simulate: there are times of {len(times)} worlds, but {world_count} worlds; give one row each."
+        )
 
 
 class _Run:
@@ -154,9 +156,7 @@ class _Run:
         shape = len(self.kinds), times.shape[1], self.shown, 3
         seen = [_contiguous(bars[0]) if bars[0] is not None else np.zeros(shape)]
         seen.append(_contiguous(bars[1]) if bars[1] is not None else np.zeros((1, 0, self.shown, 3)))
-        self.kernel.reverse_batch(
-            self.kinds, bodies, shared, start, times, self.outcomes, *self.tapes, *seen, *results
-        )
+        self.kernel.reverse_batch(self.kinds, bodies, shared, start, times, self.outcomes, *self.tapes, *seen, *results)
         gradients = [torch.from_numpy(array) for array in results]
         return (*gradients[:3], gradients[3] if of_times else None)
 

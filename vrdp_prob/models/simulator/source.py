@@ -62,10 +62,7 @@ def assemble(effects: Sequence[Effect], layout: Layout) -> str:
         f"ROLLING_SHARE = {ROLLING_SHARE!r}\n",
         f"COUPLED, TIMED = {_is_coupled(effects)}, {is_timed(effects, layout)}\n",
         f"KICKS, BOUNDARIES = {len(with_kick(effects))}, {len(with_boundary(effects))}\n",
-        *(
-            f"{name} = np.array({getattr(tableau, name).tolist()!r})\n"
-            for name in ("DENSE", "ERRORS", "NODES")
-        ),
+        *(f"{name} = np.array({getattr(tableau, name).tolist()!r})\n" for name in ("DENSE", "ERRORS", "NODES")),
         step_source(),
         law_source(effects, layout),
     ]

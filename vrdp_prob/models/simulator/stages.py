@@ -40,10 +40,14 @@ def step_source() -> str:
     ]
     spread = [
         _loop(
-            [f"bars[{earlier}, body, c] += {float(WEIGHTS[stage, earlier])!r} * (h * before[c])"
-             for earlier in range(stage)
-             if WEIGHTS[stage, earlier] != 0.0]
-        ) if stage else ["pass"]
+            [
+                f"bars[{earlier}, body, c] += {float(WEIGHTS[stage, earlier])!r} * (h * before[c])"
+                for earlier in range(stage)
+                if WEIGHTS[stage, earlier] != 0.0
+            ]
+        )
+        if stage
+        else ["pass"]
         for stage in range(STAGES)
     ]
     polynomial = [

@@ -41,10 +41,10 @@ APPROACH = 0.5
 @compiled
 def rests(world, cluster):
     """Whether no body of a cluster moves or spins."""
+    moving = False
     for place in range(world.members[cluster, 0]):
-        if not is_still(world, world.members[cluster, 1 + place]):
-            return False
-    return True
+        moving = moving or not is_still(world, world.members[cluster, 1 + place])
+    return not moving
 
 
 @compiled

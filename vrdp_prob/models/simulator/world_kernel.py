@@ -28,9 +28,10 @@ STAGES = DENSE.shape[1]
 WORK, SPARE, PUSH = STAGES, STAGES + 1, STAGES + 2
 # How a piece ends: its step is over, or a body stops (to spin), or never; in a cluster also by a contact that parts or
 # passes to another feature, or by a resting body that is pushed to move or to spin; or a body crosses a boundary.
-CONTINUES, STOPS, SPIN_STOPS, LASTS, PARTS, SLIDES_OFF, YIELDS, TURNS, CROSSES = 0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0
-# What pushes a body in the row PUSH: its acceleration without friction (2 numbers), what friction holds, the same for its
-# spin; and whether it leans on others at rest.
+CONTINUES, STOPS, SPIN_STOPS, LASTS = 0.0, 1.0, 2.0, 3.0
+PARTS, SLIDES_OFF, YIELDS, TURNS, CROSSES = 4.0, 5.0, 6.0, 7.0, 8.0
+# What pushes a body, in the row PUSH: its acceleration without friction (2 numbers), what friction holds, the same for
+# its spin; and whether it leans on others at rest.
 BRAKE, TURN, LEANING = 3, 4, 5
 TOUCHES_PER_BODY = 4
 """Lasting contacts per body that a world has room for; two bodies in a plane share at most two, and few touch each."""

@@ -51,7 +51,7 @@ def test_contacts_of_ten_thousand_random_scenes(record_property: Record) -> None
 
 @pytest.mark.parametrize("mix", [MIXES[3], MIXES[4]])
 def test_both_references_agree(mix: tuple[object, ...], record_property: Record) -> None:
-    worlds = scenes(12, mix, seed=70)
+    worlds = scenes(8, mix, seed=70)
     farthest, times = 0.0, FRAMES.numpy()
     for index in range(len(worlds)):
         scene = scene_of(worlds, index)

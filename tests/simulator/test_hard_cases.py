@@ -10,6 +10,7 @@ from vrdp_prob.errors import InputError
 from vrdp_prob.models.simulator.outcome import Outcome
 from vrdp_prob.models.simulator.rollout import simulate
 from vrdp_prob.models.simulator.worlds import Worlds
+from vrdp_prob.scene import Shape
 
 
 def _stacked(*worlds: Worlds) -> Worlds:
@@ -44,6 +45,70 @@ def test_the_event_limit_is_an_outcome() -> None:
     assert torch.isfinite(rollout.trajectory).all()
     assert (rollout.trajectory[0, -1] == rollout.trajectory[0, -2]).all()
     assert simulate(scene, FRAMES).outcome == (Outcome.OK,)
+
+
+def test_a_world_beyond_the_event_limit_spoils_no_other_world() -> None:
+    trap = {"walls": [[0.21, -1, 0.21, 1], [-0.21, -1, -0.21, 1]]}
+    bad, good = (world([[0, y]], [[3.0, 0]], **trap) for y in (0.0, 5.0))
+    both = _stacked(bad, good)
+    leaf = both.velocity.clone().requires_grad_()
+    rollout = simulate(replace(both, velocity=leaf), FRAMES, event_limit=20)
+    assert rollout.outcome == (Outcome.EVENT_LIMIT, Outcome.OK)
+    assert torch.equal(rollout.trajectory[1], simulate(good, FRAMES).trajectory[0])
+    rollout.trajectory.sum().backward()
+    assert torch.isfinite(leaf.grad).all()
+    assert leaf.grad[1, 0, 0].item() == pytest.approx(FRAMES.sum().item(), rel=1e-9)
+
+
+@pytest.mark.parametrize("shape", [CUBE, SPHERE])
+def test_a_wall_that_takes_all_closing_speed(shape: Shape) -> None:
+    scene = world([[0, 0]], [[1.0, 0.5]], [shape], walls=[[1, -5, 1, 5]], wall_restitution=[0.0])
+    rollout = at(scene, 2.0)
+    assert rollout.outcome == (Outcome.OK,)
+    assert rollout.trajectory[0, -1, 0, :2].tolist() == pytest.approx([0.8, 1.0], abs=1e-6)
+    assert rollout.velocity[0, -1, 0].tolist() == pytest.approx([0, 0.5, 0], abs=1e-9)
+
+
+@pytest.mark.parametrize("shapes", [(DISC, SPHERE, DISC), (CUBE, CUBE, CUBE), (SPHERE, CUBE, DISC)])
+def test_inelastic_bodies_from_both_sides(shapes: tuple[Shape, ...]) -> None:
+    place, speed = [[0, 0], [0.5, 0], [1.0, 0]], [[1.0, 0], [0, 0], [-1.0, 0]]
+    scene = world(place, speed, shapes, restitution=[0.5] * 3, mass=[1.0, 2.0, 1.5])
+    rollout = simulate(scene, FRAMES)
+    assert rollout.outcome == (Outcome.OK,)
+    assert len(rollout.events) < 20
+    momentum = (scene.mass[0, :, None] * rollout.velocity[0, -1, :, :2]).sum(0)
+    assert momentum.tolist() == pytest.approx([-0.5, 0], abs=1e-9)
+    gaps = rollout.trajectory[0, :, 1:, 0] - rollout.trajectory[0, :, :-1, 0] - 2 * RADIUS
+    assert gaps.min() > -1e-6
+
+
+@pytest.mark.parametrize("bounce", [0.0, 0.1, 0.6])
+def test_inelastic_collapse_between_a_heavy_body_and_a_wall(bounce: float) -> None:
+    friction = {"sliding_friction": 0.05, "rolling_resistance": 0.01}
+    walls = {"walls": [[1, -5, 1, 5]], "wall_restitution": [bounce]}
+    bodies = {"restitution": [bounce, 1.0], "mass": [50.0, 0.5]}
+    scene = world([[-0.5, 0], [0.7, 0]], [[2, 0], [0, 0]], [SPHERE, DISC], friction, **walls, **bodies)
+    rollout = simulate(scene, FRAMES)
+    assert rollout.outcome == (Outcome.OK,)
+    place = rollout.trajectory[0, ..., 0]
+    assert place[:, 1].max() < 1 - RADIUS + 1e-6
+    assert (place[:, 1] - place[:, 0]).min() > 2 * RADIUS - 1e-6
+
+
+@pytest.mark.parametrize("shapes", [(DISC, SPHERE), (CUBE, CUBE), (CUBE, SPHERE)])
+def test_bodies_that_rest_in_touch_stay(shapes: tuple[Shape, ...]) -> None:
+    place = [[0.8, 0], [0.8 - 2 * RADIUS, 0]]
+    rollout = simulate(world(place, [[0, 0], [0, 0]], shapes, {"sliding_friction": 0.1}, walls=[[1, -5, 1, 5]]), FRAMES)
+    assert rollout.outcome == (Outcome.OK,)
+    assert len(rollout.events) == 0
+    assert rollout.trajectory[0, -1, :, :2].tolist() == place
+
+
+def test_newtons_cradle_of_five() -> None:
+    place = [[0, 0], *([1 + 2 * RADIUS * index, 0] for index in range(4))]
+    rollout = at(world(place, [[1.0, 0], *[[0, 0]] * 4]), 2.0)
+    assert rollout.outcome == (Outcome.OK,)
+    assert torch.allclose(rollout.velocity[0, -1, :, 0], tensor([0.0, 0, 0, 0, 1.0]), atol=1e-12)
 
 
 def test_contact_without_rebound() -> None:

@@ -61,7 +61,7 @@ def _check(found: Comparison, record: Record) -> None:
 @pytest.mark.parametrize("mix", MIXES)
 @pytest.mark.parametrize("model", [PhysicsModel.base(), EXTENDED], ids=["base", "extended"])
 def test_against_the_reference(mix: str, model: PhysicsModel, record_property: Record) -> None:
-    _check(_compared(24, MIXES[mix], 21, model), record_property)
+    _check(_compared(20, MIXES[mix], 21, model), record_property)
 
 
 @pytest.mark.slow

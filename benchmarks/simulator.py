@@ -1,7 +1,10 @@
-"""Time, memory and accuracy of the simulator: `python benchmarks/simulator.py [--json FILE]`.
+"""Time and memory of the simulator beside its peers: `python benchmarks/simulator.py [--json FILE] [--docs docs]`.
 
-Prints a table and writes `{checks: [{name, value, goal, ok}]}`. Times are processor times of one thread, medians of
-several runs after the first; the log density is that of independent normal errors of all positions.
+Prints tables and writes `{checks: [{name, value, goal, ok}]}`; a check that was missed or not measured is `ok: false`.
+What is measured is the log density of 5 bodies in 128 frames (independent normal errors of all positions) with its
+gradient by positions, velocities, masses and restitutions, in processor time of one thread, medians of calls that take
+turns with the peers'. The peers simulate the same scenes by the same laws with fixed steps of 0.004 s. `--docs` writes
+the tables into `simulator-speed.md` there, and the figures beside it; `--quick` measures less.
 """
 
 import argparse
@@ -10,134 +13,216 @@ import os
 import subprocess
 import sys
 import tempfile
-import time
-from collections.abc import Callable
-from dataclasses import replace
+from collections.abc import Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 
-import numpy as np
 import torch
+from _clock import interleaved
+from _clock import seconds as seconds_of
+from _fixed_step_torch import FORMULATIONS, positions
+from _memory import peak
+from _peers import COMPILED, HAS_JAX, JAX, OURS, TORCH, laws_of, peers
+from _scenes import (
+    BASE,
+    DISCS,
+    EXTENDED,
+    FRAMES,
+    MIXED,
+    contacts_per_world,
+    crowd,
+    gradient_of,
+    positions_of,
+    scenes,
+)
+from _speed_page import Cost, Gap, Memory, Race, figures, page
 
 from vrdp_prob.models.physics import PhysicsModel
-from vrdp_prob.models.simulator.rollout import simulate
 from vrdp_prob.models.simulator.worlds import Worlds
 from vrdp_prob.scene import Shape
 
-FRAMES = torch.arange(128, dtype=torch.float64) * 0.04
-DISCS = (Shape.CYLINDER, Shape.SPHERE, Shape.CYLINDER, Shape.SPHERE, Shape.CYLINDER)
-MIXED = (Shape.CUBE, Shape.SPHERE, Shape.CYLINDER, Shape.CUBE, Shape.SPHERE)
-NOISE = 0.01
-UNMEASURED = (
-    "speed against batched torch with fixed steps, discs, 1 world (goal 150x)",
-    "speed against batched torch with fixed steps, mixed shapes, 1 world (goal 60x)",
-    "speed against a compiled JAX scan with fixed steps, 256 worlds (goal 15x)",
-)
+KINDS: dict[str, tuple[Shape, ...]] = {"discs": DISCS, "mixed shapes": MIXED}
+MORE_LAWS = "mixed shapes with contact_friction, slip_to_roll and linear_drag"
+MANY = 256
+SINGLE = 4
+"""Scenes that are simulated alone, one after the other; they are the first of the many."""
 
 
-def scenes(count: int, shapes: tuple[Shape, ...], seed: int = 0) -> Worlds:
-    """Bodies around a centre that they move to."""
-    generator = np.random.default_rng(seed)
-    bodies = len(shapes)
-    side = 1.8 * np.sqrt(bodies / 5)
-    position = np.zeros((count, bodies, 2))
-    for world in range(count):
-        placed = 0
-        while placed < bodies:
-            candidate = generator.uniform(-side, side, 2)
-            if all(np.hypot(*(candidate - other)) > 0.6 for other in position[world, :placed]):
-                position[world, placed] = candidate
-                placed += 1
-    tensor = torch.from_numpy
-    return Worlds(
-        shapes=shapes,
-        position=tensor(position),
-        velocity=tensor(-position * generator.uniform(0.4, 1.2, (count, bodies, 1)))
-        + tensor(generator.normal(0, 0.4, (count, bodies, 2))),
-        angle=tensor(generator.uniform(0, 6, (count, bodies))),
-        spin=tensor(generator.normal(0, 1, (count, bodies))),
-        release_time=torch.zeros(count, bodies, dtype=torch.float64),
-        mass=tensor(generator.lognormal(0, 0.5, (count, bodies))),
-        restitution=tensor(generator.uniform(0.6, 1, (count, bodies))),
-        radius=torch.full((count, bodies), 0.2, dtype=torch.float64),
-        present=torch.ones(count, bodies, dtype=torch.bool),
-        parameters={
-            name: torch.full((count,), value, dtype=torch.float64)
-            for name, value in {
-                "sliding_friction": 0.1,
-                "rolling_resistance": 0.03,
-                "air_drag": 0.02,
-                "angular_drag": 1.0,
-            }.items()
-        },
-    )
+@dataclass
+class Checks:
+    """What is compared with a goal."""
 
+    entries: list[dict[str, object]] = field(default_factory=list)
 
-def density_and_gradient(worlds: Worlds, model: PhysicsModel) -> Callable[[], None]:
-    """One evaluation of log density and gradient for all worlds."""
-    seen = simulate(worlds, FRAMES, model).trajectory[..., :2]
-    names = ("position", "velocity", "mass", "restitution")
+    def at_most(self, name: str, value: float | None, goal: float) -> None:
+        """Add a value that should be small."""
+        self.entries.append(
+            {"name": name, "value": value, "goal": goal, "ok": value is not None and bool(value <= goal)}
+        )
 
-    def evaluate() -> None:
-        leaves = {name: getattr(worlds, name).clone().requires_grad_() for name in names}
-        predicted = simulate(replace(worlds, **leaves), FRAMES, model).trajectory[..., :2]
-        (-0.5 * ((predicted - seen) / NOISE) ** 2).sum().backward()
-
-    return evaluate
-
-
-def seconds(function: Callable[[], None], repeats: int) -> float:
-    """Median processor time of one call."""
-    function()
-    times = []
-    for _ in range(repeats):
-        start = time.process_time()
-        function()
-        times.append(time.process_time() - start)
-    return float(np.median(times))
+    def at_least(self, name: str, value: float | None, goal: float) -> None:
+        """Add a value that should be large."""
+        self.entries.append(
+            {"name": name, "value": value, "goal": goal, "ok": value is not None and bool(value >= goal)}
+        )
 
 
 def compile_seconds() -> float:
     """Processor time to compile forward and backward on a machine that never did."""
     code = (
-        "import time, torch; from benchmarks.simulator import *; w = scenes(1, MIXED); m = PhysicsModel.base();"
-        "s = time.process_time(); density_and_gradient(w, m)(); print(time.process_time() - s)"
+        "import time; from _scenes import *; w = scenes(1, MIXED); s = time.process_time();"
+        "gradient_of(w, positions_of(), torch.zeros(1, 128, 5, 2)); print(time.process_time() - s)"
     )
     with tempfile.TemporaryDirectory() as folder:
-        root = Path(__file__).resolve().parents[1]
-        environment = {**os.environ, "VRDP_PROB_CACHE": folder, "PYTHONPATH": str(root)}
-        done = subprocess.run(
-            [sys.executable, "-c", code], env=environment, cwd=root, capture_output=True, text=True, check=True
-        )
+        here = str(Path(__file__).resolve().parent)
+        environment = {**os.environ, "VRDP_PROB_CACHE": folder, "PYTHONPATH": here}
+        done = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=True)
     return float(done.stdout)
+
+
+def race(
+    name: str, shapes: Sequence[Shape], model: PhysicsModel, entrants: Sequence[str], *, quick: bool
+) -> list[Race]:
+    """Milliseconds per world of all peers, one world at a time and all at once."""
+    worlds = scenes(MANY, shapes, model)
+    sizes = {1: [worlds.select([index]) for index in range(SINGLE)]}
+    if model == BASE:
+        sizes[MANY] = [worlds]
+    races = []
+    for size, batches in sizes.items():
+        functions, taken = peers(tuple(entrants), batches, model)
+        if COMPILED in functions:
+            taken[COMPILED] = seconds_of(functions[COMPILED])  # compiles when first called
+        times = interleaved(functions, 0.2 if quick else 2.0)
+        count = size * len(batches)
+        races += [Race(name, size, peer, 1e3 * seconds / count, taken.get(peer)) for peer, seconds in times.items()]
+    return races
+
+
+def cost(varied: int, worlds: Worlds, size: int, quick: bool) -> Cost:
+    """Cost per world, forward and with gradient, where `size` worlds are simulated in one call."""
+    batches = [worlds.select(slice(begin, begin + size)) for begin in range(0, len(worlds), size)]
+    targets = [positions_of()(batch).detach() for batch in batches]
+
+    def forward() -> None:
+        for batch in batches:
+            positions_of()(batch)
+
+    def gradient() -> None:
+        for batch, target in zip(batches, targets, strict=True):
+            gradient_of(batch, positions_of(), target)
+
+    times = interleaved({"forward": forward, "gradient": gradient}, 0.1 if quick else 1.0)
+    per_world = {name: 1e3 * seconds / len(worlds) for name, seconds in times.items()}
+    return Cost(varied, contacts_per_world(worlds), per_world["forward"], per_world["gradient"])
+
+
+def gaps() -> list[Gap]:
+    """How far the fixed-step simulators are from the event-driven one where few contacts happen."""
+    found = []
+    base = [(name, shapes, BASE) for name, shapes in KINDS.items()]
+    for name, shapes, model in (*base, (MORE_LAWS, MIXED, EXTENDED)):
+        worlds = scenes(64, shapes, model)
+        calm = [index for index in range(len(worlds)) if contacts_per_world(worlds.select([index]), model) <= 1]
+        chosen = worlds.select(calm)
+        with torch.no_grad():
+            difference = (_fixed_steps(chosen, model) - positions_of(model)(chosen)).norm(dim=-1)
+        found.append(Gap(name, len(calm), float(difference.mean()), float(difference.max())))
+    return found
+
+
+def _fixed_steps(worlds: Worlds, model: PhysicsModel) -> torch.Tensor:
+    return positions(worlds, len(FRAMES), laws_of(model), FORMULATIONS["all pairs"])
+
+
+def memory(quick: bool) -> list[Memory]:
+    """Peak memory of one evaluation in a fresh process."""
+    wanted = [(OURS, worlds) for worlds in (1, MANY, 4096)]
+    if not quick:
+        wanted += [(peer, MANY) for peer in (*TORCH, *([JAX] if HAS_JAX else []))]
+    return [Memory(peer, worlds, peak(peer, "discs", worlds), peak(peer, "mixed", worlds)) for peer, worlds in wanted]
+
+
+def value_of(races: Sequence[Race], name: str, size: int, entrants: Sequence[str]) -> float | None:
+    """Milliseconds per world of the fastest of some peers."""
+    found = [race.milliseconds for race in races if (race.name, race.size) == (name, size) and race.peer in entrants]
+    return min(found, default=None)
+
+
+def ratio(races: Sequence[Race], name: str, size: int, entrants: Sequence[str]) -> float | None:
+    """How many times faster the event-driven simulator is than the fastest of some peers."""
+    peer, own = value_of(races, name, size, entrants), value_of(races, name, size, [OURS])
+    return None if peer is None or own is None else peer / own
+
+
+def check(races: Sequence[Race], compiling: float | None) -> Checks:
+    """Compare with the goals."""
+    checks = Checks()
+    checks.at_most("compile forward and backward, s", compiling, 20.0)
+    checks.at_most("log density and gradient of 5 discs, 1 world, ms", value_of(races, "discs", 1, [OURS]), 1.0)
+    for name, size, goal in (
+        ("discs", 1, 150.0),
+        ("mixed shapes", 1, 60.0),
+        ("discs", MANY, 60.0),
+        ("mixed shapes", MANY, 30.0),
+    ):
+        value = ratio(races, name, size, TORCH)
+        checks.at_least(f"times faster than torch with fixed steps, {name}, worlds: {size}", value, goal)
+    for name in KINDS:
+        for size, goal in ((1, 1.0), (MANY, 15.0)):
+            value = ratio(races, name, size, [JAX])
+            checks.at_least(f"times faster than JAX with fixed steps, {name}, worlds: {size}", value, goal)
+    value = ratio(races, MORE_LAWS, 1, TORCH)
+    checks.at_least(f"times faster than torch with fixed steps, {MORE_LAWS}, worlds: 1", value, 25.0)
+    return checks
 
 
 def main() -> None:
     """Measure, print and write."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--json", type=Path)
+    parser.add_argument("--json", type=Path, help="write the checks to this file")
+    parser.add_argument("--docs", type=Path, help="write tables and figures into this folder")
+    parser.add_argument("--quick", action="store_true", help="measure fewer sizes, shorter")
     options = parser.parse_args()
     torch.set_num_threads(1)
-    model = PhysicsModel.base()
-    checks: list[dict[str, object]] = []
-
-    def check(name: str, value: float, goal: float) -> None:
-        checks.append({"name": name, "value": value, "goal": goal, "ok": value <= goal})
-
-    check("compile forward and backward, s", compile_seconds(), 20.0)
-    for name, shapes in (("discs", DISCS), ("mixed shapes", MIXED)):
-        one = seconds(density_and_gradient(scenes(1, shapes), model), 50)
-        check(f"log density and gradient, 5 {name}, 1 world, ms", 1e3 * one, 1.0)
-        many = seconds(density_and_gradient(scenes(256, shapes), model), 5) / 256
-        check(f"the same per world at 256 worlds, {name}, ms", 1e3 * many, 0.2)
-    checks += [{"name": name, "value": None, "goal": None, "ok": False} for name in UNMEASURED]
-    for entry in checks:
-        value = "not measured" if entry["value"] is None else f"{entry['value']:.3g} (goal {entry['goal']:g})"
-        print(f"{'ok  ' if entry['ok'] else 'MISS'} {entry['name']}: {value}")
-    for bodies in (2, 4, 8, 16, 32, 64):
-        cost = seconds(density_and_gradient(scenes(4, (DISCS * 13)[:bodies]), model), 3) / 4
-        print(f"     {bodies:4d} discs: {1e3 * cost:8.3f} ms per world")
+    entrants = (OURS, *TORCH, *([JAX] if HAS_JAX else []))
+    races: list[Race] = []
+    races += race("discs", DISCS, BASE, entrants if options.quick else (*entrants, COMPILED), quick=options.quick)
+    if not options.quick:
+        races += race("mixed shapes", MIXED, BASE, entrants, quick=False)
+        races += race(MORE_LAWS, MIXED, EXTENDED, (OURS, *TORCH), quick=False)
+    bodies = (2, 4, 8, 16) if options.quick else (2, 4, 8, 16, 32, 64)
+    worlds = (1, 4, 16, 64) if options.quick else (1, 4, 16, 64, 256, 1024, 4096)
+    by_bodies, by_worlds = {}, {}
+    for name, shapes in KINDS.items():
+        by_bodies[name] = [cost(count, crowd(16, (shapes * 13)[:count]), 16, options.quick) for count in bodies]
+        batch = scenes(max(worlds), shapes)
+        # Few worlds at a time take the same 64 scenes in turn, so that the sizes are comparable.
+        by_worlds[name] = [cost(size, batch.select(slice(max(size, 64))), size, options.quick) for size in worlds]
+    checks = check(races, None if options.quick else compile_seconds())
+    text = page(
+        races=races,
+        by_bodies=by_bodies,
+        by_worlds=by_worlds,
+        memories=memory(options.quick),
+        gaps=gaps(),
+        checks=checks.entries,
+    )
+    print(text)
     if options.json:
-        options.json.write_text(json.dumps({"checks": checks}, indent=1) + "\n", encoding="utf-8")
+        options.json.write_text(json.dumps({"checks": checks.entries}, indent=1) + "\n", encoding="utf-8")
+    if options.docs:
+        figures(by_bodies, by_worlds, options.docs / "figures")
+        write_between(options.docs / "simulator-speed.md", text)
+
+
+def write_between(path: Path, text: str) -> None:
+    """Replace what stands between the marks in a page."""
+    before, rest = path.read_text(encoding="utf-8").split(BEGIN)
+    path.write_text(f"{before}{BEGIN}\n\n{text}\n\n{END}{rest.split(END)[1]}", encoding="utf-8")
+
+
+BEGIN, END = "<!-- measured: begin -->", "<!-- measured: end -->"
 
 
 if __name__ == "__main__":

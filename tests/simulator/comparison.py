@@ -21,7 +21,10 @@ LINES = [[-2.2, -2.2, 2.2, -2.3], [2.2, -2.3, 2.4, 2.2], [-2.5, 0.3, -2.1, 0.9]]
 
 @dataclass(frozen=True)
 class Comparison:
-    """What was found in some scenes: deviations in m (angles times radius), contacts, and scenes cut by doubts."""
+    """What was found in some scenes: deviations in m (angles times radius), contacts, and how much doubts cut off.
+
+    `compared` counts scenes by the share of their time before the first event in doubt, `cut` those that have one.
+    """
 
     scenes: int = 0
     farthest: float = 0.0
@@ -30,12 +33,12 @@ class Comparison:
     invented: int = 0
     latest: float = 0.0
     cut: int = 0
+    compared: float = 0.0
 
     def __add__(self, other: "Comparison") -> "Comparison":
-        sums = {name: getattr(self, name) + getattr(other, name) for name in ("scenes", "contacts", "missed", "cut")}
+        names = ("scenes", "contacts", "missed", "invented", "cut", "compared")
         return Comparison(
-            **sums,
-            invented=self.invented + other.invented,
+            **{name: getattr(self, name) + getattr(other, name) for name in names},
             farthest=max(self.farthest, other.farthest),
             latest=max(self.latest, other.latest),
         )
@@ -43,8 +46,8 @@ class Comparison:
     def __str__(self) -> str:
         return (
             f"{self.scenes} scenes, {self.contacts} contacts, {self.missed} missed, {self.invented} invented; farthest "
-            f"deviation {self.farthest:.1e} m, of the time of a contact {self.latest:.1e} s; {self.cut} scenes end "
-            "early at an event in doubt"
+            f"deviation {self.farthest:.1e} m, of the time of a contact {self.latest:.1e} s; {self.cut} scenes have an "
+            f"event in doubt, {self.compared / max(self.scenes, 1):.0%} of the time is before it"
         )
 
 
@@ -56,7 +59,7 @@ def scene_of(worlds: Worlds, index: int) -> reference.Scene:
         shapes=tuple(shape.value for shape in worlds.shapes),
         **{name: getattr(worlds, name)[index].numpy() for name in fields},
         parameters={name: float(values[index]) for name, values in worlds.parameters.items() if values.ndim == 1},
-        rolling_share=of_body.get("rolling_share", np.zeros(len(worlds.shapes))),
+        rolling_share=of_body.get("release_rolling", np.zeros(len(worlds.shapes))),
         walls=worlds.walls.numpy(),
         wall_restitution=worlds.restitution_of_walls[index].numpy(),
     )
@@ -80,6 +83,7 @@ def compare(
             scenes=1,
             farthest=float(deviation.max(initial=0.0)),
             cut=int(until < times[-1]),
+            compared=len(states) / len(times),
         )
     return total
 

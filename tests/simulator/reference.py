@@ -94,7 +94,8 @@ class _Simulation:
                 self.found[i, j] = self._search(i, j, max(self._born(i), self._born(j)), met=False)
         while True:
             doubt = min(min((one.doubt for one in self.found.values()), default=np.inf), self._doubtful_paths())
-            (i, j), time = min(((pair, one.contact) for pair, one in self.found.items()), key=lambda item: item[1])
+            times = [(one.contact, pair) for pair, one in self.found.items()]
+            time, (i, j) = min(times, default=(np.inf, (0, 0)))
             if min(time, doubt) > self.horizon:
                 break
             if doubt <= time or not self._collide(i, j, time):

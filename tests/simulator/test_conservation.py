@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from tests.simulator.comparison import scenes
 from tests.simulator.scenes import CUBE, DISC, FRAMES, SPHERE, energy, random_worlds, tensor
-from vrdp_prob.models.effects.contact_friction import ContactFriction
+from tests.simulator.test_reference import EXTENDED
 from vrdp_prob.models.effects.effect import BodyView
 from vrdp_prob.models.effects.normal_impact import NormalImpact
 from vrdp_prob.models.physics import PhysicsModel
@@ -21,7 +21,6 @@ from vrdp_prob.models.simulator.worlds import Worlds
 from vrdp_prob.scene import Shape
 
 SHORTLY = 1e-6
-RUBBING = PhysicsModel.base().with_effect(ContactFriction())
 
 
 def _body(generator: np.random.Generator) -> BodyView:
@@ -62,8 +61,10 @@ def _frictionless(worlds: Worlds) -> Worlds:
 
 
 def _rubbing(worlds: Worlds, coefficient: float) -> Worlds:
-    """The worlds with friction between bodies, and with walls and bodies that bounce differently."""
-    return replace(worlds, parameters={**worlds.parameters, "contact_friction": tensor([coefficient] * len(worlds))})
+    """The worlds with friction between bodies; the other effects of the extended model vanish."""
+    strengths = {"tilt_x": 0.0, "tilt_y": 0.0, "linear_drag": 0.0, "contact_friction": coefficient}
+    more = {name: tensor([value] * len(worlds)) for name, value in strengths.items()}
+    return replace(worlds, parameters={**worlds.parameters, **more})
 
 
 @given(shapes=SHAPES, seed=SEEDS, coefficient=st.floats(0, 2), bounce=st.floats(0.6, 1))
@@ -71,7 +72,7 @@ def _rubbing(worlds: Worlds, coefficient: float) -> Worlds:
 def test_energy_never_grows(shapes: tuple[Shape, ...], seed: int, coefficient: float, bounce: float) -> None:
     worlds = scenes(2, shapes, seed)
     worlds = replace(worlds, restitution=worlds.restitution * bounce)
-    for scene, model in ((worlds, PhysicsModel.base()), (_rubbing(worlds, coefficient), RUBBING)):
+    for scene, model in ((worlds, PhysicsModel.base()), (_rubbing(worlds, coefficient), EXTENDED)):
         rollout = simulate(scene, FRAMES, model)
         assert set(rollout.outcome) <= {Outcome.OK, Outcome.OVERLAP}
         fine = torch.from_numpy(rollout.fine)
@@ -92,7 +93,7 @@ def _of_pair(worlds: Worlds, rollout: Rollout, row: int, pair: list[int]) -> tup
 def test_every_contact_of_a_rollout_keeps_momentum(shapes: tuple[Shape, ...], seed: int, coefficient: float) -> None:
     # Without friction with the table nothing but a contact changes velocities, also shortly before and after it.
     worlds = _frictionless(scenes(1, shapes, seed, walls=False))
-    for scene, model in ((worlds, PhysicsModel.base()), (_rubbing(worlds, coefficient), RUBBING)):
+    for scene, model in ((worlds, PhysicsModel.base()), (_rubbing(worlds, coefficient), EXTENDED)):
         events = simulate(scene, FRAMES, model).events
         if not len(events) or np.diff(events.time).min(initial=1.0) < 3 * SHORTLY:
             continue

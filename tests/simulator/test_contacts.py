@@ -35,7 +35,7 @@ def _check(found: Comparison, record: Record) -> None:
     record("found", str(found))
     assert found.missed == found.invented == 0
     assert found.contacts > 2 * found.scenes
-    assert found.cut < found.scenes / 3
+    assert found.compared > 0.7 * found.scenes
     assert found.farthest < 1e-6
 
 

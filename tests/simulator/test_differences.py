@@ -9,12 +9,15 @@ from tests.simulator import reference
 from tests.simulator.comparison import scene_of, scenes
 from tests.simulator.differences import Slope, is_fair, off_frames, slopes
 from tests.simulator.scenes import CUBE, DISC, FRAMES, SPHERE
-from tests.simulator.test_reference import EXTENDED, STRENGTHS, with_strengths
+from tests.simulator.test_reference import MODELS, random_strengths
 from vrdp_prob.models.physics import PhysicsModel
 from vrdp_prob.models.simulator.worlds import Worlds
 
 Record = Callable[[str, object], None]
 MIXES = {"discs": (DISC, SPHERE, DISC, DISC), "mixed": (CUBE, DISC, CUBE, SPHERE)}
+SLIPPING = pytest.param(
+    "slipping", marks=pytest.mark.xfail(reason="a sphere that begins to roll has wrong derivatives off its path")
+)
 RIGHT = 1e-5
 """Relative error up to which a derivative counts as right."""
 
@@ -40,7 +43,7 @@ def _verdicts(count: int, mix: str, seed: int, model: PhysicsModel) -> tuple[Cou
     worst, batch = 0.0, 0
     while verdicts.total() < count:
         worlds = scenes(count, MIXES[mix], seed + batch, late=False)
-        worlds = with_strengths(worlds, STRENGTHS, seed) if model is EXTENDED else worlds
+        worlds = random_strengths(worlds, model, seed)
         for index in range(count):
             world = worlds.select([index])
             if verdicts.total() < count and is_fair(world, FRAMES, model, index):
@@ -60,9 +63,9 @@ def _check(verdicts: Counter[str], worst: float, share: float, record: Record) -
 
 
 @pytest.mark.parametrize("mix", MIXES)
-@pytest.mark.parametrize("model", [PhysicsModel.base(), EXTENDED], ids=["base", "extended"])
-def test_derivatives_of_random_scenes(mix: str, model: PhysicsModel, record_property: Record) -> None:
-    _check(*_verdicts(15, mix, 11, model), 0.9, record_property)
+@pytest.mark.parametrize("model", ["base", "extended", SLIPPING])
+def test_derivatives_of_random_scenes(mix: str, model: str, record_property: Record) -> None:
+    _check(*_verdicts(12, mix, 11, MODELS[model]), 0.9, record_property)
 
 
 @pytest.mark.slow
@@ -75,5 +78,6 @@ def test_derivatives_of_a_thousand_random_scenes(record_property: Record) -> Non
 @pytest.mark.slow
 @pytest.mark.timeout(1800)
 @pytest.mark.parametrize("mix", MIXES)
-def test_derivatives_of_many_extended_scenes(mix: str, record_property: Record) -> None:
-    _check(*_verdicts(200, mix, 41, EXTENDED), 0.99, record_property)
+@pytest.mark.parametrize("model", ["extended", SLIPPING])
+def test_derivatives_of_many_extended_scenes(mix: str, model: str, record_property: Record) -> None:
+    _check(*_verdicts(200, mix, 41, MODELS[model]), 0.99, record_property)

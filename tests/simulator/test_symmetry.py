@@ -6,19 +6,18 @@ import pytest
 import torch
 
 from tests.simulator.scenes import CUBE, DISC, FRAMES, SPHERE, random_worlds, tensor
-from tests.simulator.test_reference import EXTENDED, STRENGTHS, with_strengths
+from tests.simulator.test_reference import MODELS, random_strengths
 from vrdp_prob.models.physics import PhysicsModel
 from vrdp_prob.models.simulator.rollout import simulate
 from vrdp_prob.models.simulator.worlds import Worlds
 
 TIMES = FRAMES[:40]
 TOLERANCE = 1e-8
-MODELS = pytest.mark.parametrize("model", [PhysicsModel.base(), EXTENDED], ids=["base", "extended"])
+EACH_MODEL = pytest.mark.parametrize("model", MODELS.values(), ids=MODELS)
 
 
 def _scene(seed: int, model: PhysicsModel) -> Worlds:
-    worlds = random_worlds(8, (CUBE, DISC, SPHERE, CUBE), seed)
-    return with_strengths(worlds, STRENGTHS, seed) if model is EXTENDED else worlds
+    return random_strengths(random_worlds(8, (CUBE, DISC, SPHERE, CUBE), seed), model, seed)
 
 
 def _downhill(worlds: Worlds, tilt: torch.Tensor) -> Worlds:
@@ -38,7 +37,7 @@ def _turned(points: torch.Tensor, angle: float) -> torch.Tensor:
     return points @ torch.stack([torch.stack([cosine, sine]), torch.stack([-sine, cosine])])
 
 
-@MODELS
+@EACH_MODEL
 @pytest.mark.parametrize("seed", [1, 2])
 def test_mirror(seed: int, model: PhysicsModel) -> None:
     worlds = _scene(seed, model)
@@ -56,7 +55,7 @@ def test_mirror(seed: int, model: PhysicsModel) -> None:
     assert torch.allclose(first.trajectory * tensor([1.0, -1, -1]), second.trajectory, atol=TOLERANCE)
 
 
-@MODELS
+@EACH_MODEL
 @pytest.mark.parametrize("seed", [1, 2])
 def test_rotation(seed: int, model: PhysicsModel) -> None:
     worlds = _scene(seed, model)
@@ -74,7 +73,7 @@ def test_rotation(seed: int, model: PhysicsModel) -> None:
     assert torch.allclose(first[..., 2] + angle, second[..., 2], atol=TOLERANCE)
 
 
-@MODELS
+@EACH_MODEL
 @pytest.mark.parametrize("seed", [1, 2])
 def test_time_shift(seed: int, model: PhysicsModel) -> None:
     worlds = _scene(seed, model)
@@ -83,7 +82,7 @@ def test_time_shift(seed: int, model: PhysicsModel) -> None:
     assert torch.allclose(first.trajectory, second.trajectory, atol=TOLERANCE)
 
 
-@MODELS
+@EACH_MODEL
 def test_order_of_bodies_does_not_matter(model: PhysicsModel) -> None:
     worlds = _scene(3, model)
     order = [2, 0, 3, 1]
@@ -92,12 +91,15 @@ def test_order_of_bodies_does_not_matter(model: PhysicsModel) -> None:
         worlds,
         shapes=tuple(worlds.shapes[index] for index in order),
         **{name: getattr(worlds, name)[:, order] for name in fields},
+        parameters={
+            name: values[:, order] if values.ndim == 2 else values for name, values in worlds.parameters.items()
+        },
     )
     first, second = simulate(worlds, TIMES, model), simulate(other, TIMES, model)
     assert torch.allclose(first.trajectory[:, :, order], second.trajectory, atol=TOLERANCE)
 
 
-@MODELS
+@EACH_MODEL
 def test_a_world_does_not_depend_on_its_batch(model: PhysicsModel) -> None:
     worlds = _scene(4, model)
     together, alone = simulate(worlds, TIMES, model), simulate(worlds.select([5]), TIMES, model)

@@ -65,7 +65,7 @@ def _check(verdicts: Counter[str], worst: float, share: float, record: Record) -
 @pytest.mark.parametrize("mix", MIXES)
 @pytest.mark.parametrize("model", ["base", "extended", SLIPPING])
 def test_derivatives_of_random_scenes(mix: str, model: str, record_property: Record) -> None:
-    _check(*_verdicts(12, mix, 11, MODELS[model]), 0.9, record_property)
+    _check(*_verdicts(10, mix, 11, MODELS[model]), 0.9, record_property)
 
 
 @pytest.mark.slow

@@ -67,7 +67,7 @@ def _check(found: Comparison, record: Record) -> None:
 @pytest.mark.parametrize("mix", MIXES)
 @pytest.mark.parametrize("model", MODELS)
 def test_against_the_reference(mix: str, model: str, record_property: Record) -> None:
-    _check(_compared(16, MIXES[mix], 21, MODELS[model]), record_property)
+    _check(_compared(12, MIXES[mix], 21, MODELS[model]), record_property)
 
 
 @pytest.mark.slow

@@ -40,7 +40,8 @@ class Laws(NamedTuple):
 class Pairs(NamedTuple):
     """Pairs of one kind: indices of the first and the second bodies, and matrices [pair, body] that pick them.
 
-    Where a body is a square or a wall, also its index among those; None where it is a disc.
+    For bodies that are squares or walls also matrices [pair, box] that pick them among those; None for discs.
+    Matrices are faster than indices: the derivative of indexing is slow in torch, and more so in JAX.
     """
 
     first: Array
@@ -113,15 +114,16 @@ class System(NamedTuple):
     laws: Laws
     pairs: dict[str, Pairs]
     turns: bool  # whether spins take part in contacts
-    boxes: Array  # bodies whose angle matters: squares and walls
+    boxes: Array  # matrix [box, body] that picks the bodies whose angle matters: squares and walls
 
 
 def pairs_of(xp: Any, kinds: list[str], pairs: list[tuple[int, int]]) -> Pairs:
     """Pairs of one kind."""
     bodies = [np.array([pair[side] for pair in pairs], dtype=np.int64) for side in (0, 1)]
     rank = np.cumsum([kind != "disc" for kind in kinds]) - 1
-    boxes = tuple(None if kinds[of_side[0]] == "disc" else xp.asarray(rank[of_side]) for of_side in bodies)
     eye = np.eye(len(kinds))
+    of_boxes = np.eye(max(rank[-1] + 1, 1))
+    boxes = [None if kinds[of_side[0]] == "disc" else xp.asarray(of_boxes[rank[of_side]]) for of_side in bodies]
     first, second = (xp.asarray(of_side) for of_side in bodies)
     picks = (eye[bodies[0]], eye[bodies[1]], eye[bodies[1]] - eye[bodies[0]])
     return Pairs(first, second, (boxes[0], boxes[1]), *(xp.asarray(pick) for pick in picks))
@@ -138,7 +140,7 @@ def system_of(xp: Any, shapes: tuple[Shape, ...], laws: Laws, walls: int = 0) ->
             if kinds[second] != "wall":
                 sorted_pairs.setdefault(f"{kinds[first]}_{kinds[second]}", []).append((first, second))
     pairs = {kind: pairs_of(xp, kinds, entries) for kind, entries in sorted_pairs.items()}
-    boxes = xp.asarray(np.array([body for body, kind in enumerate(kinds) if kind != "disc"], dtype=np.int64))
+    boxes = xp.asarray(np.eye(len(kinds))[[kind != "disc" for kind in kinds]])
     turns = "square" in kinds or laws.contact_friction
     return System((*shapes, *[None] * walls), laws, pairs, turns, boxes)
 
@@ -233,7 +235,8 @@ def resist(xp: Any, laws: Laws, constants: Constants, motion: Motion) -> tuple[A
 def meet(xp: Any, system: System, constants: Constants, motion: Motion) -> tuple[Array, Array]:
     """Velocities and spins after the contacts of all pairs, touching or not."""
     push, twist = 0.0, 0.0
-    turns = (xp.cos(motion.angle[system.boxes]), xp.sin(motion.angle[system.boxes])) if len(system.boxes) else None
+    angle = system.boxes @ motion.angle if len(system.boxes) else None
+    turns = None if angle is None else (xp.cos(angle), xp.sin(angle))
     for kind, pairs in system.pairs.items():
         pair = pair_of(system, constants.pairs[kind], motion, pairs, turns)
         impulse, on_first, on_second = CONTACTS[kind](xp, system.laws, pair)
@@ -259,12 +262,12 @@ class Pair(NamedTuple):
 
 def pair_of(system: System, fixed: Fixed, motion: Motion, pairs: Pairs, turns: Any) -> Pair:
     """All pairs of a kind, with cosine and sine of all boxes."""
-    of_boxes = [None if box is None else (turns[0][box], turns[1][box]) for box in pairs.boxes]
+    of_boxes = [None if box is None else (box @ turns[0], box @ turns[1]) for box in pairs.boxes]
     return Pair(
         offset=matmul(pairs.difference, motion.position),
         closing=matmul(pairs.difference, motion.velocity),
         turns=(of_boxes[0], of_boxes[1]),
-        spin=(motion.spin[pairs.first], motion.spin[pairs.second]) if system.turns else (None, None),
+        spin=(pairs.pick_first @ motion.spin, pairs.pick_second @ motion.spin) if system.turns else (None, None),
         fixed=fixed,
     )
 
@@ -360,9 +363,9 @@ def box_meets_disc(xp: Any, laws: Laws, pair: Pair, height: float = 1.0) -> tupl
     flat = between / xp.sqrt(square + TINY)[..., None, :]
     touches = (square < pair.fixed.radius_1 * pair.fixed.radius_1) & (square > 0)
     beside = (dot(nearest, flat), -pair.fixed.radius_1) if laws.contact_friction else None
-    return impulse_of(
-        xp, pair, touches, turned(xp, cosine, sine, flat), along=(cross(xp, nearest, flat), None), beside=beside
-    )
+    # A wall does not turn.
+    along = (cross(xp, nearest, flat) if height else None, None)
+    return impulse_of(xp, pair, touches, turned(xp, cosine, sine, flat), along=along, beside=beside)
 
 
 def wall_meets_disc(xp: Any, laws: Laws, pair: Pair) -> tuple[Array, Array, Array]:

@@ -10,6 +10,7 @@ mpl.use("Agg")
 
 import matplotlib.pyplot as plt
 from matplotlib.axes import Axes
+from matplotlib.ticker import LogLocator
 
 
 class Race(NamedTuple):
@@ -155,6 +156,7 @@ def _draw(axes: Axes, costs: Costs) -> None:
     axes.set_xticks(at, [str(value) for value in at])
     axes.minorticks_off()
     axes.set_ylabel("ms per world (128 frames, one thread)")
+    axes.yaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
     axes.yaxis.set_major_formatter("{x:g}")
     axes.grid(alpha=0.3)
     axes.legend(frameon=False)

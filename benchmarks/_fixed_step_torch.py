@@ -1,6 +1,6 @@
 """The peer in torch: a plain batched simulator with fixed steps, differentiated by autograd.
 
-The physics is in `_fixed_step.py`. What was tried to make it fast (milliseconds per world for log density and gradient
+The physics is in `_fixed_step.py` and `_fixed_step_contacts.py`. What was tried to make it fast (milliseconds per world for log density and gradient
 of 5 discs, at 1 world and at 256 worlds; a busy machine, so compare within the line):
 
 - the world as first axis and products of pairs as batched matrices: slower than the world as last axis, where the pairs
@@ -20,24 +20,19 @@ from typing import Any
 
 import torch
 from _fixed_step import (
-    CONTACTS,
     STEPS_PER_FRAME,
-    TINY,
     Constants,
-    Fixed,
     Inputs,
-    Laws,
     Motion,
-    Pair,
     System,
     begin,
     constants_of,
-    matmul,
     meet,
     resist,
     step,
     system_of,
 )
+from _fixed_step_contacts import CONTACTS, TINY, Fixed, Laws, Pair, matmul
 from torch import Tensor
 
 from vrdp_prob.models.simulator.worlds import Worlds

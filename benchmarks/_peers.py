@@ -5,7 +5,7 @@ from collections.abc import Callable
 from functools import partial
 
 import torch
-from _fixed_step import Laws
+from _fixed_step_contacts import Laws
 from _fixed_step_torch import BODY_FIELDS, FORMULATIONS, inputs_of, positions
 from _scenes import EXTENDED, FRAMES, LEAVES, NOISE, gradient_of, positions_of
 

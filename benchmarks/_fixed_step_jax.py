@@ -1,6 +1,8 @@
 """The peer in JAX: the same simulator with fixed steps as a compiled scan, differentiated by JAX.
 
-The physics is in `_fixed_step.py` and `_fixed_step_contacts.py`. What was tried to make it fast (milliseconds per world for log density and gradient
+The physics is in `_fixed_step.py` and `_fixed_step_contacts.py`.
+
+What was tried to make it fast (milliseconds per world for log density and gradient
 of 5 discs, at 1 world and at 256 worlds): ten steps unrolled per frame 5.4 and 1.5, a scan of single steps 9.7 and 1.7,
 pairs as slices of bodies instead of matrix products 7 to 12 and 1.1 to 2.0, frames computed again in the derivative
 (`jax.checkpoint`) 6.3 and 0.43, all contacts skipped in steps where no pair is near (`lax.cond`) 3.7 at 1 world. With

@@ -1,6 +1,8 @@
 """The peer in torch: a plain batched simulator with fixed steps, differentiated by autograd.
 
-The physics is in `_fixed_step.py` and `_fixed_step_contacts.py`. What was tried to make it fast (milliseconds per world for log density and gradient
+The physics is in `_fixed_step.py` and `_fixed_step_contacts.py`.
+
+What was tried to make it fast (milliseconds per world for log density and gradient
 of 5 discs, at 1 world and at 256 worlds; a busy machine, so compare within the line):
 
 - the world as first axis and products of pairs as batched matrices: slower than the world as last axis, where the pairs

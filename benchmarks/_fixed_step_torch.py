@@ -5,16 +5,16 @@ The physics is in `_fixed_step.py` and `_fixed_step_contacts.py`.
 What was tried to make it fast (milliseconds per world for log density and gradient
 of 5 discs, at 1 world and at 256 worlds; a busy machine, so compare within the line):
 
-- the world as first axis and products of pairs as batched matrices: slower than the world as last axis, where the pairs
-  are one matrix product and all else is contiguous;
-- `linalg.vector_norm` over the axis of x and y: 120 microseconds for 2560 bodies, where the root of the sum of squares
-  takes 9; `where` with masks against multiplication with masks: no difference;
-- `addcdiv` and `addcmul` for friction and drag: two nodes fewer per step, kept;
+- `linalg.vector_norm` over the axis of x and y: 120 microseconds for 1280 vectors, where the root of the sum of squares
+  takes 9;
+- `addcdiv` and `addcmul` for friction and drag: fewer nodes per step, kept;
+- cosine and sine once per square instead of once per pair, bodies of a pair picked by a product with a matrix instead
+  of indices, corners of squares without derivative except for the one that touches: kept;
 - all pairs in every step: 470 and 3.7; kinds of pairs of which none is near left out: 190 and 5.1; the pairs that are
-  near gathered, the rest left out: 200 and 2.8. `FORMULATIONS` holds the first and the last, and the benchmark takes
-  the faster one: with squares, many of which are near for long, gathering loses at 256 worlds;
-- `torch.compile` of one frame (10 steps): 68 and 0.92, after 19 s of compilation, and minutes with squares. It is no
-  plain torch any more, so the benchmark names it apart.
+  near gathered, the rest left out: 200 and 2.3. `FORMULATIONS` holds the first and the last, and the benchmark takes
+  the faster one (with squares both take about 20 at 256 worlds);
+- `torch.compile` of one frame (10 steps): 68 and 0.92, after 19 s of compilation. It is no plain torch any more, so the
+  benchmark names it apart.
 """
 
 from collections.abc import Callable

@@ -9,10 +9,12 @@ from jaxtyping import Bool, Float
 from torch import Tensor
 
 from vrdp_prob.models.coordinates import Coordinates
+from vrdp_prob.models.measurement import changes_clock, changes_positions, measured_positions, true_times
 from vrdp_prob.models.observation import Observations
 from vrdp_prob.models.physics import PhysicsModel
 from vrdp_prob.models.scenery import Quantities, Scenery
 from vrdp_prob.models.simulator.rollout import Rollout, simulate
+from vrdp_prob.models.simulator.worlds import Worlds
 from vrdp_prob.models.unknowns import ANGLE_NOISE, NOISE
 from vrdp_prob.scene import Tracks
 
@@ -63,11 +65,28 @@ class Likelihood:
 
     def rollout(self, points: Float[Tensor, "point dimension"], frame_count: int | None = None) -> Rollout:
         """Simulate the worlds of some points over the (first) frames of the video."""
-        return self._rollout(self.coordinates.quantities(points), frame_count)
+        return self._rollout(self._worlds(self.coordinates.quantities(points)), frame_count)[0]
 
-    def _rollout(self, quantities: Quantities, frame_count: int | None) -> Rollout:
-        worlds = self._scenery.worlds(self.model, quantities)
-        return simulate(worlds, self._times[:frame_count], self.model, event_limit=EVENT_LIMIT)
+    def _worlds(self, quantities: Quantities) -> Worlds:
+        return self._scenery.worlds(self.model, quantities)
+
+    def _rollout(self, worlds: Worlds, frame_count: int | None) -> tuple[Rollout, Bool[np.ndarray, "point"]]:
+        """Rollout over the frames, and whether each world has a clock that goes forward and was simulated."""
+        times, forward = self._times[:frame_count], np.ones(len(worlds), dtype=bool)
+        if changes_clock(self.model):
+            true, increasing = true_times(self.model, worlds.parameters, self._times.expand(len(worlds), -1))
+            worlds = worlds.released_at(true[:, self.tracks.seen.argmax(axis=0)])
+            times, forward = true[:, :frame_count], increasing.numpy()
+        rollout = simulate(worlds, times, self.model, event_limit=EVENT_LIMIT)
+        return rollout, forward & rollout.fine
+
+    def _measured(self, worlds: Worlds, rollout: Rollout) -> Float[Tensor, "point number"]:
+        """Numbers (x, y, angle) of all frames and bodies as they are measured, in a row for each world."""
+        trajectory = rollout.trajectory
+        if changes_positions(self.model):
+            seen = measured_positions(self.model, worlds.parameters, trajectory[..., :2], rollout.times)
+            trajectory = torch.cat([seen, trajectory[..., 2:]], dim=-1)
+        return trajectory.flatten(1)
 
     def residuals(
         self, points: Float[np.ndarray, "point dimension"], frame_count: int | None = None
@@ -108,8 +127,9 @@ class Likelihood:
         self, quantities: Quantities, frame_count: int | None
     ) -> tuple[Float[Tensor, "point residual"], Bool[np.ndarray, "point"]]:
         observations = self.observations if frame_count is None else self.observations.until(frame_count)
-        rollout = self._rollout(quantities, frame_count)
-        states = rollout.trajectory.flatten(1)
+        worlds = self._worlds(quantities)
+        rollout, valid = self._rollout(worlds, frame_count)
+        states = self._measured(worlds, rollout)
         # index_select, because its derivative is many times faster than that of indexing with several arrays.
         position = states.index_select(1, observations.position_places).reshape(len(states), -1, 2)
         difference = position - torch.from_numpy(observations.position)
@@ -121,8 +141,7 @@ class Likelihood:
             angle = (predicted - torch.from_numpy(observations.angle)) / observations.angle_reference
             parts.append(angle / quantities[ANGLE_NOISE])
         residuals = torch.cat(parts, dim=1)
-        valid = rollout.fine & torch.isfinite(residuals).all(dim=1).numpy()
-        return residuals, valid
+        return residuals, valid & torch.isfinite(residuals).all(dim=1).numpy()
 
     def _log_scale(self, quantities: Quantities) -> Float[Tensor, "point"]:
         """Sum of the log noise scales over all seen numbers."""

@@ -1,0 +1,44 @@
+"""A place on the table with another friction."""
+
+import math
+from collections.abc import Mapping
+from typing import ClassVar
+
+from vrdp_prob.models.effects.effect import BodyView, Effect
+from vrdp_prob.models.parameters import Parameter, Prior, Transform
+from vrdp_prob.models.simulator.formula import Scalar
+from vrdp_prob.models.simulator.mathematics import length, maximum, where
+
+PATCH_X = Parameter("patch_x", "m", "x of the patch's middle", Transform.IDENTITY, Prior(0.0, 2.0), default=0.0)
+PATCH_Y = Parameter("patch_y", "m", "y of the patch's middle", Transform.IDENTITY, Prior(0.0, 2.0), default=0.0)
+PATCH_RADIUS = Parameter(
+    "patch_radius", "m", "radius of the patch", Transform.LOG, Prior(math.log(0.5), 0.7), default=0.5
+)
+PATCH_FRICTION = Parameter(
+    "patch_friction",
+    "1",
+    "share by which friction is larger on the patch",
+    Transform.IDENTITY,
+    Prior(0.0, 1.0),
+    default=0.0,
+)
+
+
+class FrictionPatch(Effect):
+    """Friction differs inside a disc."""
+
+    name: ClassVar = "friction_patch"
+    sentence: ClassVar = "There is a patch on the table that slows bodies more, or less, than the rest."
+    law: ClassVar = "mu (1 + patch_friction) where the centre is within patch_radius of (patch_x, patch_y), at least 0"
+    source: ClassVar = "dry friction of two materials"
+    parameters: ClassVar = (PATCH_X, PATCH_Y, PATCH_RADIUS, PATCH_FRICTION)
+    vanishes_at: ClassVar = {"patch_friction": 0.0}
+
+    def boundary(self, body: BodyView, parameters: Mapping[str, Scalar]) -> Scalar:
+        """Distance of the centre from the patch in m, negative on it."""
+        distance = length(body.x - parameters["patch_x"], body.y - parameters["patch_y"])
+        return distance - parameters["patch_radius"]
+
+    def friction_factor(self, time: Scalar, body: BodyView, parameters: Mapping[str, Scalar]) -> Scalar:
+        """Factor of the friction, 1 beside the patch."""
+        return where(body.side[self.name] < 0, maximum(0.0, 1 + parameters["patch_friction"]), 1.0)

@@ -1,0 +1,41 @@
+"""Something fixed that nobody sees."""
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import ClassVar
+
+from jaxtyping import Float
+from torch import Tensor
+
+from vrdp_prob.models.effects.effect import Effect
+from vrdp_prob.models.parameters import EDGE, Parameter, Prior, Transform
+from vrdp_prob.models.simulator.obstacle import Obstacle
+
+OBSTACLE_X = Parameter("obstacle_x", "m", "x of the obstacle", Transform.IDENTITY, Prior(0.0, 2.0), default=0.0)
+OBSTACLE_Y = Parameter("obstacle_y", "m", "y of the obstacle", Transform.IDENTITY, Prior(0.0, 2.0), default=0.0)
+OBSTACLE_RADIUS = Parameter(
+    "obstacle_radius", "m", "radius of the obstacle", Transform.LOG, Prior(math.log(0.2), 0.7), default=0.2
+)
+OBSTACLE_RESTITUTION = Parameter(
+    "obstacle_restitution",
+    "1",
+    "restitution factor of the obstacle",
+    Transform.LOG,
+    Prior(math.log(0.8), 0.35, upper=EDGE),
+    default=0.8,
+)
+
+
+class HiddenObstacle(Effect):
+    """A fixed disc that bodies bounce off."""
+
+    name: ClassVar = "hidden_obstacle"
+    sentence: ClassVar = "Something that cannot be seen stands in the way."
+    law: ClassVar = "a fixed disc at (obstacle_x, obstacle_y) with obstacle_radius; e = r obstacle_restitution"
+    source: ClassVar = "contact with a body of infinite mass"
+    parameters: ClassVar = (OBSTACLE_X, OBSTACLE_Y, OBSTACLE_RADIUS, OBSTACLE_RESTITUTION)
+
+    def obstacles(self, parameters: Mapping[str, Float[Tensor, "world"]]) -> Sequence[Obstacle]:
+        """The disc."""
+        names = ("obstacle_x", "obstacle_y", "obstacle_radius", "obstacle_restitution")
+        return (Obstacle.disc(*(parameters[name] for name in names)),)

@@ -1,0 +1,44 @@
+"""Attraction or repulsion between bodies at a distance."""
+
+import math
+from collections.abc import Mapping
+from typing import ClassVar
+
+from vrdp_prob.models.effects.effect import BodyView, Effect
+from vrdp_prob.models.parameters import Parameter, Prior, Transform
+from vrdp_prob.models.simulator.formula import Scalar
+from vrdp_prob.models.simulator.mathematics import sqrt
+
+PAIR_STRENGTH = Parameter(
+    "pair_strength", "N m^2", "strength of the attraction between two bodies", Transform.IDENTITY, Prior(0.0, 0.05), 0.0
+)
+PAIR_SOFTENING = Parameter(
+    "pair_softening",
+    "m",
+    "distance below which the attraction between two bodies grows no further",
+    Transform.LOG,
+    Prior(math.log(0.2), 0.7),
+    default=0.2,
+)
+
+
+class PairForce(Effect):
+    """A force along the line between two bodies that falls with the square of their distance."""
+
+    name: ClassVar = "pair_force"
+    sentence: ClassVar = "Bodies attract or repel each other without touching."
+    law: ClassVar = (
+        "force pair_strength r / (|r|^2 + pair_softening^2)^1.5 between two bodies, attraction where positive"
+    )
+    source: ClassVar = "inverse-square law with a softening length: H. C. Plummer, MNRAS 71 (1911)"
+    parameters: ClassVar = (PAIR_STRENGTH, PAIR_SOFTENING)
+    vanishes_at: ClassVar = {"pair_strength": 0.0}
+
+    def pair_force(
+        self, time: Scalar, first: BodyView, second: BodyView, parameters: Mapping[str, Scalar]
+    ) -> tuple[Scalar, Scalar]:
+        """Force in N towards the second body."""
+        x, y = second.x - first.x, second.y - first.y
+        square = x * x + y * y + parameters["pair_softening"] * parameters["pair_softening"]
+        strength = parameters["pair_strength"] / (square * sqrt(square))
+        return strength * x, strength * y

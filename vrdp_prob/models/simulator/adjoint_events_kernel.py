@@ -34,6 +34,7 @@ from vrdp_prob.models.simulator.laws_kernel import (
     kick_time_vjp,
     kick_vjp,
 )
+from vrdp_prob.models.simulator.motion import ROLLING_SHARE
 from vrdp_prob.models.simulator.motion_kernel import take_states
 from vrdp_prob.models.simulator.tape_kernel import (
     BEFORE_FIRST,
@@ -96,8 +97,9 @@ def reverse_stop(world, adjoint, body, t):
     phase, bar = world.phase[body], adjoint.state[body]
     rolls = SLIPS and phase[MOVING] == SLIPPING
     if rolls:
-        bar[3], bar[4] = bar[3] + bar[6], bar[4] + bar[7]
-        bar[6], bar[7] = 0.0, 0.0
+        for c in range(2):
+            both = bar[3 + c] + bar[6 + c]
+            bar[3 + c], bar[6 + c] = ROLLING_SHARE * both, (1.0 - ROLLING_SHARE) * both
     else:
         bar[3], bar[4] = 0.0, 0.0
         if SLIPS:

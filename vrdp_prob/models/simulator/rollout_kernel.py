@@ -45,6 +45,7 @@ from vrdp_prob.models.simulator.laws_kernel import (
     contact_law,
     kick,
 )
+from vrdp_prob.models.simulator.motion import ROLLING_SHARE
 from vrdp_prob.models.simulator.motion_kernel import LINGERING, cluster_derivatives, set_sides, settle, take_states
 from vrdp_prob.models.simulator.pressing_kernel import (
     ROOM_COUNTS,
@@ -264,7 +265,7 @@ def stop(world, cluster, body, t, moves):
     if not moves:
         y[5] = 0.0
     elif SLIPS and world.phase[body, MOVING] == SLIPPING:
-        y[6], y[7] = y[3], y[4]
+        begin_rolling(y)
     else:
         y[3], y[4] = 0.0, 0.0
         for place in range(world.members[cluster, 0] if world.members[cluster, 0] > 1 else 0):
@@ -273,6 +274,14 @@ def stop(world, cluster, body, t, moves):
             if world.phase[member, MOVING] == SLIDING and math.hypot(other[3], other[4]) <= 2.0 * LINGERING:
                 other[3], other[4] = 0.0, 0.0
     settle(world, body, t, y)
+
+
+@compiled
+def begin_rolling(y):
+    """Take what is left of a slip from velocity and rolling velocity as friction does."""
+    for c in range(2):
+        rolling = ROLLING_SHARE * y[3 + c] + (1.0 - ROLLING_SHARE) * y[6 + c]
+        y[3 + c], y[6 + c] = rolling, rolling
 
 
 @compiled

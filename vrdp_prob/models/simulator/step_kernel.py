@@ -23,6 +23,7 @@ from vrdp_prob.models.simulator.pressing_kernel import find_parting, find_yieldi
 from vrdp_prob.models.simulator.world_kernel import (
     CONTINUES,
     ENDING,
+    FIXED,
     LENGTH,
     ORIGIN,
     REFERENCE_X,
@@ -58,7 +59,7 @@ def hold_cluster(world, cluster, t):
 def rest(world, cluster, t, horizon):
     """Let a cluster rest, where forces change with time until they move a body."""
     hold_cluster(world, cluster, t)
-    if TIMED:
+    if TIMED and not world.kind[cluster, FIXED]:
         world.clock[cluster, ENDING] = CONTINUES
         until = find_yielding(world, cluster, t, horizon)
         for place in range(world.members[cluster, 0]):
@@ -128,7 +129,7 @@ def advance(world, cluster, t, horizon):
         elif not really_stops(world, cluster, share):
             h *= 0.5 * max(share, 0.1)
         else:
-            if COUPLED or presses(world, cluster):
+            if COUPLED or TIMED or presses(world, cluster):
                 share = find_parting(world, cluster, t, h, share)
             for place in range(world.members[cluster, 0]):
                 clock = world.clock[world.members[cluster, 1 + place]]

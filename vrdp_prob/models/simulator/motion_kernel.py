@@ -47,6 +47,7 @@ from vrdp_prob.models.simulator.world_kernel import (
     SIDES,
     SLIDING,
     SLIPPING,
+    SPARE,
     SPIN_SENSE,
     SPIN_STOPS,
     STAGES,
@@ -54,17 +55,22 @@ from vrdp_prob.models.simulator.world_kernel import (
     TRAVEL,
     WORK,
     evaluate,
+    evaluate_rate,
 )
 
 TOLERANCE = 1e-11
 """Error of one step, in m, m/s, rad and rad/s."""
+INNER_TOLERANCE = 1e-9
+"""Change of the velocity in m/s within a step by which its polynomial may miss the law in the middle."""
 VANISHED = 1e-7
 """Speed in m/s across the direction of motion below which a body at its turning point rests."""
 LINGERING = 1e-6
-"""Speed in m/s below which a body stops that moves with others.
+"""Speed (or slip) in m/s below which a body stops whose direction of motion changes.
 
-The force of the others turns its motion ever faster while it slows down, which would take many short steps.
+What is not friction turns its motion ever faster while it slows down, which would take many short steps.
 """
+STRAIGHT = 1e-9
+"""Sine of the angle between velocity and acceleration below which a motion counts as straight."""
 SLOWEST = 1e-10
 """Speed in m/s (or rad/s) below which a body rests, and with which it starts when a force moves it."""
 SMALLEST_SHARE = 1e-16
@@ -181,6 +187,25 @@ def step_error(world, body, h):
         if scale > 0.0:
             worst = max(worst, abs(h) * fifth * fifth / (scale * TOLERANCE))
     return worst
+
+
+@compiled
+def inner_error(world, cluster, t, h):
+    """Error of a step in its middle relative to what is allowed there.
+
+    The error at the end may vanish by chance where a step is too long, and says nothing of the polynomial. This is how
+    far the polynomial's derivative is from the law, times the length. Source: W. H. Enright, A new error-control for
+    initial value solvers, Appl. Math. Comput. 31 (1989).
+    """
+    worst, rate = 0.0, world.stages[PUSH + 1, 0]
+    take_states(world, cluster, 0.5)
+    cluster_derivatives(world, cluster, t + 0.5 * h, world.stages[SPARE])
+    for place in range(world.members[cluster, 0]):
+        body = world.members[cluster, 1 + place]
+        evaluate_rate(world.polynomial[body], 0.5, h, rate)
+        for c in range(3, 5):
+            worst = max(worst, h * abs(rate[c] - world.stages[SPARE, body, c]))
+    return worst / INNER_TOLERANCE
 
 
 @compiled
@@ -328,11 +353,28 @@ def cut(world, cluster, share, root, ending, what):
 
 
 @compiled
-def stopping_level(world, cluster, phase):
+def bends(world, body):
+    """Whether the velocity (or slip) with which a piece begins changes its direction."""
+    phase, rate = world.phase[body], world.stages[0, body]
+    x, y = rate[3], rate[4]
+    if SLIPS and phase[MOVING] == SLIPPING:
+        x, y = x - rate[6], y - rate[7]
+    across = abs(x * phase[REFERENCE_Y] - y * phase[REFERENCE_X])
+    return across > STRAIGHT * math.hypot(x, y) * math.hypot(phase[REFERENCE_X], phase[REFERENCE_Y])
+
+
+@compiled
+def lingers(world, cluster, body):
+    """Whether a body would turn ever faster while it stops, or stops together with others."""
+    return world.members[cluster, 0] > 1 or bends(world, body)
+
+
+@compiled
+def stopping_level(world, cluster, body):
     """Value of `vanishing` at which a body stops."""
-    if world.members[cluster, 0] == 1:
+    if not lingers(world, cluster, body):
         return 0.0
-    speed = math.hypot(phase[REFERENCE_X], phase[REFERENCE_Y])
+    speed = math.hypot(world.phase[body, REFERENCE_X], world.phase[body, REFERENCE_Y])
     return min(LINGERING, 0.5 * speed) * speed
 
 
@@ -345,7 +387,7 @@ def find_ending(world, cluster, body, share):
         root = vanishing_share(polynomial, phase, 1.0, 0.0)
         share = cut(world, cluster, share, root, SPIN_STOPS, body)
     moves = phase[REFERENCE_X] != 0.0 or phase[REFERENCE_Y] != 0.0
-    level = stopping_level(world, cluster, phase)
+    level = stopping_level(world, cluster, body)
     if moves and vanishing(polynomial, phase, 1.0, 0.0)[0] <= level:
         root = vanishing_share(polynomial, phase, 0.0, level)
         share = cut(world, cluster, share, root, STOPS, body)
@@ -399,7 +441,7 @@ def really_stops(world, cluster, share):
         return True
     body = int(world.clock[cluster, ENDING_BODY])
     y = world.stages[WORK, body]
-    vanished = VANISHED if world.members[cluster, 0] == 1 else 2.0 * LINGERING
+    vanished = 2.0 * LINGERING if lingers(world, cluster, body) else VANISHED
     evaluate(world.polynomial[body], share, y)
     if SLIPS and world.phase[body, MOVING] == SLIPPING:
         return math.hypot(y[3] - y[6], y[4] - y[7]) <= vanished

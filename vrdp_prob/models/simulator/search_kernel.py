@@ -25,13 +25,14 @@ from vrdp_prob.models.simulator.detection_kernel import (
     POWERS,
     PRESSING,
     RATE,
-    SLACK,
-    SLOW,
+    STILL,
+    STILL_RATE,
     TOUCHING,
     add_path,
     bound,
     box_box,
     box_disc,
+    closes,
     disc_disc,
     plane_bound,
     touching_walk,
@@ -139,7 +140,7 @@ def certain_step(world, pairs, i, j, duration):
     if world.kind[i, SHAPE] != DISC and world.kind[j, SHAPE] != DISC:
         step = pairs.local[LOOK, CURVATURE]
     elif touching:
-        step = touching_walk(gap, rate, pairs.local[LOOK, CURVATURE])
+        step = touching_walk(gap, rate, pairs.local[LOOK, CURVATURE], pairs.local[LOOK, STILL_RATE])
     else:
         step = walk(gap, rate, pairs.local[LOOK, CURVATURE])
     return max(step, CRAWL / duration) if touching else step
@@ -166,6 +167,7 @@ def search(world, pairs, i, j, t, end):
     turning = outer_radius(world, i) * bound(pairs.local[ANGLE_FIRST], 1)
     turning += outer_radius(world, j) * bound(pairs.local[ANGLE_FIRST + 1], 1)
     fastest = plane_bound(pairs.local, 1) + turning
+    pairs.local[LOOK, STILL_RATE] = STILL * duration
     s = 0.0
     while s <= 1.0:
         code = look(world, pairs, i, j, s, curvature)
@@ -176,7 +178,7 @@ def search(world, pairs, i, j, t, end):
             else:
                 s += max(-gap / fastest, CLEARING / duration)
             continue
-        if gap <= TOUCHING and (rate < -SLOW or (gap <= -SLACK and rate < 0.0)):
+        if gap <= TOUCHING and closes(gap, rate):
             pairs.table[i, j, CONTACT_TIME] = t + s * duration
             pairs.table[i, j, PAIR_KIND] = code % 2
             pairs.table[i, j, OWNER] = j if code >= 2 else i

@@ -70,7 +70,17 @@ def assemble(effects: Sequence[Effect], layout: Layout) -> str:
         file = folder / f"{name}_kernel.py"
         if file.is_file():
             parts.append(_without_imports(file.read_text(encoding="utf-8")))
-    return "\n".join(parts)
+    text = "\n".join(parts)
+    _check_names(text)
+    return text
+
+
+def _check_names(text: str) -> None:
+    """Raise where two kernels define a function of the same name, as all share one module."""
+    names = re.findall(r"^def (\w+)\(", text, flags=re.MULTILINE)
+    twice = sorted({name for name in names if names.count(name) > 1})
+    if twice:
+        raise RuntimeError(f"the kernel defines {', '.join(twice)} more than once; rename one of each.")
 
 
 def _is_coupled(effects: Sequence[Effect]) -> bool:

@@ -12,6 +12,7 @@ from vrdp_prob.models.simulator.motion_kernel import (
     find_crossing,
     find_ending,
     first_step,
+    inner_error,
     is_still,
     match_velocities,
     really_stops,
@@ -103,12 +104,15 @@ def try_step(world, cluster, t, h):
     if error > 1.0:
         return error, 1.0
     compute_stages(world, cluster, t, h, PARTS_OF_STEP[2], PARTS_OF_STEP[3])
+    for place in range(world.members[cluster, 0]):
+        set_polynomial(world, world.members[cluster, 1 + place], h)
+    within = inner_error(world, cluster, t, h)
+    if within > 1.0:
+        return within, 1.0
     share = 1.0
     world.clock[cluster, ENDING] = CONTINUES
     for place in range(world.members[cluster, 0]):
-        body = world.members[cluster, 1 + place]
-        set_polynomial(world, body, h)
-        share = find_ending(world, cluster, body, share)
+        share = find_ending(world, cluster, world.members[cluster, 1 + place], share)
     if BOUNDARIES > 0:
         for place in range(world.members[cluster, 0]):
             share = find_crossing(world, cluster, world.members[cluster, 1 + place], share)

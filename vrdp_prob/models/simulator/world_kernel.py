@@ -51,7 +51,7 @@ class World(NamedTuple):
     phase: np.ndarray  # [body, (moving, reference x, reference y, spin sense, alive, bound on the way, sides)]
     clock: np.ndarray  # [body, (origin, length, end of validity, next step, how it ends, for which body)], s
     polynomial: np.ndarray  # [body, power, state]
-    stages: np.ndarray  # [stage and three for work, body, state]
+    stages: np.ndarray  # [stage and four for work, body, state]
     members: np.ndarray  # [body, (size of its cluster, bodies in it)], two more rows of room
     touching: np.ndarray  # [lasting contact, (bodies, kind, features, how it holds, force, constraint)]
     matrix: np.ndarray  # [lasting contact, lasting contact and one], room for the equations of a cluster
@@ -72,7 +72,7 @@ def new_world(kind, body, shared, start):
         np.zeros((count, PHASE_SIZE)),
         np.zeros((count, 6)),
         np.zeros((count, DENSE.shape[0], STATE_SIZE)),
-        np.zeros((PUSH + 1, count, STATE_SIZE)),
+        np.zeros((PUSH + 2, count, STATE_SIZE)),
         np.zeros((count + 2, count + 1), np.int64),
         np.zeros((most, 21)),
         np.zeros((most, most + 1)),

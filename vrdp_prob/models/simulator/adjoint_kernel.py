@@ -22,6 +22,7 @@ from vrdp_prob.models.simulator.cluster_kernel import (
     TOUCH_FEATURE,
     TOUCH_KIND,
     constrain_vjp,
+    is_alone,
     mobility,
     note_member,
     presses,
@@ -36,6 +37,7 @@ from vrdp_prob.models.simulator.laws_kernel import (
     dense_output_vjp,
     motion_vjp,
     pair_force_vjp,
+    stage_state,
     stage_state_vjp,
 )
 from vrdp_prob.models.simulator.motion_kernel import (
@@ -46,7 +48,6 @@ from vrdp_prob.models.simulator.motion_kernel import (
     match_velocities,
     pair_force_of,
     set_polynomial,
-    stage_states,
 )
 from vrdp_prob.models.simulator.tableau import DENSE, NODES
 from vrdp_prob.models.simulator.tape_kernel import (
@@ -219,24 +220,90 @@ def reverse_step(world, adjoint, cluster, t, h):
         dense_output_vjp(adjoint.polynomial[body], body, h, adjoint.stages)
         for c in range(STATE_SIZE):
             adjoint.state[body, c] = adjoint.polynomial[body, 0, c]
+    if is_alone(world, cluster):
+        reverse_stages(world, adjoint, cluster, t, h, STAGES - 1, -1)
+        return
     pressing = presses(world, cluster)
     for stage in range(STAGES - 1, -1, -1):
-        stage_states(world, cluster, stage, h)
         time = t + NODES[stage] * h
+        for place in range(world.members[cluster, 0]):
+            body = world.members[cluster, 1 + place]
+            stage_state(world.polynomial[body, 0], world.stages, body, stage, h, world.stages[WORK, body])
         if pressing:
             # Computes the forces of this stage again.
             cluster_derivatives(world, cluster, time, world.stages[stage])
-        for place in range(world.members[cluster, 0]):
-            body = world.members[cluster, 1 + place]
-            for c in range(STATE_SIZE):
-                adjoint.before[body, c] = 0.0
-        if pressing:
             bars = adjoint.stages[stage]
             constrain_vjp(world, adjoint, cluster, world.stages[stage], bars, adjoint.before, 1.0)
         if COUPLED:
             pair_forces_vjp(world, adjoint, cluster, time, adjoint.stages[stage])
         for place in range(world.members[cluster, 0]):
-            reverse_stage(world, adjoint, world.members[cluster, 1 + place], time, h, stage)
+            reverse_stages(world, adjoint, world.members[cluster, 1 + place], t, h, stage, stage - 1)
+
+
+@compiled
+def reverse_stages(world, adjoint, body, t, h, begin, end):
+    """Pass the adjoints of a body's stages, from `begin` down to before `end`, on to its beginning."""
+    body_stages_vjp(
+        world.polynomial[body, 0],
+        world.stages,
+        world.phase[body],
+        world.body[body],
+        world.shared,
+        adjoint.stages,
+        adjoint.before[body],
+        adjoint.state[body],
+        adjoint.body[body],
+        adjoint.shared,
+        adjoint.leg[body : body + 1],
+        body,
+        t,
+        h,
+        begin,
+        end,
+    )
+
+
+@compiled
+def body_stages_vjp(
+    y,
+    stages,
+    phase,
+    constants,
+    shared,
+    bars,
+    before,
+    state_bar,
+    constants_bar,
+    shared_bar,
+    leg_bar,
+    body,
+    t,
+    h,
+    begin,
+    end,
+):
+    """Derivative of `body_stages`; `before` holds what forces of other bodies add, and is cleared."""
+    state = stages[WORK, body]
+    still = phase[MOVING] == RESTING and phase[SPIN_SENSE] == 0.0
+    for stage in range(begin, end, -1):
+        stage_state(y, stages, body, stage, h, state)
+        if not still:
+            motion_vjp(
+                t + NODES[stage] * h,
+                state,
+                phase,
+                constants,
+                shared,
+                bars[stage, body],
+                before,
+                constants_bar,
+                shared_bar,
+                leg_bar,
+            )
+        stage_state_vjp(before, bars, body, stage, h)
+        for c in range(STATE_SIZE):
+            state_bar[c] += before[c]
+            before[c] = 0.0
 
 
 @compiled
@@ -271,28 +338,6 @@ def pair_forces_vjp(world, adjoint, cluster, t, bars):
 
 
 @compiled
-def reverse_stage(world, adjoint, body, t, h, stage):
-    """Pass the adjoint of a body's derivative in one stage on to the earlier ones and to the beginning."""
-    before = adjoint.before[body]
-    if not is_still(world, body):
-        motion_vjp(
-            t,
-            world.stages[WORK, body],
-            world.phase[body],
-            world.body[body],
-            world.shared,
-            adjoint.stages[stage, body],
-            before,
-            adjoint.body[body],
-            adjoint.shared,
-            adjoint.leg[body : body + 1],
-        )
-    for c in range(STATE_SIZE):
-        adjoint.state[body, c] += before[c]
-    stage_state_vjp(before, adjoint.stages, body, stage, h)
-
-
-@compiled
 def reverse_pieces(world, adjoint, integers, numbers, block):
     """Pass the adjoints of the pieces of a cluster on to the states with which they begin."""
     cluster = integers[block, FIRST]
@@ -322,6 +367,7 @@ def reverse_match(world, adjoint, numbers, block, cluster):
     for body in range(adjoint.before.shape[0]):
         for c in range(STATE_SIZE):
             adjoint.state[body, c] += adjoint.before[body, c]
+    clear(adjoint.before)
 
 
 @compiled

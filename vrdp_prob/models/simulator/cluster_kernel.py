@@ -72,6 +72,12 @@ def presses(world, cluster):
 
 
 @compiled
+def is_alone(world, cluster):
+    """Whether a cluster is one body that nothing touches."""
+    return world.members[cluster, 0] == 1 and not (touch_count(world) > 0 and presses(world, cluster))
+
+
+@compiled
 def join(world, body, other):
     """Make one cluster of the clusters of two bodies; returns its name."""
     first, second = cluster_of(world, body), cluster_of(world, other)

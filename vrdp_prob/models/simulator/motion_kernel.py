@@ -11,6 +11,7 @@ import numpy as np
 from vrdp_prob.models.simulator.cluster_kernel import (
     cluster_of,
     constrain,
+    is_alone,
     mobility,
     presses,
     push_mobility,
@@ -106,6 +107,12 @@ def cluster_derivatives(world, cluster, t, rates):
     """Time derivative of all bodies of a cluster at the states in the work row, into `rates`."""
     for place in range(world.members[cluster, 0]):
         derivatives(world, world.members[cluster, 1 + place], t, rates)
+    add_forces(world, cluster, t, rates)
+
+
+@compiled
+def add_forces(world, cluster, t, rates):
+    """Add the accelerations by forces between the bodies of a cluster, at the states in the work row."""
     if COUPLED:
         add_pair_forces(world, cluster, t, rates)
     if presses(world, cluster):
@@ -135,19 +142,35 @@ def pair_force_of(world, a, b, t, force):
 
 
 @compiled
-def stage_states(world, cluster, stage, h):
-    """States of a cluster at which a stage is evaluated, into the work row."""
-    for place in range(world.members[cluster, 0]):
-        body = world.members[cluster, 1 + place]
-        stage_state(world.polynomial[body, 0], world.stages, body, stage, h, world.stages[WORK, body])
+def body_stages(y, stages, phase, constants, shared, body, t, h, begin, end):
+    """Stages `begin` to `end` of a step of one body from `y`, apart from forces of other bodies.
+
+    It takes rows and not the world, because handing over all its arrays takes longer than a stage.
+    """
+    state = stages[WORK, body]
+    still = phase[MOVING] == RESTING and phase[SPIN_SENSE] == 0.0
+    for stage in range(begin, end):
+        stage_state(y, stages, body, stage, h, state)
+        if still:
+            for c in range(STATE_SIZE):
+                stages[stage, body, c] = 0.0
+        else:
+            motion(t + NODES[stage] * h, state, phase, constants, shared, stages[stage, body])
 
 
 @compiled
 def compute_stages(world, cluster, t, h, begin, end):
     """Stages `begin` to `end` of a step from the states in the polynomials' constant terms."""
+    if is_alone(world, cluster):
+        y, phase, constants = world.polynomial[cluster, 0], world.phase[cluster], world.body[cluster]
+        body_stages(y, world.stages, phase, constants, world.shared, cluster, t, h, begin, end)
+        return
     for stage in range(begin, end):
-        stage_states(world, cluster, stage, h)
-        cluster_derivatives(world, cluster, t + NODES[stage] * h, world.stages[stage])
+        for place in range(world.members[cluster, 0]):
+            body = world.members[cluster, 1 + place]
+            y, phase, constants = world.polynomial[body, 0], world.phase[body], world.body[body]
+            body_stages(y, world.stages, phase, constants, world.shared, body, t, h, stage, stage + 1)
+        add_forces(world, cluster, t + NODES[stage] * h, world.stages[stage])
 
 
 @compiled

@@ -355,10 +355,8 @@ def set_references(world, body):
 @compiled
 def first_step(world, body, h, most):
     """Limit a step to a multiple of the time in which friction stops the body."""
-    phase, rate = world.phase[body], world.stages[0, body]
-    x, y = rate[3], rate[4]
-    if SLIPS and phase[MOVING] == SLIPPING:
-        x, y = x - rate[6], y - rate[7]
+    phase = world.phase[body]
+    x, y = rate_of_reference(world, body)
     braking = -(x * phase[REFERENCE_X] + y * phase[REFERENCE_Y])
     square = phase[REFERENCE_X] ** 2 + phase[REFERENCE_Y] ** 2
     if phase[MOVING] != RESTING and braking > 0.0 and h * braking > most * square:
@@ -376,14 +374,30 @@ def cut(world, cluster, share, root, ending, what):
 
 
 @compiled
+def rate_of_reference(world, body):
+    """Rate of what a piece has as reference direction, the velocity or the slip, where the piece begins."""
+    rate = world.stages[0, body]
+    if SLIPS and world.phase[body, MOVING] == SLIPPING:
+        return rate[3] - rate[6], rate[4] - rate[7]
+    return rate[3], rate[4]
+
+
+@compiled
 def bends(world, body):
     """Whether the velocity (or slip) with which a piece begins changes its direction."""
-    phase, rate = world.phase[body], world.stages[0, body]
-    x, y = rate[3], rate[4]
-    if SLIPS and phase[MOVING] == SLIPPING:
-        x, y = x - rate[6], y - rate[7]
+    phase = world.phase[body]
+    x, y = rate_of_reference(world, body)
     across = abs(x * phase[REFERENCE_Y] - y * phase[REFERENCE_X])
     return across > STRAIGHT * math.hypot(x, y) * math.hypot(phase[REFERENCE_X], phase[REFERENCE_Y])
+
+
+@compiled
+def hardly_moves(world, body):
+    """Whether a body that slows down on a bent path is so slow that it stops at once."""
+    phase = world.phase[body]
+    x, y = rate_of_reference(world, body)
+    slow = 0.0 < math.hypot(phase[REFERENCE_X], phase[REFERENCE_Y]) < LINGERING
+    return slow and x * phase[REFERENCE_X] + y * phase[REFERENCE_Y] < 0.0 and bends(world, body)
 
 
 @compiled

@@ -46,6 +46,8 @@ from vrdp_prob.models.simulator.world_kernel import (
     FIXED,
     INVERSE_INERTIA,
     LEANING,
+    LEANS_MOVING,
+    LEANS_TURNING,
     MOVING,
     PARTS,
     PUSH,
@@ -123,6 +125,12 @@ def turns(push):
 
 
 @compiled
+def stays(push):
+    """Whether a body leans on others at rest."""
+    return push[LEANING] in (LEANS_MOVING, LEANS_MOVING + LEANS_TURNING)
+
+
+@compiled
 def failure(world, cluster, t):
     """What ends the pieces of a cluster at the states at hand: how, and for which contact or body."""
     cluster_derivatives(world, cluster, t, world.stages[SPARE])
@@ -137,9 +145,9 @@ def failure(world, cluster, t):
         body = world.members[cluster, 1 + place]
         phase, push = world.phase[body], world.stages[PUSH, body]
         set_push(world, body, t)
-        if phase[MOVING] == RESTING and push[LEANING] == 0.0 and yields(push, 0.0):
+        if phase[MOVING] == RESTING and not stays(push) and yields(push, 0.0):
             return YIELDS, body
-        if phase[SPIN_SENSE] == 0.0 and turns(push):
+        if phase[SPIN_SENSE] == 0.0 and push[LEANING] < LEANS_TURNING and turns(push):
             return TURNS, body
     return CONTINUES, -1
 
@@ -218,10 +226,10 @@ def loosened(world, cluster, t):
         body = world.members[cluster, 1 + place]
         phase, push = world.phase[body], world.stages[PUSH, body]
         set_push(world, body, t)
-        if phase[MOVING] == RESTING and push[LEANING] == 0.0 and yields(push, 0.0):
+        if phase[MOVING] == RESTING and not stays(push) and yields(push, 0.0):
             start(world, body)
             changed = True
-        if phase[SPIN_SENSE] == 0.0 and turns(push):
+        if phase[SPIN_SENSE] == 0.0 and push[LEANING] < LEANS_TURNING and turns(push):
             start_spin(world, body)
             changed = True
     return changed
@@ -243,7 +251,23 @@ def blocked(world, cluster):
             start(world, body)
         else:
             at_rest = world.polynomial[body, 0]
-            phase[MOVING], at_rest[3], at_rest[4], push[LEANING] = RESTING, 0.0, 0.0, 1.0
+            phase[MOVING], at_rest[3], at_rest[4] = RESTING, 0.0, 0.0
+            push[LEANING] += LEANS_MOVING
+    return changed
+
+
+@compiled
+def blocked_turning(world, cluster):
+    """Let bodies not spin that just began to, where their contacts turn them back; returns whether any does."""
+    changed = False
+    for place in range(world.members[cluster, 0]):
+        body = world.members[cluster, 1 + place]
+        phase, push = world.phase[body], world.stages[PUSH, body]
+        begins = abs(world.polynomial[body, 0, 5]) <= 4.0 * SLOWEST and push[BRAKE] > 0.0
+        if phase[SPIN_SENSE] * world.stages[SPARE, body, 5] < 0.0 and begins:
+            phase[SPIN_SENSE], world.polynomial[body, 0, 5] = 0.0, 0.0
+            push[LEANING] += LEANS_TURNING
+            changed = True
     return changed
 
 
@@ -334,7 +358,7 @@ def choose_contacts(world, cluster, t):
         check_room(world, cluster)
         match(world, cluster)
         press(world, cluster, t)
-        if not (loosened(world, cluster, t) or blocked(world, cluster)):
+        if not (loosened(world, cluster, t) or blocked(world, cluster) or blocked_turning(world, cluster)):
             break
     for touch in range(touch_count(world)):
         row = world.touching[touch]

@@ -3,7 +3,7 @@
 # numba infers types, and compiled functions take their arrays one by one and by position.
 # mypy: disable-error-code="no-untyped-def"
 
-from vrdp_prob.models.simulator.cluster_kernel import presses
+from vrdp_prob.models.simulator.cluster_kernel import is_alone, presses
 from vrdp_prob.models.simulator.laws_kernel import BOUNDARIES, COUPLED, TIMED, compiled
 from vrdp_prob.models.simulator.motion_kernel import (
     LINGERING,
@@ -12,6 +12,7 @@ from vrdp_prob.models.simulator.motion_kernel import (
     find_crossing,
     find_ending,
     first_step,
+    hardly_moves,
     inner_error,
     is_still,
     match_velocities,
@@ -24,12 +25,14 @@ from vrdp_prob.models.simulator.pressing_kernel import find_parting, find_yieldi
 from vrdp_prob.models.simulator.world_kernel import (
     CONTINUES,
     ENDING,
+    ENDING_BODY,
     FIXED,
     LENGTH,
     ORIGIN,
     REFERENCE_X,
     REFERENCE_Y,
     STEP,
+    STOPS,
     UNTIL,
     hold,
 )
@@ -126,6 +129,11 @@ def advance(world, cluster, t, horizon):
         rest(world, cluster, t, horizon)
         return True
     h = begin_step(world, cluster, t, horizon)
+    if is_alone(world, cluster) and hardly_moves(world, cluster):
+        hold(world, cluster, t)
+        clock = world.clock[cluster]
+        clock[UNTIL], clock[ENDING], clock[ENDING_BODY] = t, STOPS, cluster
+        return True
     while h >= SMALLEST_STEP:
         error, share = try_step(world, cluster, t, h)
         if error > 1.0:

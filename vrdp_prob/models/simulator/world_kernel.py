@@ -33,6 +33,8 @@ PARTS, SLIDES_OFF, YIELDS, TURNS, CROSSES = 4.0, 5.0, 6.0, 7.0, 8.0
 # What pushes a body, in the row PUSH: its acceleration without friction (2 numbers), what friction holds, the same for
 # its spin; and whether it leans on others at rest.
 BRAKE, TURN, LEANING = 3, 4, 5
+# How a body leans: it would move alone, or it would turn; both add up.
+LEANS_MOVING, LEANS_TURNING = 1.0, 2.0
 TOUCHES_PER_BODY = 4
 """Lasting contacts per body that a world has room for; two bodies in a plane share at most two, and few touch each."""
 

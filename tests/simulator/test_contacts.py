@@ -63,5 +63,5 @@ def test_both_references_agree(mix: tuple[object, ...], record_property: Record)
         before = times < closed.doubtful_from
         farthest = max(farthest, np.abs(closed.states - integrated.states)[before][..., :3].max())
     print(f"farthest deviation of the references from each other {farthest:.1e} m")
-    record_property("farthest_deviation_m", farthest)
+    record_property("farthest_deviation_m", float(farthest))
     assert farthest < 1e-7

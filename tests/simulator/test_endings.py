@@ -8,14 +8,13 @@ import torch
 
 from tests.simulator import reference
 from tests.simulator.comparison import scene_of, scenes
-from tests.simulator.scenes import CUBE, DISC, FRAMES, RADIUS, SPHERE, tensor, world
-from vrdp_prob.models.effects.surface_tilt import SurfaceTilt
-from vrdp_prob.models.physics import PhysicsModel
+from tests.simulator.scenes import CUBE, DISC, FRAMES, RADIUS, SPHERE, world
+from tests.simulator.test_reference import EXTENDED
 from vrdp_prob.models.simulator.outcome import Outcome
 from vrdp_prob.models.simulator.rollout import simulate
 from vrdp_prob.scene import Shape
 
-TILTED = PhysicsModel.base().with_effect(SurfaceTilt())
+NOTHING_ELSE = {"linear_drag": 0.0, "contact_friction": 0.0}
 
 
 @pytest.mark.parametrize("share", [0.3, 0.86, 0.9, 0.98])
@@ -23,9 +22,9 @@ def test_a_body_comes_to_rest_on_a_slope(share: float) -> None:
     # The slope is that share of the friction: close to 1 the body turns downhill ever faster before it rests.
     for angle in np.linspace(0.1, 6.2, 12):
         tilt = {"tilt_x": 0.12 * share * np.cos(angle), "tilt_y": 0.12 * share * np.sin(angle)}
-        scene = world([[0, 0]], [[1, 0]], None, {"sliding_friction": 0.12, **tilt})
+        scene = world([[0, 0]], [[1, 0]], None, {"sliding_friction": 0.12, **tilt, **NOTHING_ELSE})
         times = torch.linspace(0, 60, 100, dtype=torch.float64)
-        rollout = simulate(scene, times, TILTED)
+        rollout = simulate(scene, times, EXTENDED)
         assert rollout.outcome == (Outcome.OK,)
         assert (rollout.velocity[0, -1] == 0).all()
         expected = reference.rollout(scene_of(scene, 0), times.numpy()).states[:, 0, :2]

@@ -66,10 +66,12 @@ INNER_TOLERANCE = 1e-9
 VANISHED = 1e-7
 """Speed in m/s across the direction of motion below which a body at its turning point rests."""
 LINGERING = 1e-6
-"""Speed (or slip) in m/s below which a body stops whose direction of motion changes.
+"""Speed in m/s below which a body stops whose direction of motion changes.
 
 What is not friction turns its motion ever faster while it slows down, which would take many short steps.
 """
+LINGERING_SLIP = 1e-7
+"""The same for a slip: what a sphere has not slipped yet then, it misses as resistance to rolling."""
 STRAIGHT = 1e-9
 """Sine of the angle between velocity and acceleration below which a motion counts as straight."""
 SLOWEST = 1e-10
@@ -392,11 +394,17 @@ def bends(world, body):
 
 
 @compiled
+def lingering(world, body):
+    """Speed, or slip, below which a body stops whose direction of motion changes."""
+    return LINGERING_SLIP if SLIPS and world.phase[body, MOVING] == SLIPPING else LINGERING
+
+
+@compiled
 def hardly_moves(world, body):
     """Whether a body that slows down on a bent path is so slow that it stops at once."""
     phase = world.phase[body]
     x, y = rate_of_reference(world, body)
-    slow = 0.0 < math.hypot(phase[REFERENCE_X], phase[REFERENCE_Y]) < LINGERING
+    slow = 0.0 < math.hypot(phase[REFERENCE_X], phase[REFERENCE_Y]) < lingering(world, body)
     return slow and x * phase[REFERENCE_X] + y * phase[REFERENCE_Y] < 0.0 and bends(world, body)
 
 
@@ -412,7 +420,7 @@ def stopping_level(world, cluster, body):
     if not lingers(world, cluster, body):
         return 0.0
     speed = math.hypot(world.phase[body, REFERENCE_X], world.phase[body, REFERENCE_Y])
-    return min(LINGERING, 0.5 * speed) * speed
+    return min(lingering(world, body), 0.5 * speed) * speed
 
 
 @compiled
@@ -478,7 +486,7 @@ def really_stops(world, cluster, share):
         return True
     body = int(world.clock[cluster, ENDING_BODY])
     y = world.stages[WORK, body]
-    vanished = 2.0 * LINGERING if lingers(world, cluster, body) else VANISHED
+    vanished = 2.0 * lingering(world, body) if lingers(world, cluster, body) else VANISHED
     evaluate(world.polynomial[body], share, y)
     if SLIPS and world.phase[body, MOVING] == SLIPPING:
         return math.hypot(y[3] - y[6], y[4] - y[7]) <= vanished

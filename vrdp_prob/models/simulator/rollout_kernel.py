@@ -267,13 +267,21 @@ def stop(world, cluster, body, t, moves):
     elif SLIPS and world.phase[body, MOVING] == SLIPPING:
         begin_rolling(y)
     else:
-        y[3], y[4] = 0.0, 0.0
+        rest_at_once(y)
         for place in range(world.members[cluster, 0] if world.members[cluster, 0] > 1 else 0):
             member = world.members[cluster, 1 + place]
             other = world.polynomial[member, 0]
             if world.phase[member, MOVING] == SLIDING and math.hypot(other[3], other[4]) <= 2.0 * LINGERING:
-                other[3], other[4] = 0.0, 0.0
+                rest_at_once(other)
     settle(world, body, t, y)
+
+
+@compiled
+def rest_at_once(y):
+    """Take the velocity from a state."""
+    y[3], y[4] = 0.0, 0.0
+    if SLIPS:
+        y[6], y[7] = 0.0, 0.0
 
 
 @compiled

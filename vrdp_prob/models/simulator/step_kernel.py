@@ -6,7 +6,6 @@
 from vrdp_prob.models.simulator.cluster_kernel import is_alone, presses
 from vrdp_prob.models.simulator.laws_kernel import BOUNDARIES, COUPLED, TIMED, compiled
 from vrdp_prob.models.simulator.motion_kernel import (
-    LINGERING,
     PARTS_OF_STEP,
     compute_stages,
     find_crossing,
@@ -15,6 +14,8 @@ from vrdp_prob.models.simulator.motion_kernel import (
     hardly_moves,
     inner_error,
     is_still,
+    lingering,
+    lingers,
     match_velocities,
     really_stops,
     set_polynomial,
@@ -40,7 +41,7 @@ from vrdp_prob.models.simulator.world_kernel import (
 SMALLEST_STEP = 1e-12
 """Step in s below which the motion counts as not solvable."""
 APPROACH = 0.5
-"""Longest step of bodies that press, in units of the time in which friction alone would stop one of them."""
+"""Longest step of bodies on bent paths, in units of the time in which friction alone would stop one of them."""
 
 
 @compiled
@@ -89,12 +90,12 @@ def begin_step(world, cluster, t, horizon):
 def reach_of_step(world, cluster, body):
     """Length of a step in units of the time in which friction stops a body.
 
-    A little more than 1, so that a body alone stops within it. Where bodies press, how their directions change becomes
-    singular at the stop; the error of a straight motion does not show that, but its derivative needs shorter steps.
+    A little more than 1, so that a body on a straight path stops within it. Elsewhere, how directions change becomes
+    singular at the stop; the error of the motion hardly shows that, but its derivative needs shorter steps.
     """
     phase = world.phase[body]
-    slow = phase[REFERENCE_X] ** 2 + phase[REFERENCE_Y] ** 2 < (4.0 * LINGERING) ** 2
-    return 1.25 if world.members[cluster, 0] == 1 or slow else APPROACH
+    slow = phase[REFERENCE_X] ** 2 + phase[REFERENCE_Y] ** 2 < (4.0 * lingering(world, body)) ** 2
+    return APPROACH if lingers(world, cluster, body) and not slow else 1.25
 
 
 @compiled

@@ -3,6 +3,7 @@
 # numba infers types, and compiled functions take their arrays one by one and by position.
 # mypy: disable-error-code="no-untyped-def"
 # ruff: noqa: PLR0917
+
 from vrdp_prob.models.simulator.adjoint_kernel import (
     FLATTEST,
     OF_A,
@@ -19,10 +20,15 @@ from vrdp_prob.models.simulator.adjoint_kernel import (
     load_touches,
     product,
     read_frames,
-    reverse_pieces,
     shift_of,
 )
-from vrdp_prob.models.simulator.cluster_kernel import ROOM_RATE, cluster_of, constraint_bar_states, set_constraints
+from vrdp_prob.models.simulator.adjoint_step_kernel import reverse_pieces
+from vrdp_prob.models.simulator.cluster_kernel import (
+    ROOM_RATE,
+    cluster_of,
+    constraint_bar_states,
+    set_constraints,
+)
 from vrdp_prob.models.simulator.laws_kernel import (
     SLIPS,
     STATE_SIZE,

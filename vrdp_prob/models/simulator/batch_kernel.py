@@ -11,10 +11,10 @@ from vrdp_prob.models.simulator.adjoint_events_kernel import reverse_world
 from vrdp_prob.models.simulator.adjoint_kernel import Adjoint
 from vrdp_prob.models.simulator.detection_kernel import new_pairs
 from vrdp_prob.models.simulator.laws_kernel import STATE_SIZE, allocating, compiled
-from vrdp_prob.models.simulator.rollout_kernel import NOT_FINITE, TAPE_FULL, rollout_world
+from vrdp_prob.models.simulator.rollout_kernel import rollout_world
 from vrdp_prob.models.simulator.tableau import DENSE
 from vrdp_prob.models.simulator.tape_kernel import INTEGERS, NUMBERS, ROWS, Tape
-from vrdp_prob.models.simulator.world_kernel import STAGES, new_world
+from vrdp_prob.models.simulator.world_kernel import NOT_FINITE, STAGES, TAPE_FULL, new_world
 
 
 @allocating

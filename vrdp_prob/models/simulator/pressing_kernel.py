@@ -27,17 +27,9 @@ from vrdp_prob.models.simulator.cluster_kernel import (
     set_touch_count,
     touch_count,
 )
+from vrdp_prob.models.simulator.ending_kernel import SLOWEST, VANISHED, set_push_at, settle
 from vrdp_prob.models.simulator.laws_kernel import COUPLED, compiled
-from vrdp_prob.models.simulator.motion_kernel import (
-    SLOWEST,
-    VANISHED,
-    add_pair_forces,
-    cluster_derivatives,
-    derivatives,
-    set_push_at,
-    settle,
-    take_states,
-)
+from vrdp_prob.models.simulator.motion_kernel import add_pair_forces, cluster_derivatives, derivatives, take_states
 from vrdp_prob.models.simulator.world_kernel import (
     BRAKE,
     CONTINUES,

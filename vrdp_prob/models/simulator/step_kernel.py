@@ -4,22 +4,24 @@
 # mypy: disable-error-code="no-untyped-def"
 
 from vrdp_prob.models.simulator.cluster_kernel import is_alone, presses
-from vrdp_prob.models.simulator.laws_kernel import BOUNDARIES, COUPLED, TIMED, compiled
-from vrdp_prob.models.simulator.motion_kernel import (
-    PARTS_OF_STEP,
-    compute_stages,
+from vrdp_prob.models.simulator.ending_kernel import (
     find_crossing,
     find_ending,
     first_step,
     hardly_moves,
-    inner_error,
-    is_still,
     lingering,
     lingers,
-    match_velocities,
     really_stops,
-    set_polynomial,
     set_references,
+)
+from vrdp_prob.models.simulator.laws_kernel import BOUNDARIES, COUPLED, TIMED, compiled
+from vrdp_prob.models.simulator.motion_kernel import (
+    PARTS_OF_STEP,
+    compute_stages,
+    inner_error,
+    is_still,
+    match_velocities,
+    set_polynomial,
     step_error,
 )
 from vrdp_prob.models.simulator.pressing_kernel import find_parting, find_yielding

@@ -16,6 +16,8 @@ from vrdp_prob.models.simulator.laws_kernel import BOUNDARIES, KICKS, STATE_SIZE
 from vrdp_prob.models.simulator.tableau import DENSE
 
 DISC, SQUARE, WALL = 0, 1, 2
+# Outcomes of a world, and that its tape has no room.
+OK, OVERLAP, EVENT_LIMIT, NOT_SOLVED, NOT_FINITE, TAPE_FULL = 0, 1, 2, 3, 4, 5
 SHAPE, FIXED, PRESENT = 0, 1, 2
 INVERSE_MASS, INVERSE_INERTIA, RADIUS, IS_SPHERE = 1, 2, 4, 5
 RELEASE_TIME = STATE_SIZE

@@ -1,0 +1,203 @@
+"""Compiled reverse sweep over one piece of motion: the adjoint of a Runge-Kutta step."""
+
+# numba infers types, and compiled functions take their arrays one by one and by position.
+# mypy: disable-error-code="no-untyped-def"
+# ruff: noqa: PLR0917
+
+from vrdp_prob.models.simulator.adjoint_kernel import clear, load_block, load_state
+from vrdp_prob.models.simulator.cluster_kernel import constrain_vjp, is_alone, mobility, presses
+from vrdp_prob.models.simulator.laws_kernel import (
+    COUPLED,
+    STATE_SIZE,
+    compiled,
+    dense_output_vjp,
+    motion_vjp,
+    pair_force_vjp,
+    stage_state,
+    stage_state_vjp,
+)
+from vrdp_prob.models.simulator.motion_kernel import cluster_derivatives, is_still, match_velocities, pair_force_of
+from vrdp_prob.models.simulator.tableau import NODES
+from vrdp_prob.models.simulator.tape_kernel import BLOCK_PIECES, BLOCK_TOUCHES, FIRST
+from vrdp_prob.models.simulator.world_kernel import (
+    INVERSE_MASS,
+    LENGTH,
+    MOVING,
+    ORIGIN,
+    RESTING,
+    SPIN_SENSE,
+    STAGES,
+    WORK,
+)
+
+
+@compiled
+def reverse_step(world, adjoint, cluster, t, h):
+    """Adjoints of the states with which the loaded pieces of a cluster begin, from those of their polynomials."""
+    for place in range(world.members[cluster, 0]):
+        body = world.members[cluster, 1 + place]
+        dense_output_vjp(adjoint.polynomial[body], body, h, adjoint.stages)
+        for c in range(STATE_SIZE):
+            adjoint.state[body, c] = adjoint.polynomial[body, 0, c]
+    if is_alone(world, cluster):
+        reverse_stages(world, adjoint, cluster, t, h, STAGES - 1, -1)
+        return
+    pressing = presses(world, cluster)
+    for stage in range(STAGES - 1, -1, -1):
+        time = t + NODES[stage] * h
+        for place in range(world.members[cluster, 0]):
+            body = world.members[cluster, 1 + place]
+            stage_state(world.polynomial[body, 0], world.stages, body, stage, h, world.stages[WORK, body])
+        if pressing:
+            # Computes the forces of this stage again.
+            cluster_derivatives(world, cluster, time, world.stages[stage])
+            bars = adjoint.stages[stage]
+            constrain_vjp(world, adjoint, cluster, world.stages[stage], bars, adjoint.before, 1.0)
+        if COUPLED:
+            pair_forces_vjp(world, adjoint, cluster, time, adjoint.stages[stage])
+        for place in range(world.members[cluster, 0]):
+            reverse_stages(world, adjoint, world.members[cluster, 1 + place], t, h, stage, stage - 1)
+
+
+@compiled
+def reverse_stages(world, adjoint, body, t, h, begin, end):
+    """Pass the adjoints of a body's stages, from `begin` down to before `end`, on to its beginning."""
+    body_stages_vjp(
+        world.polynomial[body, 0],
+        world.stages,
+        world.phase[body],
+        world.body[body],
+        world.shared,
+        adjoint.stages,
+        adjoint.before[body],
+        adjoint.state[body],
+        adjoint.body[body],
+        adjoint.shared,
+        adjoint.leg[body : body + 1],
+        body,
+        t,
+        h,
+        begin,
+        end,
+    )
+
+
+@compiled
+def body_stages_vjp(
+    y,
+    stages,
+    phase,
+    constants,
+    shared,
+    bars,
+    before,
+    state_bar,
+    constants_bar,
+    shared_bar,
+    leg_bar,
+    body,
+    t,
+    h,
+    begin,
+    end,
+):
+    """Derivative of `body_stages`; `before` holds what forces of other bodies add, and is cleared."""
+    state = stages[WORK, body]
+    still = phase[MOVING] == RESTING and phase[SPIN_SENSE] == 0.0
+    for stage in range(begin, end, -1):
+        stage_state(y, stages, body, stage, h, state)
+        if not still:
+            motion_vjp(
+                t + NODES[stage] * h,
+                state,
+                phase,
+                constants,
+                shared,
+                bars[stage, body],
+                before,
+                constants_bar,
+                shared_bar,
+                leg_bar,
+            )
+        stage_state_vjp(before, bars, body, stage, h)
+        for c in range(STATE_SIZE):
+            state_bar[c] += before[c]
+            before[c] = 0.0
+
+
+@compiled
+def pair_forces_vjp(world, adjoint, cluster, t, bars):
+    """Pass the adjoints of the accelerations by forces between bodies on to their states and constants."""
+    force, bar, work = world.force[0], world.force[1], world.stages[WORK]
+    for place in range(world.members[cluster, 0]):
+        a = world.members[cluster, 1 + place]
+        for later in range(place + 1, world.members[cluster, 0]):
+            b = world.members[cluster, 1 + later]
+            pair_force_of(world, a, b, t, force)
+            for c in range(2):
+                of_a, of_b = mobility(world, a, c, 1.0) * bars[a, 3 + c], mobility(world, b, c, 1.0) * bars[b, 3 + c]
+                bar[c] = of_a - of_b
+                adjoint.body[a, INVERSE_MASS] += force[c] * of_a / world.body[a, INVERSE_MASS]
+                adjoint.body[b, INVERSE_MASS] -= force[c] * of_b / world.body[b, INVERSE_MASS]
+            pair_force_vjp(
+                t,
+                work[a],
+                work[b],
+                world.body[a],
+                world.body[b],
+                world.shared,
+                bar,
+                adjoint.before[a],
+                adjoint.before[b],
+                adjoint.body[a],
+                adjoint.body[b],
+                adjoint.shared,
+                adjoint.leg[a : a + 1],
+            )
+
+
+@compiled
+def reverse_pieces(world, adjoint, integers, numbers, block):
+    """Pass the adjoints of the pieces of a cluster on to the states with which they begin."""
+    cluster = integers[block, FIRST]
+    if integers[block, BLOCK_PIECES] > 1 or integers[block, BLOCK_TOUCHES] > 0:
+        load_block(world, adjoint, integers, numbers, block)
+    moving = False
+    for place in range(world.members[cluster, 0]):
+        moving = moving or not is_still(world, world.members[cluster, 1 + place])
+    if moving:
+        reverse_step(world, adjoint, cluster, world.clock[cluster, ORIGIN], world.clock[cluster, LENGTH])
+        reverse_match(world, adjoint, numbers, block, cluster)
+    for place in range(world.members[cluster, 0]):
+        reverse_beginning(world, adjoint, world.members[cluster, 1 + place], moving)
+
+
+@compiled
+def reverse_match(world, adjoint, numbers, block, cluster):
+    """Velocities were matched in the recorded states before the pieces of a cluster began."""
+    if not presses(world, cluster):
+        return
+    for place in range(world.members[cluster, 0]):
+        load_state(world, world.members[cluster, 1 + place], numbers[block + place])
+        adjoint.loaded[world.members[cluster, 1 + place]] = -1
+    match_velocities(world, cluster)
+    clear(adjoint.before)
+    constrain_vjp(world, adjoint, cluster, world.stages[WORK], adjoint.state, adjoint.before, 0.0)
+    for body in range(adjoint.before.shape[0]):
+        for c in range(STATE_SIZE):
+            adjoint.state[body, c] += adjoint.before[body, c]
+    clear(adjoint.before)
+
+
+@compiled
+def reverse_beginning(world, adjoint, body, moving):
+    """The adjoint of a piece is read; a resting body was set to rest, whatever small velocity it came with."""
+    phase, bar = world.phase[body], adjoint.state[body]
+    for c in range(STATE_SIZE):
+        if not moving:
+            bar[c] = adjoint.polynomial[body, 0, c]
+    clear(adjoint.polynomial[body])
+    if phase[MOVING] == RESTING:
+        bar[3], bar[4] = 0.0, 0.0
+    if phase[SPIN_SENSE] == 0.0:
+        bar[5] = 0.0

@@ -171,3 +171,39 @@ def test_bad_times_and_missing_parameters_are_named() -> None:
         simulate(scene, tensor([1.0, 0.5]))
     with pytest.raises(InputError, match="rolling_resistance"):
         simulate(replace(scene, parameters={"sliding_friction": tensor([0.1])}), FRAMES)
+
+
+def test_single_precision_in_and_out() -> None:
+    exact = world([[0, 0], [1, 0.1]], [[1, 0], [0, 0]], [CUBE, SPHERE], {"sliding_friction": 0.1})
+    names = ("position", "velocity", "angle", "spin", "release_time", "mass", "restitution", "radius")
+    fields = {name: getattr(exact, name).float() for name in names}
+    parameters = {name: values.float() for name, values in exact.parameters.items()}
+    velocity = fields["velocity"].requires_grad_()
+    rollout = simulate(replace(exact, **fields, parameters=parameters), FRAMES.float())
+    rollout.trajectory.sum().backward()
+    assert rollout.trajectory.dtype == rollout.velocity.dtype == velocity.grad.dtype == torch.float32
+    assert torch.allclose(rollout.trajectory.double(), simulate(exact, FRAMES).trajectory, atol=1e-5)
+
+
+@pytest.mark.skipif(not torch.cuda.is_available(), reason="torch finds no GPU")
+def test_tensors_on_a_gpu_stay_there() -> None:
+    scene = world([[0, 0], [1, 0]], [[1, 0], [0, 0]])
+    names = ("position", "velocity", "angle", "spin", "release_time", "mass", "restitution", "radius", "present")
+    fields = {name: getattr(scene, name).cuda() for name in names}
+    parameters = {name: values.cuda() for name, values in scene.parameters.items()}
+    velocity = fields["velocity"].requires_grad_()
+    rollout = simulate(replace(scene, **fields, parameters=parameters), FRAMES.cuda())
+    rollout.trajectory.sum().backward()
+    assert rollout.trajectory.is_cuda
+    assert velocity.grad.is_cuda
+
+
+def test_times_of_each_world() -> None:
+    scene = world([[0, 0]], [[1.0, 0]])
+    times = torch.stack([tensor([0.0, 1.0]), tensor([0.5, 2.0])]).requires_grad_()
+    rollout = simulate(_stacked(scene, scene), times)
+    assert torch.allclose(rollout.trajectory[:, :, 0, 0], times, atol=1e-11)
+    rollout.trajectory[..., 0].sum().backward()
+    assert torch.allclose(times.grad, torch.ones(2, 2, dtype=torch.float64), atol=1e-11)
+    with pytest.raises(InputError, match="one row each"):
+        simulate(_stacked(scene, scene, scene), times)

@@ -256,6 +256,11 @@ def assignments(outputs: Mapping[str, Scalar], *, add: bool = False) -> list[str
     return lines
 
 
+def function_source(name: str, arguments: str, lines: Sequence[str]) -> str:
+    """Source of a compiled function with the given lines as its body."""
+    return "\n".join(["@compiled", f"def {name}({arguments}):", *(f"    {line}" for line in lines or ["pass"]), "\n"])
+
+
 def _is_zero(value: Scalar) -> bool:
     return (value.constant if isinstance(value, Symbol) else value) == 0
 

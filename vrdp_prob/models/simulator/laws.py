@@ -6,7 +6,15 @@ from dataclasses import dataclass
 from vrdp_prob.models.effects.effect import BodyView, Effect
 from vrdp_prob.models.parameters import Parameter, Scope
 from vrdp_prob.models.simulator.contact import ContactKind, Feature, contact, contact_geometry, room_on_feature
-from vrdp_prob.models.simulator.formula import Recorder, Scalar, Symbol, assignments, depends, vector_jacobian
+from vrdp_prob.models.simulator.formula import (
+    Recorder,
+    Scalar,
+    Symbol,
+    assignments,
+    depends,
+    function_source,
+    vector_jacobian,
+)
 from vrdp_prob.models.simulator.mathematics import length, where
 from vrdp_prob.models.simulator.motion import (
     SLIPPING_ABOVE,
@@ -119,11 +127,6 @@ def with_kick(effects: Sequence[Effect]) -> list[Effect]:
     return [effect for effect in effects if effect.overrides("kick")]
 
 
-def _function(name: str, arguments: str, lines: Sequence[str], ending: str = "") -> str:
-    body = [*lines, ending] if ending else [*lines]
-    return "\n".join(["@compiled", f"def {name}({arguments}):", *(f"    {line}" for line in body or ["pass"]), "\n"])
-
-
 def _targets(name: str, values: Sequence[Scalar]) -> dict[str, Scalar]:
     return {f"{name}[{index}]": value for index, value in enumerate(values)}
 
@@ -142,7 +145,7 @@ def _motion_source(effects: Sequence[Effect], layout: Layout) -> str:
     body = inputs.view(state, constants, phase)
     outputs = derivative(effects, inputs.time, body, Phase(phase[0], phase[3]), inputs.shared)
     arguments = "t, y, phase, body, shared"
-    value = _function("motion", f"{arguments}, out", assignments(_targets("out", outputs)))
+    value = function_source("motion", f"{arguments}, out", assignments(_targets("out", outputs)))
     arrays = {
         "y_bar": state,
         "body_bar": constants,
@@ -150,7 +153,7 @@ def _motion_source(effects: Sequence[Effect], layout: Layout) -> str:
         "t_bar": [inputs.time],
     }
     lines = _vjp_lines(outputs, inputs.array("bar", len(state)), arrays)
-    return value + _function("motion_vjp", f"{arguments}, bar, y_bar, body_bar, shared_bar, t_bar", lines)
+    return value + function_source("motion_vjp", f"{arguments}, bar, y_bar, body_bar, shared_bar, t_bar", lines)
 
 
 def _external(effects: Sequence[Effect], inputs: _Inputs) -> list[Scalar]:
@@ -165,7 +168,7 @@ def _external(effects: Sequence[Effect], inputs: _Inputs) -> list[Scalar]:
 
 def _external_source(effects: Sequence[Effect], layout: Layout) -> str:
     lines = assignments(_targets("out", _external(effects, _Inputs(effects, layout))))
-    return _function("external", "t, y, phase, body, shared, out", lines)
+    return function_source("external", "t, y, phase, body, shared, out", lines)
 
 
 def is_timed(effects: Sequence[Effect], layout: Layout) -> bool:
@@ -188,7 +191,7 @@ def _pair_source(effects: Sequence[Effect], layout: Layout) -> str:
     inputs = _Inputs(effects, layout)
     force = _pair_force(effects, inputs)
     arguments = "t, ya, yb, body_a, body_b, shared"
-    value = _function("pair_force", f"{arguments}, out", assignments(_targets("out", force)))
+    value = function_source("pair_force", f"{arguments}, out", assignments(_targets("out", force)))
     arrays = {
         "ya_bar": inputs.state("ya"),
         "yb_bar": inputs.state("yb"),
@@ -198,7 +201,7 @@ def _pair_source(effects: Sequence[Effect], layout: Layout) -> str:
         "t_bar": [inputs.time],
     }
     lines = _vjp_lines(force, inputs.array("bar", 2), arrays)
-    return value + _function("pair_force_vjp", f"{arguments}, bar, {', '.join(arrays)}", lines)
+    return value + function_source("pair_force_vjp", f"{arguments}, bar, {', '.join(arrays)}", lines)
 
 
 def _by_number(name: str, arguments: str, blocks: Sequence[Sequence[str]], nothing: str) -> str:
@@ -206,7 +209,7 @@ def _by_number(name: str, arguments: str, blocks: Sequence[Sequence[str]], nothi
     lines = []
     for number, block in enumerate(blocks):
         lines += [f"if which == {number}:", *(f"    {line}" for line in block or ["pass"])]
-    return _function(name, f"which, {arguments}", lines, nothing)
+    return function_source(name, f"which, {arguments}", [*lines, nothing])
 
 
 def _kick_source(effects: Sequence[Effect], layout: Layout) -> str:
@@ -267,10 +270,10 @@ def _contact_source(kind: ContactKind, effects: Sequence[Effect], layout: Layout
     constraint = [*_gap_motion(geometry.gap, state_a, state_b), room]
     more = [result.closing_speed, result.normal_impulse, *geometry.point, *geometry.normal, geometry.gap]
     name = kind.name.lower()
-    text = _function(
+    text = function_source(
         f"contact_{name}", f"{_CONTACT_ARGUMENTS}, out", assignments(_targets("out", [*velocities, *more]))
     )
-    text += _function(
+    text += function_source(
         f"constraint_{name}",
         f"{_CONTACT_ARGUMENTS}, out",
         assignments(_targets("out", [*constraint, _rate(room, state_a, state_b)])),
@@ -284,7 +287,7 @@ def _contact_source(kind: ContactKind, effects: Sequence[Effect], layout: Layout
     }
     for part, outputs in (("contact", velocities), ("gap", [geometry.gap]), ("constraint", constraint)):
         lines = _vjp_lines(outputs, inputs.array("bar", len(outputs)), arrays)
-        text += _function(f"{part}_{name}_vjp", f"{_CONTACT_ARGUMENTS}, {_CONTACT_BARS}", lines)
+        text += function_source(f"{part}_{name}_vjp", f"{_CONTACT_ARGUMENTS}, {_CONTACT_BARS}", lines)
     return text
 
 
@@ -310,7 +313,7 @@ def _choice_source(part: str, suffix: str, arguments: str) -> str:
         "else:",
         f"    {part}_{ContactKind.POINT_POINT.name.lower()}{suffix}({arguments})",
     ]
-    return _function(f"{part}_law{suffix}", f"kind, {arguments}", lines)
+    return function_source(f"{part}_law{suffix}", f"kind, {arguments}", lines)
 
 
 def law_source(effects: Sequence[Effect], layout: Layout) -> str:

@@ -186,7 +186,7 @@ class _Simulation(torch.autograd.Function):
 def compile_model(model: PhysicsModel | None = None) -> None:
     """Compile the kernel of a model and its derivative now rather than in the first simulation.
 
-    The compiled code is kept in the user's cache, so this takes its half a minute once per machine and set of effects.
+    The compiled code is kept in the user's cache, so this takes about a minute, once per machine and set of effects.
 
     Parameters
     ----------

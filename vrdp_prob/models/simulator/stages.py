@@ -6,6 +6,7 @@ zero as a number, in the order of the stages.
 
 import numpy as np
 
+from vrdp_prob.models.simulator.formula import function_source
 from vrdp_prob.models.simulator.tableau import DEGREE, DENSE, STAGES, WEIGHTS
 
 
@@ -13,10 +14,6 @@ def _sum(weights: np.ndarray, terms: str) -> str:
     """Sum of weighted terms, whose text has a place for the number of the stage."""
     parts = [f"{weight!r} * {terms.format(index)}" for index, weight in enumerate(weights.tolist()) if weight != 0.0]
     return " + ".join(parts)
-
-
-def _function(name: str, arguments: str, lines: list[str]) -> str:
-    return "\n".join(["@compiled", f"def {name}({arguments}):", *(f"    {line}" for line in lines), "\n"])
 
 
 def _loop(statements: list[str]) -> list[str]:
@@ -60,9 +57,9 @@ def step_source() -> str:
         of_polynomial.append(f"bars[{stage}, body, c] = " + (f"h * ({total})" if total else "0.0"))
     return "\n".join(
         [
-            _function("stage_state", "y, stages, body, stage, h, out", _by_stage(state)),
-            _function("stage_state_vjp", "before, bars, body, stage, h", _by_stage(spread)),
-            _function("dense_output", "stages, body, h, out", _loop(polynomial)),
-            _function("dense_output_vjp", "bar, body, h, bars", _loop(of_polynomial)),
+            function_source("stage_state", "y, stages, body, stage, h, out", _by_stage(state)),
+            function_source("stage_state_vjp", "before, bars, body, stage, h", _by_stage(spread)),
+            function_source("dense_output", "stages, body, h, out", _loop(polynomial)),
+            function_source("dense_output_vjp", "bar, body, h, bars", _loop(of_polynomial)),
         ]
     )

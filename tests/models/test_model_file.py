@@ -1,5 +1,6 @@
 """Models as files."""
 
+import importlib
 import re
 from dataclasses import replace
 from pathlib import Path
@@ -76,3 +77,39 @@ def test_the_documentation_lists_every_effect() -> None:
 def test_a_file_that_is_not_there(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="cannot be read"):
         PhysicsModel.read(tmp_path / "none.toml")
+
+
+OWN = """
+from vrdp_prob.models.effects.linear_drag import LinearDrag
+
+class Syrup(LinearDrag):
+    name = "syrup"
+
+NUMBER = 3
+"""
+
+
+def test_an_effect_of_another_module_is_named_with_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "my_effects.py").write_text(OWN, encoding="utf-8")
+    monkeypatch.syspath_prepend(tmp_path)
+    syrup = importlib.import_module("my_effects").Syrup
+    path = tmp_path / "model.toml"
+    PhysicsModel.base().with_effect(syrup()).write(path)
+    assert '"my_effects:Syrup"' in path.read_text(encoding="utf-8")
+    assert isinstance(PhysicsModel.read(path).effects[-1], syrup)
+
+
+@pytest.mark.parametrize(
+    ("reference", "sentence"),
+    [
+        ("no_such_module:Syrup", "cannot be imported"),
+        ("math:Syrup", "cannot be imported"),
+        ("math:pi", "no subclass of Effect"),
+        (":Syrup", "cannot be imported"),
+    ],
+)
+def test_a_wrong_module_is_one_sentence(tmp_path: Path, reference: str, sentence: str) -> None:
+    path = tmp_path / "model.toml"
+    path.write_text(f'name = "one"\neffects = ["{reference}"]\n', encoding="utf-8")
+    with pytest.raises(InputError, match=sentence):
+        PhysicsModel.read(path)

@@ -3,7 +3,7 @@
 ::
 
     name = "base"
-    effects = ["dry_friction", "air_drag", "angular_drag", "normal_impact"]
+    effects = ["dry_friction", "air_drag", "angular_drag", "normal_impact"]  # an effect of your own: "module:Class"
 
     [parameters.sliding_friction]        # optional: a table for each parameter whose prior or default differs
     default = 0.1                        # in the parameter's unit
@@ -42,7 +42,7 @@ def known_effects() -> Mapping[str, type[Effect]]:
 def text(name: str, effects: Sequence[Effect], parameters: Sequence[Parameter]) -> str:
     """Content of a model file."""
     lines = [f"name = {json.dumps(name)}", "effects = ["]
-    lines += [f"    {json.dumps(effect.name)}, # {effect.sentence}" for effect in effects]
+    lines += [f"    {json.dumps(_reference(effect))}, # {effect.sentence}" for effect in effects]
     lines.append("]")
     for parameter in parameters:
         lines += [
@@ -83,11 +83,34 @@ def parse(content: str) -> tuple[str, tuple[Effect, ...], dict[str, Parameter]]:
     return name, effects, {key: _belief(key, table, stated) for key, table in tables.items()}
 
 
+def _reference(effect: Effect) -> str:
+    """How a model file names an effect: by its name, or, where it is not ours, by the module that has its class."""
+    kind = type(effect)
+    return effect.name if known_effects().get(effect.name) is kind else f"{kind.__module__}:{kind.__qualname__}"
+
+
 def _effect(name: object) -> Effect:
+    if isinstance(name, str) and ":" in name:
+        return _effect_of_module(*name.split(":", 1))
     known = known_effects()
     if not isinstance(name, str) or name not in known:
-        raise InputError(f"effect '{name}' is not known; the effects are {', '.join(sorted(known))}.")
+        raise InputError(
+            f"effect '{name}' is not known; the effects are {', '.join(sorted(known))}, or name the module and the class "
+            "of your own as 'module:Class'."
+        )
     return known[name]()
+
+
+def _effect_of_module(module: str, name: str) -> Effect:
+    try:
+        found = getattr(importlib.import_module(module), name)
+    except (ImportError, ValueError, AttributeError) as error:
+        raise InputError(
+            f"effect '{module}:{name}' cannot be imported ({error}); check both names and that Python finds the module."
+        ) from error
+    if not (isinstance(found, type) and issubclass(found, Effect)):
+        raise InputError(f"effect '{module}:{name}' is no subclass of Effect; name a class that is.")
+    return found()
 
 
 def _belief(name: str, table: Any, stated: Mapping[str, Parameter]) -> Parameter:

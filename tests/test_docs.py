@@ -14,12 +14,14 @@ BLOCK = re.compile(r"^```python\n(?P<source>.*?)^```\n(?:\n```text\n(?P<printed>
 
 def test_the_effect_of_the_documentation(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-    names = {"__name__": "bowl_of_the_documentation"}
+    monkeypatch.syspath_prepend(tmp_path)
+    names: dict[str, object] = {}
     text = PAGE.read_text(encoding="utf-8")
     blocks = list(BLOCK.finditer(text))
     assert len(blocks) == text.count("```python") == 4
     assert sum(block["printed"] is not None for block in blocks) == text.count("```text") == 3
-    for block in blocks:
+    Path("bowl.py").write_text(blocks[0]["source"], encoding="utf-8")
+    for block in blocks[1:]:
         printed = io.StringIO()
         with contextlib.redirect_stdout(printed):
             exec(compile(block["source"], PAGE.name, "exec"), names)
@@ -35,5 +37,4 @@ def _check_oscillation(names: dict[str, object]) -> None:
     by_frequency = -0.5 * time * sine + 0.3 * (time * cosine / frequency - sine / frequency**2)
     assert names["place"].tolist() == pytest.approx(place, abs=1e-10)
     assert names["slope"].item() == pytest.approx(by_frequency / (2 * frequency), abs=1e-9)
-    assert 'effects = [\n    "dry_friction"' in Path("bowl.toml").read_text(encoding="utf-8")
-    assert '"bowl", # The table is hollow' in Path("bowl.toml").read_text(encoding="utf-8")
+    assert '"bowl:Bowl", # The table is hollow' in Path("bowl.toml").read_text(encoding="utf-8")

@@ -95,8 +95,7 @@ def _effect(name: object) -> Effect:
     known = known_effects()
     if not isinstance(name, str) or name not in known:
         raise InputError(
-            f"effect '{name}' is not known; the effects are {', '.join(sorted(known))}, or name the module and the class "
-            "of your own as 'module:Class'."
+            f"effect '{name}' is not known; the effects are {', '.join(sorted(known))}, or your own as 'module:Class'."
         )
     return known[name]()
 

@@ -67,6 +67,8 @@ def read_posterior(path: Path, tracks: Tracks | None = None) -> Posterior:
     except OSError as error:
         reason = error.strerror or error
         raise InputError(f"{path}: the posterior cannot be read ({reason}); check the path.") from error
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from error
     except (KeyError, ValueError, TypeError) as error:
         raise InputError(f"{path}: not a posterior of this tool ({error}); run the inference again.") from error
 

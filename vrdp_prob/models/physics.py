@@ -14,8 +14,8 @@ from vrdp_prob.models.effects.angular_drag import AngularDrag
 from vrdp_prob.models.effects.dry_friction import DryFriction
 from vrdp_prob.models.effects.effect import Effect
 from vrdp_prob.models.effects.normal_impact import NormalImpact
-from vrdp_prob.models.parameters import Parameter
-from vrdp_prob.models.simulator.laws import Layout
+from vrdp_prob.models.parameters import MASS, RESTITUTION, Parameter
+from vrdp_prob.models.simulator.laws import CONSTANTS, STATE, Layout
 from vrdp_prob.models.simulator.source import load
 
 
@@ -35,7 +35,8 @@ class PhysicsModel:
     Raises
     ------
     InputError
-        If an effect appears twice, or a belief is about a parameter that no effect has.
+        If an effect appears twice, has no hook, or its parameters clash with others, or a belief is about a parameter
+        that no effect has.
     """
 
     name: str
@@ -46,9 +47,27 @@ class PhysicsModel:
         names = [effect.name for effect in self.effects]
         if len(set(names)) < len(names):
             raise InputError(f"model {self.name}: an effect appears twice ({', '.join(names)}); list each effect once.")
+        for effect in self.effects:
+            self._check_effect(effect)
         strange = sorted(set(self.beliefs) - {parameter.name for parameter in self._stated_parameters()})
         if strange:
             raise InputError(f"model {self.name}: no effect has a parameter '{strange[0]}'; leave it out.")
+
+    def _check_effect(self, effect: Effect) -> None:
+        where = f"model {self.name}, effect '{effect.name}'"
+        if not effect.does_something():
+            raise InputError(f"{where}: it has none of the hooks of Effect; check how its methods are spelt.")
+        own = {parameter.name for parameter in effect.parameters}
+        if strange := sorted(set(effect.vanishes_at) - own):
+            raise InputError(f"{where}: 'vanishes_at' names '{strange[0]}', which is none of its parameters.")
+        if taken := sorted(own & {*STATE, *CONSTANTS, MASS.name, RESTITUTION.name}):
+            raise InputError(f"{where}: every body has a '{taken[0]}' already; give the parameter another name.")
+        stated = {parameter.name: parameter for parameter in self._stated_parameters()}
+        for parameter in effect.parameters:
+            if stated[parameter.name] != parameter:
+                raise InputError(
+                    f"{where}: another effect states the parameter '{parameter.name}' differently; rename one of them."
+                )
 
     @classmethod
     def base(cls) -> "PhysicsModel":

@@ -12,6 +12,7 @@ through which torch differentiates.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from types import FunctionType
 from typing import ClassVar
 
 from jaxtyping import Float
@@ -119,6 +120,11 @@ class Effect:
         """Whether the effect has its own version of a hook."""
         return getattr(cls, hook) is not getattr(Effect, hook)
 
+    @classmethod
+    def does_something(cls) -> bool:
+        """Whether the effect has its own version of any hook."""
+        return any(cls.overrides(name) for name in _hooks())
+
     def acceleration(self, time: Scalar, body: BodyView, parameters: Mapping[str, Scalar]) -> tuple[Scalar, Scalar]:
         """Acceleration of a body in m/s^2, dry friction apart."""
         return 0.0, 0.0
@@ -211,3 +217,10 @@ class Effect:
     ) -> Float[Tensor, "world time body 2"]:
         """Positions in m as they are measured, from the true ones."""
         return positions
+
+
+def _hooks() -> list[str]:
+    """Names of all hooks."""
+    return [
+        name for name, value in vars(Effect).items() if isinstance(value, FunctionType) and not name.startswith("_")
+    ]

@@ -234,7 +234,9 @@ def stopping_level(world, cluster, body):
 def find_ending(world, cluster, body, share):
     """Share of the step, at most `share`, at which a body first stops to move or to spin."""
     polynomial, phase = world.polynomial[body], world.phase[body]
-    spins = phase[SPIN_SENSE] != 0.0 and polynomial[0, 5] != 0.0
+    # Where nothing brakes the spin it may change its sense.
+    braked = world.stages[PUSH, body, BRAKE] > 0.0
+    spins = braked and phase[SPIN_SENSE] != 0.0 and polynomial[0, 5] != 0.0
     if spins and vanishing(polynomial, phase, 1.0, 1.0)[0] <= 0.0:
         root = vanishing_share(polynomial, phase, 1.0, 0.0)
         share = cut(world, cluster, share, root, SPIN_STOPS, body)

@@ -83,6 +83,14 @@ class Symbol:
     def __ge__(self, other: Scalar) -> "Symbol":
         return self.recorder.step(">=", self, other)
 
+    __hash__ = object.__hash__
+
+    def __eq__(self, other: object) -> bool:
+        raise TypeError("a law cannot ask whether its inputs are equal; compare them with < or > in mathematics.where.")
+
+    def __ne__(self, other: object) -> bool:
+        raise TypeError("a law cannot ask whether its inputs differ; compare them with < or > in mathematics.where.")
+
     def __bool__(self) -> bool:
         raise TypeError("a law cannot branch on its inputs with 'if'; use mathematics.where instead.")
 

@@ -64,8 +64,16 @@ class Layout:
         return cls(CONSTANTS + own, shared)
 
 
-class _Inputs:
-    """Symbols for the arrays of a compiled law."""
+class LawInputs:
+    """Symbols for the arrays of a compiled law.
+
+    Parameters
+    ----------
+    effects
+        Effects of the model.
+    layout
+        Order of the numbers in the arrays.
+    """
 
     def __init__(self, effects: Sequence[Effect], layout: Layout) -> None:
         self.effects, self.layout = effects, layout
@@ -74,17 +82,25 @@ class _Inputs:
         self.shared = {name: self.recorder.input(f"shared[{i}]") for i, name in enumerate(layout.shared)}
 
     def array(self, text: str, size: int) -> list[Symbol]:
+        """Symbols for the numbers of an array."""
         return [self.recorder.input(f"{text}[{index}]") for index in range(size)]
 
     def state(self, text: str) -> list[Symbol]:
+        """Symbols for the state of a body."""
         return self.array(text, state_size(self.effects))
 
     def constants(self, text: str) -> list[Symbol]:
+        """Symbols for the constants of a body."""
         return self.array(text, len(self.layout.constants))
+
+    def phase(self) -> list[Symbol]:
+        """Symbols for the phase of a body."""
+        return self.array("phase", _SIDES + len(with_boundary(self.effects)))
 
     def view(
         self, state: Sequence[Symbol], constants: Sequence[Symbol], phase: Sequence[Symbol] | None = None
     ) -> BodyView:
+        """A body as a law sees it; with a phase where it moves, without one in a contact."""
         values = dict(zip(STATE, state[: len(STATE)], strict=True))
         speed = length(values["vx"], values["vy"])
         slip = [values["vx"] - state[6], values["vy"] - state[7]] if slips(self.effects) else [0.0, 0.0]
@@ -139,9 +155,9 @@ def _vjp_lines(outputs: Sequence[Scalar], bars: Sequence[Symbol], arrays: Mappin
 
 
 def _motion_source(effects: Sequence[Effect], layout: Layout) -> str:
-    inputs = _Inputs(effects, layout)
+    inputs = LawInputs(effects, layout)
     state, constants = inputs.state("y"), inputs.constants("body")
-    phase = inputs.array("phase", _SIDES + len(with_boundary(effects)))
+    phase = inputs.phase()
     body = inputs.view(state, constants, phase)
     outputs = derivative(effects, inputs.time, body, Phase(phase[0], phase[3]), inputs.shared)
     arguments = "t, y, phase, body, shared"
@@ -156,9 +172,9 @@ def _motion_source(effects: Sequence[Effect], layout: Layout) -> str:
     return value + function_source("motion_vjp", f"{arguments}, bar, y_bar, body_bar, shared_bar, t_bar", lines)
 
 
-def _external(effects: Sequence[Effect], inputs: _Inputs) -> list[Scalar]:
+def _external(effects: Sequence[Effect], inputs: LawInputs) -> list[Scalar]:
     """Acceleration without friction of a body that does not slip, what friction holds, and the brake of its spin."""
-    phase = inputs.array("phase", _SIDES + len(with_boundary(effects)))
+    phase = inputs.phase()
     body = inputs.view(inputs.state("y"), inputs.constants("body"), phase)
     ax, ay = external_acceleration(effects, inputs.time, body, inputs.shared)
     share = rolling_share(effects, body)
@@ -167,17 +183,17 @@ def _external(effects: Sequence[Effect], inputs: _Inputs) -> list[Scalar]:
 
 
 def _external_source(effects: Sequence[Effect], layout: Layout) -> str:
-    lines = assignments(_targets("out", _external(effects, _Inputs(effects, layout))))
+    lines = assignments(_targets("out", _external(effects, LawInputs(effects, layout))))
     return function_source("external", "t, y, phase, body, shared, out", lines)
 
 
 def is_timed(effects: Sequence[Effect], layout: Layout) -> bool:
     """Whether what pushes a body at rest, or its friction, changes with time."""
-    inputs = _Inputs(effects, layout)
+    inputs = LawInputs(effects, layout)
     return depends(_external(effects, inputs), inputs.time) or depends(_pair_force(effects, inputs), inputs.time)
 
 
-def _pair_force(effects: Sequence[Effect], inputs: _Inputs) -> list[Scalar]:
+def _pair_force(effects: Sequence[Effect], inputs: LawInputs) -> list[Scalar]:
     a = inputs.view(inputs.state("ya"), inputs.constants("body_a"))
     b = inputs.view(inputs.state("yb"), inputs.constants("body_b"))
     total: list[Scalar] = [0.0, 0.0]
@@ -188,7 +204,7 @@ def _pair_force(effects: Sequence[Effect], inputs: _Inputs) -> list[Scalar]:
 
 
 def _pair_source(effects: Sequence[Effect], layout: Layout) -> str:
-    inputs = _Inputs(effects, layout)
+    inputs = LawInputs(effects, layout)
     force = _pair_force(effects, inputs)
     arguments = "t, ya, yb, body_a, body_b, shared"
     value = function_source("pair_force", f"{arguments}, out", assignments(_targets("out", force)))
@@ -215,7 +231,7 @@ def _by_number(name: str, arguments: str, blocks: Sequence[Sequence[str]], nothi
 def _kick_source(effects: Sequence[Effect], layout: Layout) -> str:
     times, of_times, changes, of_changes = [], [], [], []
     for effect in with_kick(effects):
-        inputs = _Inputs(effects, layout)
+        inputs = LawInputs(effects, layout)
         shared, state, constants = list(inputs.shared.values()), inputs.state("y"), inputs.constants("body")
         time = inputs.recorder.constant(0.0) + effect.kick_time(inputs.shared)
         change = effect.kick(inputs.time, inputs.view(state, constants), inputs.shared)
@@ -236,7 +252,7 @@ def _kick_source(effects: Sequence[Effect], layout: Layout) -> str:
 def _boundary_source(effects: Sequence[Effect], layout: Layout) -> str:
     values, rates, of_values = [], [], []
     for effect in with_boundary(effects):
-        inputs = _Inputs(effects, layout)
+        inputs = LawInputs(effects, layout)
         shared, state, constants = list(inputs.shared.values()), inputs.state("y"), inputs.constants("body")
         value = inputs.recorder.constant(0.0) + effect.boundary(inputs.view(state, constants), inputs.shared)
         slopes = vector_jacobian([value], [inputs.recorder.constant(1.0)], state)
@@ -257,7 +273,7 @@ _CONTACT_BARS = "bar, ya_bar, yb_bar, body_a_bar, body_b_bar, shared_bar"
 
 
 def _contact_source(kind: ContactKind, effects: Sequence[Effect], layout: Layout) -> str:
-    inputs = _Inputs(effects, layout)
+    inputs = LawInputs(effects, layout)
     state_a, state_b = inputs.state("ya"), inputs.state("yb")
     constants_a, constants_b = inputs.constants("body_a"), inputs.constants("body_b")
     feature = inputs.array("feature", 7)

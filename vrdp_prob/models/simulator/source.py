@@ -19,6 +19,7 @@ from vrdp_prob.files import write_atomically
 from vrdp_prob.models.effects.effect import Effect
 from vrdp_prob.models.simulator import tableau
 from vrdp_prob.models.simulator.contact import rubs
+from vrdp_prob.models.simulator.law_check import check_laws
 from vrdp_prob.models.simulator.laws import Layout, is_timed, law_source, state_size, with_boundary, with_kick
 from vrdp_prob.models.simulator.motion import ROLLING_SHARE, slips
 from vrdp_prob.models.simulator.stages import step_source
@@ -56,6 +57,7 @@ def _without_imports(source: str) -> str:
 
 def assemble(effects: Sequence[Effect], layout: Layout) -> str:
     """Source of the module that simulates a model."""
+    check_laws(effects, layout)
     folder = resources.files("vrdp_prob.models.simulator")
     parts = [
         _HEADER,

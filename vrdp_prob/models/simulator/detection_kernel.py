@@ -26,7 +26,7 @@ SLOW = 1e-4
 """Closing speed in m/s below which touching bodies may press into each other by SLACK before they collide."""
 SLACK = 1e-7
 """Depth in m of that, and of an overlap that is not yet an error."""
-STILL = 1e-11
+STILL = 1e-9
 """Closing speed in m/s below which bodies do not collide, however deep: rounding errors of the velocities are less."""
 CRAWL = 1e-6
 """Shortest walk in s while two bodies touch."""

@@ -220,17 +220,6 @@ def test_models_with_these_effects_are_files(tmp_path: object) -> None:
         assert [effect.name for effect in again.effects] == [effect.name for effect in model.effects]
 
 
-def test_a_kick_without_a_time_is_refused() -> None:
-    class Timeless(ExternalImpulse):
-        name = "timeless"
-
-        def kick_time(self, parameters: object) -> float:
-            return super(ExternalImpulse, self).kick_time(parameters)
-
-    with pytest.raises(NotImplementedError, match="kick_time"):
-        PhysicsModel("none", (Timeless(),)).kernel  # noqa: B018 - the property compiles
-
-
 def test_missing_parameters_are_named() -> None:
     worlds = scene([[0, 0]], [[0, 0]])
     some = {name: value for name, value in worlds.parameters.items() if name != "impulse_x"}

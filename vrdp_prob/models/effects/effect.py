@@ -157,7 +157,7 @@ class Effect:
 
     def kick_time(self, parameters: Mapping[str, Scalar]) -> Scalar:
         """Time in s at which the effect changes velocities at once; an effect with `kick` must have it."""
-        raise NotImplementedError(f"effect {self.name}: a kick needs a kick_time.")
+        raise NotImplementedError("a kick needs its time; write this method.")
 
     def kick(self, time: Scalar, body: BodyView, parameters: Mapping[str, Scalar]) -> tuple[Scalar, Scalar, Scalar]:
         """Change of (vx, vy, spin) of a body in m/s and rad/s at the time of the kick."""

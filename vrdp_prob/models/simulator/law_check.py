@@ -64,7 +64,9 @@ def _called(where: str, law: Callable[..., object], arguments: tuple[Any, ...]) 
         raise InputError(
             f"{where}: there is no {error} for it; state the parameter in 'parameters' with the scope it is read from."
         ) from error
-    except (AttributeError, NotImplementedError, TypeError, ValueError) as error:
+    except NotImplementedError as error:
+        raise InputError(f"{where}: {error}") from error
+    except (AttributeError, TypeError, ValueError) as error:
         raise InputError(
             f"{where}: {error}; a law uses the operators and vrdp_prob.models.simulator.mathematics."
         ) from error

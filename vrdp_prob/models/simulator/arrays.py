@@ -55,9 +55,8 @@ def kernel_arrays(worlds: Worlds, effects: "Sequence[Effect]", layout: Layout, f
     fixed = fixed_things(worlds, effects)
     if fixed:
         earliest = worlds.release_time.detach().min(dim=1).values.clamp(max=first_time).to(torch.float64)
-        bodies = torch.cat([bodies, torch.stack([_fixed_constants(thing, layout) for thing in fixed], dim=1)], dim=1)
-        states = [_fixed_start(thing, earliest, start.shape[-1]) for thing in fixed]
-        start = torch.cat([start, torch.stack(states, dim=1)], dim=1)
+        bodies = torch.cat([bodies, *(_fixed_constants(things, layout) for things in fixed)], dim=1)
+        start = torch.cat([start, *(_fixed_start(things, earliest, start.shape[-1]) for things in fixed)], dim=1)
     return KernelArrays(
         kinds=_kinds(worlds, fixed),
         bodies=bodies,
@@ -68,25 +67,19 @@ def kernel_arrays(worlds: Worlds, effects: "Sequence[Effect]", layout: Layout, f
 
 def fixed_things(worlds: Worlds, effects: "Sequence[Effect]") -> list[Obstacle]:
     """Walls of the worlds, then what effects add."""
-    lines, factors = worlds.walls.to(torch.float64), worlds.restitution_of_walls
-    walls = [
-        Obstacle.wall(
-            (lines[index, 0].expand(len(worlds)), lines[index, 1].expand(len(worlds))),
-            (lines[index, 2].expand(len(worlds)), lines[index, 3].expand(len(worlds))),
-            factors[:, index],
-        )
-        for index in range(len(lines))
-    ]
+    walls = [Obstacle.walls(worlds.walls.to(torch.float64)[None], worlds.restitution_of_walls)] * bool(
+        len(worlds.walls)
+    )
     return [*walls, *(obstacle for effect in effects for obstacle in effect.obstacles(worlds.parameters))]
 
 
 def _kinds(worlds: Worlds, fixed: Sequence[Obstacle]) -> Int[np.ndarray, "world all 3"]:
     count = len(worlds.shapes)
-    kinds = np.zeros((len(worlds), count + len(fixed), 3), dtype=np.int64)
+    outlines = [things.outline for things in fixed for _ in range(things.x.shape[1])]
+    kinds = np.zeros((len(worlds), count + len(outlines), 3), dtype=np.int64)
     kinds[:, :count, 0] = [Outline.DISC if shape.is_disc else Outline.SQUARE for shape in worlds.shapes]
     kinds[:, :count, 2] = worlds.present.cpu().numpy()
-    for index, thing in enumerate(fixed):
-        kinds[:, count + index] = (thing.outline, 1, 1)
+    kinds[:, count:, 0], kinds[:, count:, 1:] = outlines, 1
     return kinds
 
 
@@ -123,18 +116,18 @@ def _body_starts(worlds: Worlds, effects: "Sequence[Effect]") -> Float[Tensor, "
     return torch.cat([part.to(torch.float64) for part in parts], dim=-1)
 
 
-def _fixed_constants(thing: Obstacle, layout: Layout) -> Float[Tensor, "world constant"]:
-    nothing = torch.zeros_like(thing.extent, dtype=torch.float64)
+def _fixed_constants(things: Obstacle, layout: Layout) -> Float[Tensor, "world thing constant"]:
+    nothing = torch.zeros_like(things.extent, dtype=torch.float64)
     columns = [nothing] * len(layout.constants)
     columns[CONSTANTS.index("mass")] = nothing + 1.0
-    columns[CONSTANTS.index("restitution")] = thing.restitution.to(torch.float64)
-    columns[CONSTANTS.index("radius")] = thing.extent.to(torch.float64)
+    columns[CONSTANTS.index("restitution")] = things.restitution.to(torch.float64)
+    columns[CONSTANTS.index("radius")] = things.extent.to(torch.float64)
     return torch.stack(columns, dim=-1)
 
 
 def _fixed_start(
-    thing: Obstacle, earliest: Float[Tensor, "world"], columns: int
-) -> Float[Tensor, "world state_and_time"]:
-    still = [torch.zeros_like(earliest)] * (columns - 4)
-    place = [value.to(torch.float64) for value in (thing.x, thing.y, thing.angle)]
-    return torch.stack([*place, *still, earliest], dim=-1)
+    things: Obstacle, earliest: Float[Tensor, "world"], columns: int
+) -> Float[Tensor, "world thing state_and_time"]:
+    still = [torch.zeros_like(things.x, dtype=torch.float64)] * (columns - 4)
+    place = [value.to(torch.float64) for value in (things.x, things.y, things.angle)]
+    return torch.stack([*place, *still, earliest[:, None].expand_as(things.x)], dim=-1)

@@ -11,14 +11,14 @@ from vrdp_prob.models.simulator.outline import Outline
 
 @dataclass(frozen=True)
 class Obstacle:
-    """A fixed disc or straight wall; gradients flow through all its tensors.
+    """Fixed discs or straight walls, one or several alike; gradients flow through all tensors.
 
     Parameters
     ----------
     outline
         `Outline.DISC` or `Outline.WALL`.
     x, y, angle
-        Position of its middle in m, and direction of a wall in rad.
+        Position of the middle in m, and direction of a wall in rad.
     extent
         Radius of a disc or half the length of a wall, in m.
     restitution
@@ -26,11 +26,11 @@ class Obstacle:
     """
 
     outline: Outline
-    x: Float[Tensor, "world"]
-    y: Float[Tensor, "world"]
-    angle: Float[Tensor, "world"]
-    extent: Float[Tensor, "world"]
-    restitution: Float[Tensor, "world"]
+    x: Float[Tensor, "world thing"]
+    y: Float[Tensor, "world thing"]
+    angle: Float[Tensor, "world thing"]
+    extent: Float[Tensor, "world thing"]
+    restitution: Float[Tensor, "world thing"]
 
     @classmethod
     def disc(
@@ -41,22 +41,12 @@ class Obstacle:
         restitution: Float[Tensor, "world"],
     ) -> "Obstacle":
         """A disc about (x, y)."""
-        return cls(Outline.DISC, x, y, torch.zeros_like(x), radius, restitution)
+        columns = [values[:, None] for values in (x, y, torch.zeros_like(x), radius, restitution)]
+        return cls(Outline.DISC, *columns)
 
     @classmethod
-    def wall(
-        cls,
-        begin: tuple[Float[Tensor, "world"], Float[Tensor, "world"]],
-        end: tuple[Float[Tensor, "world"], Float[Tensor, "world"]],
-        restitution: Float[Tensor, "world"],
-    ) -> "Obstacle":
-        """A straight wall between two points; both its sides reflect."""
-        along_x, along_y = end[0] - begin[0], end[1] - begin[1]
-        return cls(
-            Outline.WALL,
-            (begin[0] + end[0]) / 2,
-            (begin[1] + end[1]) / 2,
-            torch.atan2(along_y, along_x),
-            torch.hypot(along_x, along_y) / 2,
-            restitution,
-        )
+    def walls(cls, lines: Float[Tensor, "world_or_one wall 4"], restitution: Float[Tensor, "world wall"]) -> "Obstacle":
+        """Straight walls between end points (x1, y1, x2, y2) in m; both sides reflect."""
+        x1, y1, x2, y2 = lines.expand(len(restitution), -1, -1).unbind(-1)
+        angle, extent = torch.atan2(y2 - y1, x2 - x1), torch.hypot(x2 - x1, y2 - y1) / 2
+        return cls(Outline.WALL, (x1 + x2) / 2, (y1 + y2) / 2, angle, extent, restitution)

@@ -19,6 +19,7 @@ from vrdp_prob.inference.free_flight import SeenContact, noise_scale, release_fi
 from vrdp_prob.inference.growing_fit import GrowingFit
 from vrdp_prob.inference.least_squares import jacobian
 from vrdp_prob.inference.misfit import Misfit, judge
+from vrdp_prob.inference.mode import Mode
 from vrdp_prob.inference.samples import Gaussian, evaluate
 from vrdp_prob.models.likelihood import Likelihood
 from vrdp_prob.models.observation import prior_noise
@@ -48,12 +49,8 @@ class MapFit:
     ----------
     likelihood
         The density, reduced to the unknowns that the motion says something about.
-    point
-        The MAP.
-    precision
-        Gauss-Newton curvature of the negative log posterior there.
-    log_density
-        Log posterior there.
+    modes
+        Its modes that were found, best first; the first is the MAP.
     converged
         Whether the last refinement ended by itself.
     contacts
@@ -67,14 +64,27 @@ class MapFit:
     """
 
     likelihood: Likelihood
-    point: Float[np.ndarray, "dimension"]
-    precision: Float[np.ndarray, "dimension dimension"]
-    log_density: float
+    modes: tuple[Mode, ...]
     converged: bool
     contacts: tuple[SeenContact, ...]
     noise: float
     misfit: Misfit
     evaluations: int
+
+    @property
+    def point(self) -> Float[np.ndarray, "dimension"]:
+        """The MAP."""
+        return self.modes[0].point
+
+    @property
+    def precision(self) -> Float[np.ndarray, "dimension dimension"]:
+        """Gauss-Newton curvature of the negative log posterior at the MAP."""
+        return self.modes[0].precision
+
+    @property
+    def log_density(self) -> float:
+        """Log posterior at the MAP."""
+        return self.modes[0].log_density
 
     @cached_property
     def gaussian(self) -> CurvedGaussian:
@@ -134,9 +144,7 @@ def fit_map(
     evaluations = growing.evaluations + final.evaluations
     return MapFit(
         final.likelihood,
-        point,
-        precision,
-        log_density,
+        (Mode(point, precision, log_density),),
         final.converged or converged,
         contacts,
         noise,

@@ -4,11 +4,9 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 import torch
-import xarray as xr
 from jaxtyping import Float
 
 from vrdp_prob.errors import InputError
-from vrdp_prob.inference.draws import named_draws
 from vrdp_prob.inference.emcee_sampler import sample_emcee
 from vrdp_prob.inference.events import collision_sequences, first_contacts, wall_contacts
 from vrdp_prob.inference.identifiability import BodyStatus, Status, identifiability
@@ -17,6 +15,7 @@ from vrdp_prob.inference.map_fit import MapFit, fit_map
 from vrdp_prob.inference.nuts_sampler import sample_nuts
 from vrdp_prob.inference.posterior import Posterior
 from vrdp_prob.inference.samples import Convergence, Samples, assess
+from vrdp_prob.inference.tree import posterior_tree
 from vrdp_prob.models.effects.body_friction import BodyFriction
 from vrdp_prob.models.physics import PhysicsModel
 from vrdp_prob.progress import ProgressDisplay
@@ -28,7 +27,6 @@ SAMPLERS: Mapping[str, Callable[..., Samples]] = {
     "laplace": sample_laplace,
 }
 """The samplers by name; all take the log density and the Gaussian around the MAP."""
-PRIOR_DRAWS = 500
 BATCH = 500
 """Worlds simulated at once when the draws are looked at again."""
 
@@ -116,7 +114,7 @@ def _posterior(
         tracks=tracks,
         model=fit.likelihood.model,
         seed=seed,
-        data=_tree(fit, kept, changed, generator),
+        data=posterior_tree(fit, kept, changed, generator),
         status=status,
         convergence=convergence,
         warnings=tuple(_warnings(fit, convergence, status, contacts)),
@@ -135,34 +133,6 @@ def _changed_order(
             rollout = fit.likelihood.rollout(flat[begin : begin + BATCH])
             changed += [sequence != contacts for sequence in collision_sequences(rollout)]
     return np.array(changed, dtype=float).reshape(points.shape[:2])
-
-
-def _tree(
-    fit: MapFit, samples: Samples, changed: Float[np.ndarray, "chain draw"], generator: np.random.Generator
-) -> xr.DataTree:
-    likelihood, points = fit.likelihood, samples.points
-    flat = torch.from_numpy(np.ascontiguousarray(points.reshape(-1, points.shape[-1])))
-    pointwise = np.concatenate([likelihood.pointwise(flat[k : k + BATCH]) for k in range(0, len(flat), BATCH)])
-    observed = likelihood.tracks.data
-    posterior = named_draws(likelihood, points)
-    axes = ("chain", "draw", "time", "body")
-    shaped = pointwise.reshape(*points.shape[:2], *pointwise.shape[1:])
-    coordinates = {**{name: posterior[name] for name in ("chain", "draw", "body")}, "time": observed["time"]}
-    statistics = {"lp": samples.log_density, "collision_order_changed": changed, **samples.statistics}
-    prior = likelihood.coordinates.prior_draws(PRIOR_DRAWS, generator)[None]
-    return xr.DataTree.from_dict(
-        {
-            "posterior": posterior,
-            "map_estimate": named_draws(likelihood, fit.point[None, None]).isel(chain=0, draw=0, drop=True),
-            "prior": named_draws(likelihood, prior),
-            "sample_stats": xr.Dataset(
-                {name: (("chain", "draw"), values) for name, values in statistics.items()},
-                {name: posterior[name] for name in ("chain", "draw")},
-            ),
-            "log_likelihood": xr.Dataset({"position": (axes, shaped)}, coordinates),
-            "observed_data": observed,
-        }
-    )
 
 
 def _warnings(

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 import torch
@@ -15,6 +15,7 @@ from vrdp_prob.inference.continuation import continued
 from vrdp_prob.inference.identifiability import BodyStatus
 from vrdp_prob.inference.samples import Convergence
 from vrdp_prob.inference.summaries import ObjectSummary, PairSummary, ParameterSummary, Summary
+from vrdp_prob.inference.tree import for_arviz
 from vrdp_prob.models.parameters import WALL_RESTITUTION
 from vrdp_prob.models.physics import PhysicsModel
 from vrdp_prob.models.scenery import Scenery
@@ -38,8 +39,8 @@ class Posterior:
     seed
         Seed of all randomness.
     data
-        Groups `posterior`, `map_estimate`, `prior`, `sample_stats`, `log_likelihood` and `observed_data`; the draws
-        have the axes `chain` and `draw`, then `body` where there is one value per body. SI units, as attributes.
+        The groups of `vrdp_prob.inference.tree.posterior_tree`; the draws have the axes `chain` and `draw`, then `body`
+        where there is one value per body. SI units, as attributes.
     status
         What the data say about each body's mass and restitution, by id.
     convergence
@@ -128,6 +129,10 @@ class Posterior:
         """Restitution (product of both factors) of every pair that collides."""
         restitution = self._draws("restitution")
         return tuple(self._pair_summary(pair, restitution, np.multiply) for pair in self.pairs)
+
+    def to_arviz(self) -> Any:
+        """All groups as what the installed ArviZ works with: `InferenceData` before its version 1, else `DataTree`."""
+        return for_arviz(self.data)
 
     def write(self, path: Path | str) -> None:
         """Save as one netCDF file that needs nothing else to be read again; an interruption leaves no half file.

@@ -18,8 +18,9 @@ from vrdp_prob.models import model_file
 from vrdp_prob.models.physics import PhysicsModel
 from vrdp_prob.scene import Body, Camera, Shape, Tracks, Wall
 
-FORMAT = 1
+FORMAT = 2
 """Version of the layout of the file."""
+COMPRESSION = {"compression": "gzip", "compression_opts": 4, "shuffle": True}
 
 
 def write_posterior(posterior: Posterior, path: Path) -> None:
@@ -47,7 +48,7 @@ def fill_file(posterior: Posterior, path: Path) -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         # in memory first: on a full disk the HDF5 library would go on to fail whenever it frees an object
-        content = tree.to_netcdf(engine="h5netcdf")
+        content = tree.to_netcdf(engine="h5netcdf", encoding=_compressed(tree))
     path.write_bytes(content)
 
 
@@ -71,6 +72,14 @@ def read_posterior(path: Path, tracks: Tracks | None = None) -> Posterior:
         raise InputError(f"{path}: {error}") from error
     except (KeyError, ValueError, TypeError) as error:
         raise InputError(f"{path}: not a posterior of this tool ({error}); run the inference again.") from error
+
+
+def _compressed(tree: xr.DataTree) -> dict[str, dict[str, dict[str, Any]]]:
+    """How each array of each group is stored."""
+    return {
+        group.path: {str(name): dict(COMPRESSION) for name, values in group.data_vars.items() if values.ndim}
+        for group in tree.subtree
+    }
 
 
 def _document(posterior: Posterior) -> dict[str, Any]:
@@ -117,7 +126,7 @@ def _tracks(document: dict[str, Any], tree: xr.DataTree) -> Tracks:
     return Tracks(
         document["video"],
         tuple(Body(**{**body, "shape": Shape(body["shape"])}) for body in document["bodies"]),
-        tree["observed_data"].to_dataset(),
+        tree["observed_data"].to_dataset().drop_vars(("position", "axis"), errors="ignore"),
         tuple(Wall(**wall) for wall in document["walls"]),
         None if camera is None else _camera(camera),
     )

@@ -118,6 +118,12 @@ class Coordinates:
         beyond = (points[:, places] - edges) / softness
         return torch.cat([gaussian, (2 * torch.nn.functional.softplus(beyond) + TINY).sqrt()], dim=1)
 
+    def log_prior(self, points: Float[Tensor, "point dimension"]) -> Float[Tensor, "point dimension"]:
+        """Log prior density (nats, up to a constant) of each number by itself."""
+        squares = self.prior_residuals(points) ** 2
+        terms, (_, _, places, _, _) = squares[:, : len(self)], self._prior
+        return -terms.index_add(1, places, squares[:, len(self) :]) / 2
+
     def prior_draws(self, count: int, generator: np.random.Generator) -> Float[np.ndarray, "draw dimension"]:
         """Draws of the prior."""
         columns = [entry.prior.sample(generator, (count,)) for entry in self.entries]

@@ -109,6 +109,16 @@ class Likelihood:
         minus_infinity = torch.full_like(log_prior, -torch.inf)
         return torch.where(torch.from_numpy(valid), log_likelihood + log_prior, minus_infinity)
 
+    def predicted(self, points: Float[Tensor, "point dimension"]) -> Float[np.ndarray, "point time body 3"]:
+        """Positions (m) and angles (rad) of all frames and bodies as they would be measured without noise."""
+        with torch.no_grad():
+            quantities = self.coordinates.quantities(points)
+            worlds = self._worlds(quantities)
+            states = self._measured(worlds, self._rollout(worlds, None)[0]).numpy()
+        predicted: np.ndarray = states.reshape(len(points), *self.tracks.seen.shape, 3)
+        predicted[..., 2] += quantities["angle_zero"].numpy()[:, None]
+        return predicted
+
     def pointwise(self, points: Float[Tensor, "point dimension"]) -> Float[np.ndarray, "point time body"]:
         """Log likelihood of each seen position (both axes together); NaN where nothing was seen."""
         observations = self.observations

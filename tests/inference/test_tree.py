@@ -1,0 +1,120 @@
+"""What the groups of a posterior hold, and that ArviZ works on them."""
+
+from functools import cache
+from pathlib import Path
+
+import arviz
+import arviz_stats
+import numpy as np
+import pytest
+import torch
+import xarray as xr
+
+from tests.inference.generator import Scene, observe
+from vrdp_prob.inference import Posterior, default_model, infer, tree
+from vrdp_prob.inference.map_fit import MapFit, fit_map
+from vrdp_prob.inference.samples import Samples
+from vrdp_prob.inference.tree import PREDICTIVE_DRAWS, posterior_tree
+from vrdp_prob.scene import Shape, Tracks
+
+NOISE = 0.005
+
+
+def tracks() -> Tracks:
+    """A disc hits a cube; a third body enters late; some positions are missing."""
+    scene = Scene(
+        (Shape.CYLINDER, Shape.CUBE, Shape.SPHERE),
+        np.array([[-1.2, 0.0], [-0.2, 0.05], [-1.0, 1.5]]),
+        np.array([[1.8, 0.0], [0.0, 0.0], [0.9, 0.1]]),
+        np.array([1.5, 0.8, 1.0]),
+        np.array([0.9, 0.95, 0.8]),
+        np.full(3, 0.2),
+        np.array([0.4, 0.4, 0.05]),
+        angle=np.array([0.0, 0.3, 0.0]),
+        release=np.array([0.0, 0.0, 0.4]),
+    )
+    return observe(scene, noise=NOISE, dropout=0.1, frames=40, seed=2)
+
+
+@cache
+def fit() -> MapFit:
+    return fit_map(tracks(), default_model(), np.random.default_rng(0))
+
+
+def points() -> np.ndarray:
+    """Two chains of draws around the best fit."""
+    best = fit().modes[0].point
+    return best + 0.002 * np.random.default_rng(1).standard_normal((2, 150, len(best)))
+
+
+@cache
+def grouped() -> xr.DataTree:
+    log_density = fit().likelihood.log_density(torch.from_numpy(points().reshape(300, -1))).numpy().reshape(2, 150)
+    return posterior_tree(fit(), Samples(points(), log_density), np.zeros((2, 150)), np.random.default_rng(2))
+
+
+@cache
+def posterior() -> Posterior:
+    return infer(tracks(), sampler="laplace", draws=300)
+
+
+def test_likelihood_and_prior_add_up_to_the_log_density() -> None:
+    groups = grouped()
+    likelihood = groups["log_likelihood"].to_dataset().to_stacked_array("number", ("chain", "draw")).sum("number")
+    prior = groups["log_prior"].to_dataset().to_stacked_array("number", ("chain", "draw")).sum("number")
+    difference = (groups["sample_stats"]["lp"] - likelihood - prior).values
+    assert np.isfinite(difference).all()
+    assert difference.std() < 1e-3
+    assert groups["sample_stats"]["lp"].values.std() > 1
+
+
+def test_there_is_one_log_likelihood_per_observation_and_one_log_prior_per_sampled_number() -> None:
+    groups, seen = grouped(), tracks().seen
+    assert groups["log_likelihood"]["position"].sizes == {"chain": 2, "draw": 150, "observation": int(seen.sum())}
+    assert np.isfinite(groups["log_likelihood"]["position"]).all()
+    assert set(groups["log_likelihood"]["observed_body"].values) == {"0", "1", "2"}
+    prior = groups["log_prior"]
+    assert prior["position"].dims == ("chain", "draw", "body", "axis")
+    assert (prior["mass"].values[..., :2] != 0).all()
+    assert (prior["mass"].values[..., 2] == 0).all()
+
+
+def test_predicted_measurements_scatter_like_the_measured_ones() -> None:
+    groups, seen = grouped(), tracks().seen
+    predicted, observed = groups["posterior_predictive"]["position"], groups["observed_data"]["position"]
+    assert predicted.dims == ("chain", "draw", *observed.dims)
+    assert predicted.sizes["chain"] * predicted.sizes["draw"] == PREDICTIVE_DRAWS
+    assert "of 150 draws" in groups["posterior_predictive"].attrs["draws"]
+    assert np.isnan(predicted.sel(body="2", time=slice(None, 0.3))).all()
+    assert np.isfinite(predicted.sel(body="0")).all()
+    chosen = torch.from_numpy(points()[:, predicted["draw"].values].reshape(PREDICTIVE_DRAWS, -1))
+    added = predicted.values.reshape(PREDICTIVE_DRAWS, *observed.shape) - fit().likelihood.predicted(chosen)[..., :2]
+    assert added[:, seen].std() == pytest.approx(NOISE, rel=0.15)
+    assert np.abs(predicted.values.mean(axis=(0, 1)) - observed.values)[seen].max() < 5 * NOISE
+
+
+def test_the_installed_arviz_takes_the_result() -> None:
+    data = posterior().to_arviz()
+    assert set(data.groups()) >= {"posterior", "posterior_predictive", "log_likelihood", "log_prior", "map_estimate"}
+    summary = arviz.summary(data, var_names=["mass", "velocity"], kind="stats")
+    assert summary.loc["mass[0]", "mean"] > 0
+    loo = arviz.loo(data, var_name="position", pointwise=True)
+    assert np.isfinite(loo.elpd_loo)
+    assert len(loo.loo_i) == tracks().seen.sum()
+
+
+def test_arviz_from_version_1_takes_the_tree_itself(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(tree, "version", lambda _name: "1.2.0")
+    data = posterior().to_arviz()
+    assert data is posterior().data
+    assert arviz_stats.summary(data, var_names=["mass"], kind="stats").loc["mass[0]", "mean"] > 0
+    assert np.isfinite(arviz_stats.loo(data, var_name="position").elpd)
+    sensitivity = arviz_stats.psense_summary(data, var_names=["sliding_friction"])
+    assert np.isfinite(sensitivity[["prior", "likelihood"]].astype(float).to_numpy()).all()
+
+
+def test_the_file_is_compressed(tmp_path: Path) -> None:
+    path = tmp_path / "posterior.nc"
+    posterior().write(path)
+    numbers = sum(int(values.size) for group in posterior().data.subtree for values in group.data_vars.values())
+    assert path.stat().st_size < 6 * numbers

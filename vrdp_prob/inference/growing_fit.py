@@ -14,9 +14,9 @@ from jaxtyping import Bool, Float
 from vrdp_prob.inference.events import first_contacts
 from vrdp_prob.inference.free_flight import SeenContact
 from vrdp_prob.inference.least_squares import Minimum, minimise, robust_cost
+from vrdp_prob.inference.noise_fit import NOISE_FIELDS, best_noise
 from vrdp_prob.inference.samples import Gaussian
 from vrdp_prob.models.likelihood import Likelihood
-from vrdp_prob.models.unknowns import ANGLE_NOISE, NOISE
 
 CANDIDATES = 128
 """Worlds drawn where a window brings something new."""
@@ -59,7 +59,7 @@ class GrowingFit:
         self.likelihood, self.point = likelihood, start.copy()
         self._contacts, self._generator = contacts, generator
         self._coordinates = likelihood.coordinates
-        self._noise_places = self._coordinates.mask((NOISE, ANGLE_NOISE))
+        self._noise_places = self._coordinates.mask(NOISE_FIELDS)
         self._idle_sd = self._coordinates.prior_sd.copy()
         self._precision = np.diag(self._idle_sd**-2)
         self._events: set[tuple[int, int]] = set()
@@ -92,7 +92,7 @@ class GrowingFit:
         """Refine on all frames with plain least squares, the noise scale in turn with the rest."""
         frame_count = len(self.likelihood.tracks.times)
         for _ in range(rounds):
-            self._update_noise()
+            self.point = best_noise(self.likelihood, self.point)
             before = self.point
             active = self._active(frame_count)
             self._refine(self.point[None], frame_count, active, iterations=12, threshold=None, tolerance=1e-3)
@@ -216,30 +216,3 @@ class GrowingFit:
         with torch.no_grad():
             rollout = self.likelihood.rollout(torch.from_numpy(self.point[None]), frame_count)
         return set(first_contacts(rollout, 0))
-
-    def _update_noise(self) -> None:
-        """Most probable noise scales for the present residuals."""
-        residuals = self.likelihood.residuals(self.point[None])[0]
-        if not np.isfinite(residuals).all():
-            return
-        share = self.likelihood.information
-        count = 2 * len(self.likelihood.observations.frame)
-        angles = len(self.likelihood.observations.angle)
-        for field, part in ((NOISE, residuals[:count]), (ANGLE_NOISE, residuals[count : count + angles])):
-            place = self._coordinates.places.get((field, None))
-            if place is not None and len(part):
-                prior = self._coordinates.entries[place].prior
-                self.point[place] = _best_log_scale(self.point[place], part, share, prior.mean, prior.sd)
-
-
-def _best_log_scale(
-    now: float, residuals: Float[np.ndarray, "residual"], share: float, prior_mean: float, prior_sd: float
-) -> float:
-    """Log noise scale that maximises the posterior, by Newton steps; the residuals are in units of the present one."""
-    squares = float((residuals**2).sum()) * np.exp(2 * now)
-    value = now + 0.5 * np.log(max(squares * np.exp(-2 * now), 1e-300) / (share * len(residuals)))
-    for _ in range(20):
-        scaled = squares * np.exp(-2 * value)
-        gradient = scaled - share * len(residuals) - (value - prior_mean) / prior_sd**2
-        value += gradient / (2 * scaled + prior_sd**-2)
-    return float(value)

@@ -20,11 +20,12 @@ from vrdp_prob.inference.growing_fit import GrowingFit
 from vrdp_prob.inference.least_squares import jacobian
 from vrdp_prob.inference.misfit import Misfit, judge
 from vrdp_prob.inference.mode import Mode
+from vrdp_prob.inference.noise_fit import noise_curvature
 from vrdp_prob.inference.samples import Gaussian, evaluate
 from vrdp_prob.models.likelihood import Likelihood
 from vrdp_prob.models.observation import prior_noise
 from vrdp_prob.models.physics import PhysicsModel
-from vrdp_prob.models.unknowns import ANGLE_NOISE, NOISE, Structure, unknowns
+from vrdp_prob.models.unknowns import NOISE, Structure, unknowns
 from vrdp_prob.progress import ProgressDisplay, SilentProgress
 from vrdp_prob.scene import Tracks
 
@@ -140,7 +141,7 @@ def fit_map(
         final.finish()
     point, log_density, converged = _climb(final.likelihood, final.point, LBFGS_ITERATIONS if climb else 0)
     _, derivative = jacobian(final.likelihood.residuals, point, final.likelihood.coordinates.scale, central=True)
-    precision = _with_noise(final.likelihood, derivative)
+    precision = _with_noise(final.likelihood, point, derivative)
     evaluations = growing.evaluations + final.evaluations
     return MapFit(
         final.likelihood,
@@ -297,7 +298,7 @@ def _climb(
     if not iterations:
         return start, float(evaluate(likelihood.log_density, start[None])[0]), False
     _, derivative = jacobian(likelihood.residuals, start, likelihood.coordinates.scale)
-    gaussian = Gaussian.from_precision(start, _with_noise(likelihood, derivative))
+    gaussian = Gaussian.from_precision(start, _with_noise(likelihood, start, derivative))
     mean, root = torch.from_numpy(gaussian.mean), torch.from_numpy(gaussian.root)
 
     def descend(whitened: Float[np.ndarray, "dimension"]) -> tuple[float, Float[np.ndarray, "dimension"]]:
@@ -322,15 +323,11 @@ def _climb(
 
 
 def _with_noise(
-    likelihood: Likelihood, derivative: Float[np.ndarray, "residual dimension"]
+    likelihood: Likelihood, point: Float[np.ndarray, "dimension"], derivative: Float[np.ndarray, "residual dimension"]
 ) -> Float[np.ndarray, "dimension dimension"]:
     """Gauss-Newton curvature, with that of the noise scales in place of what the residuals say of them."""
     precision = derivative.T @ derivative
-    observations = likelihood.observations
-    for field, count in ((NOISE, 2 * len(observations.frame)), (ANGLE_NOISE, len(observations.angle))):
-        place = likelihood.coordinates.places.get((field, None))
-        if place is not None:
-            precision[place, :] = precision[:, place] = 0.0
-            curvature = 2 * likelihood.information * count
-            precision[place, place] = curvature + likelihood.coordinates.prior_sd[place] ** -2
+    places, curvature = noise_curvature(likelihood, point)
+    precision[places, :] = precision[:, places] = 0.0
+    precision[np.ix_(places, places)] = curvature
     return precision

@@ -10,18 +10,35 @@ from torch import Tensor
 
 from vrdp_prob.models.coordinates import Coordinates
 from vrdp_prob.models.measurement import changes_clock, changes_positions, measured_positions, true_times
+from vrdp_prob.models.model_error import ModelError, Strands, Whitening
+from vrdp_prob.models.noise import NoiseFamily
 from vrdp_prob.models.observation import Observations
 from vrdp_prob.models.physics import PhysicsModel
 from vrdp_prob.models.scenery import Quantities, Scenery
 from vrdp_prob.models.simulator.rollout import Rollout, simulate
 from vrdp_prob.models.simulator.worlds import Worlds
-from vrdp_prob.models.unknowns import ANGLE_NOISE, NOISE
+from vrdp_prob.models.unknowns import ANGLE_NOISE, DEGREES_OF_FREEDOM, NOISE
 from vrdp_prob.scene import Tracks
 
 EVENT_LIMIT = 1000
 """Events of one world after which it counts as impossible; a video shows a few dozen at most, and bodies that press on
 each other some hundred."""
-LOG_TWO_PI = float(np.log(2 * np.pi))
+
+
+@dataclass(frozen=True)
+class Discrepancies:
+    """Differences of what was seen from simulated worlds, whitened, at noise scale 1.
+
+    Parameters
+    ----------
+    positions
+        Of each seen position.
+    angles
+        Of each measured angle.
+    """
+
+    positions: Float[Tensor, "point observation 2"]
+    angles: Float[Tensor, "point angle"]
 
 
 @dataclass(frozen=True)
@@ -36,24 +53,35 @@ class Likelihood:
         The physics.
     coordinates
         The unknowns and their priors.
-    information
-        Share of an independent observation that each seen number counts for. Below 1 where the residuals of the best
-        fit are correlated in time, which is what a wrong model leaves behind: the intervals become wider.
+    noise
+        Distribution of the measurement errors.
+    model_error
+        What the model leaves unexplained; None where it explains everything. It goes with Gaussian noise.
     """
 
     tracks: Tracks
     model: PhysicsModel
     coordinates: Coordinates
-    information: float = 1.0
+    noise: NoiseFamily = NoiseFamily.GAUSSIAN
+    model_error: ModelError | None = None
 
     @cached_property
     def observations(self) -> Observations:
         """What was seen, as flat lists."""
         return Observations.of(self.tracks)
 
-    def informed(self, share: float) -> "Likelihood":
-        """The same with another share of information per observation."""
-        return replace(self, information=share)
+    def with_model_error(self, error: ModelError) -> "Likelihood":
+        """The same with an error of the model; outliers are discounted by it, so that the noise is Gaussian."""
+        return replace(self, noise=NoiseFamily.GAUSSIAN, model_error=error)
+
+    @cached_property
+    def strands(self) -> Strands:
+        """The residuals body by body, as a model error sees them."""
+        return Strands.of(self.observations, self.tracks.times)
+
+    @cached_property
+    def _whitening(self) -> Whitening | None:
+        return None if self.model_error is None else Whitening.of(self.model_error, self.strands)
 
     @cached_property
     def _scenery(self) -> Scenery:
@@ -91,23 +119,50 @@ class Likelihood:
     def residuals(
         self, points: Float[np.ndarray, "point dimension"], frame_count: int | None = None
     ) -> Float[np.ndarray, "point residual"]:
-        """Residuals of unit variance: positions, angles, then the prior; a row of NaN where a world fails."""
+        """Residuals of unit variance: positions, angles, then the prior; a row of NaN where a world fails.
+
+        Half their sum of squares is the negative log posterior, but for the terms of the noise scales.
+        """
         with torch.no_grad():
             vector = torch.from_numpy(np.ascontiguousarray(points))
-            data, valid = self._data_residuals(self.coordinates.quantities(vector), frame_count)
-            data = data * self.information**0.5
-            residuals = torch.cat([data, self.coordinates.prior_residuals(vector)], dim=1).numpy()
+            quantities = self.coordinates.quantities(vector)
+            discrepancies, valid = self._discrepancies(quantities, frame_count)
+            data = self._independent(discrepancies, quantities)
+            prior = self.coordinates.prior_residuals(vector)
+            residuals = torch.cat([*(part.flatten(1) for part in data), prior], dim=1).numpy()
         residuals[~valid] = np.nan
         return residuals
 
     def log_density(self, points: Float[Tensor, "point dimension"]) -> Float[Tensor, "point"]:
         """Log posterior density (nats) in the vector's units; -inf where a world fails. Differentiable."""
+        discrepancies, valid = self._discrepancies(self.coordinates.quantities(points), None)
+        density = self.log_density_given(discrepancies, points)
+        return torch.where(torch.from_numpy(valid), density, torch.full_like(density, -torch.inf))
+
+    def discrepancies(self, points: Float[Tensor, "point dimension"]) -> Discrepancies:
+        """Differences of what was seen from the worlds of some points, at noise scale 1; NaN where a world fails."""
+        found, valid = self._discrepancies(self.coordinates.quantities(points), None)
+        failed = torch.from_numpy(~valid)
+        return Discrepancies(
+            found.positions.masked_fill(failed[:, None, None], torch.nan),
+            found.angles.masked_fill(failed[:, None], torch.nan),
+        )
+
+    def log_density_given(
+        self, discrepancies: Discrepancies, points: Float[Tensor, "point dimension"]
+    ) -> Float[Tensor, "point"]:
+        """Log posterior density (nats) of points whose worlds are known to leave these discrepancies.
+
+        Points that differ in noise scales alone share one simulation.
+        """
         quantities = self.coordinates.quantities(points)
-        data, valid = self._data_residuals(quantities, None)
-        log_likelihood = -self.information * ((data**2).sum(dim=1) / 2 + self._log_scale(quantities))
-        log_prior = -(self.coordinates.prior_residuals(points) ** 2).sum(dim=1) / 2
-        minus_infinity = torch.full_like(log_prior, -torch.inf)
-        return torch.where(torch.from_numpy(valid), log_likelihood + log_prior, minus_infinity)
+        log_likelihood = self._log_likelihood(discrepancies, quantities)
+        log_prior = self.log_prior(points)
+        return log_likelihood + log_prior
+
+    def log_prior(self, points: Float[Tensor, "point dimension"]) -> Float[Tensor, "point"]:
+        """Log prior density (nats, up to a constant)."""
+        return -(self.coordinates.prior_residuals(points) ** 2).sum(dim=1) / 2
 
     def predicted(self, points: Float[Tensor, "point dimension"]) -> Float[np.ndarray, "point time body 3"]:
         """Positions (m) and angles (rad) of all frames and bodies as they would be measured without noise."""
@@ -120,42 +175,72 @@ class Likelihood:
         return predicted
 
     def pointwise(self, points: Float[Tensor, "point dimension"]) -> Float[np.ndarray, "point time body"]:
-        """Log likelihood of each seen position (both axes together); NaN where nothing was seen."""
+        """Log likelihood of each seen position (both axes together); NaN where nothing was seen.
+
+        With a model error it is that of a position given the body's earlier ones, so that the sum is that of all.
+        """
         observations = self.observations
         with torch.no_grad():
             quantities = self.coordinates.quantities(points)
-            data, _ = self._data_residuals(quantities, None)
-        count = len(observations.frame)
-        squares = (data[:, : 2 * count].numpy() ** 2).reshape(len(points), count, 2).sum(axis=2)
-        determinant = np.log(np.abs(np.linalg.det(observations.whitening)))
-        values = -squares / 2 - LOG_TWO_PI + determinant - 2 * np.log(quantities[NOISE].numpy())
+            discrepancies, _ = self._discrepancies(quantities, None)
+            position, _ = self._independent(discrepancies, quantities)
+            constant = self.noise.log_constant(2, quantities[DEGREES_OF_FREEDOM][:, 0])[:, None]
+            values = constant - (position**2).sum(dim=-1) / 2 - 2 * quantities[NOISE].log()
+        values = values.numpy() + np.linalg.slogdet(observations.whitening)[1]
+        if self._whitening is not None:
+            values = values + self._whitening.position_log_volume.reshape(-1, 2).sum(axis=1)
         result = np.full((len(points), *self.tracks.seen.shape), np.nan)
         result[:, observations.frame, observations.body] = values
         return result
 
-    def _data_residuals(
+    def information_shares(
+        self, points: Float[Tensor, "point dimension"]
+    ) -> tuple[Float[np.ndarray, "point observation"], Float[np.ndarray, "point angle"]]:
+        """Share of a Gaussian observation's information that each position and angle carries; small for outliers."""
+        with torch.no_grad():
+            quantities = self.coordinates.quantities(points)
+            found, _ = self._discrepancies(quantities, None)
+            degrees = quantities[DEGREES_OF_FREEDOM][:, 0]
+            position = self.noise.information(found.positions / quantities[NOISE][:, :, None], degrees)
+            angle = self.noise.information((found.angles / quantities[ANGLE_NOISE])[..., None], degrees)
+        return position.numpy(), angle.numpy()
+
+    def _log_likelihood(self, discrepancies: Discrepancies, quantities: Quantities) -> Float[Tensor, "point"]:
+        """Log likelihood (nats, up to a constant)."""
+        position, angle = self._independent(discrepancies, quantities)
+        squares = (position**2).sum(dim=(1, 2)) + (angle**2).sum(dim=1)
+        value = -squares / 2 - 2 * position.shape[1] * quantities[NOISE][:, 0].log()
+        if angle.shape[1]:
+            constant = self.noise.log_constant(1, quantities[DEGREES_OF_FREEDOM][:, 0])
+            value = value + angle.shape[1] * (constant - quantities[ANGLE_NOISE][:, 0].log())
+        return value
+
+    def _independent(
+        self, discrepancies: Discrepancies, quantities: Quantities
+    ) -> tuple[Float[Tensor, "point observation 2"], Float[Tensor, "point angle"]]:
+        """Independent residuals of unit variance."""
+        position, angle = discrepancies.positions, discrepancies.angles
+        if self._whitening is not None:
+            flat = self._whitening.whitened_positions(position.flatten(1))
+            position, angle = flat.reshape(position.shape), self._whitening.whitened_angles(angle)
+        degrees = quantities[DEGREES_OF_FREEDOM][:, 0]
+        position = self.noise.shrunk(position / quantities[NOISE][:, :, None], degrees)
+        return position, self.noise.shrunk((angle / quantities[ANGLE_NOISE])[..., None], degrees)[..., 0]
+
+    def _discrepancies(
         self, quantities: Quantities, frame_count: int | None
-    ) -> tuple[Float[Tensor, "point residual"], Bool[np.ndarray, "point"]]:
+    ) -> tuple[Discrepancies, Bool[np.ndarray, "point"]]:
+        """Discrepancies of some worlds, and whether each was simulated."""
         observations = self.observations if frame_count is None else self.observations.until(frame_count)
         worlds = self._worlds(quantities)
         rollout, valid = self._rollout(worlds, frame_count)
         states = self._measured(worlds, rollout)
         # index_select, because its derivative is many times faster than that of indexing with several arrays.
-        position = states.index_select(1, observations.position_places).reshape(len(states), -1, 2)
-        difference = position - torch.from_numpy(observations.position)
-        whitened = (torch.from_numpy(observations.whitening) * difference[:, :, None]).sum(dim=-1)
-        parts = [whitened.flatten(1) / quantities[NOISE]]
-        if len(observations.angle):
-            zero = quantities["angle_zero"][:, observations.angle_body]
-            predicted = states.index_select(1, observations.angle_places) + zero
-            angle = (predicted - torch.from_numpy(observations.angle)) / observations.angle_reference
-            parts.append(angle / quantities[ANGLE_NOISE])
-        residuals = torch.cat(parts, dim=1)
-        return residuals, valid & torch.isfinite(residuals).all(dim=1).numpy()
-
-    def _log_scale(self, quantities: Quantities) -> Float[Tensor, "point"]:
-        """Sum of the log noise scales over all seen numbers."""
-        total = 2 * len(self.observations.frame) * quantities[NOISE][:, 0].log()
-        if len(self.observations.angle):
-            total = total + len(self.observations.angle) * quantities[ANGLE_NOISE][:, 0].log()
-        return total
+        place = states.index_select(1, observations.position_places).reshape(len(states), -1, 2)
+        difference = place - torch.from_numpy(observations.position)
+        position = (torch.from_numpy(observations.whitening) * difference[:, :, None]).sum(dim=-1)
+        zero = quantities["angle_zero"].index_select(1, torch.from_numpy(observations.angle_body))
+        turned = states.index_select(1, observations.angle_places) + zero - torch.from_numpy(observations.angle)
+        angle = turned / observations.angle_reference
+        finite = torch.isfinite(position).all(dim=(1, 2)) & torch.isfinite(angle).all(dim=1)
+        return Discrepancies(position, angle), valid & finite.numpy()

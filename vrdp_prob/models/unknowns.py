@@ -8,6 +8,7 @@ import numpy as np
 from jaxtyping import Float
 
 from vrdp_prob.models.coordinates import Coordinate, Coordinates
+from vrdp_prob.models.noise import NoiseFamily
 from vrdp_prob.models.observation import NOISE_LOG_SD, Observations
 from vrdp_prob.models.parameters import (
     ANGULAR_DRAG,
@@ -23,6 +24,9 @@ from vrdp_prob.scene import Shape, Tracks
 
 NOISE = "noise_scale"
 ANGLE_NOISE = "angle_noise_scale"
+DEGREES_OF_FREEDOM = "noise_degrees_of_freedom"
+DEGREES_PRIOR = Prior(math.log(8.0), 0.8)
+"""Degrees of freedom of Student-t noise: from gross outliers (1.7) to nearly Gaussian (38) in the middle 95 %."""
 SPEED_SD = 3.0
 """Prior standard deviation in m/s of a release velocity."""
 SPIN_SD = 2.0
@@ -49,14 +53,16 @@ class Structure:
     colliding: frozenset[int]
 
 
-def unknowns(tracks: Tracks, model: PhysicsModel, structure: Structure) -> Coordinates:
+def unknowns(
+    tracks: Tracks, model: PhysicsModel, structure: Structure, noise: NoiseFamily = NoiseFamily.GAUSSIAN
+) -> Coordinates:
     """The vector of unknowns of a video under a model, with the defaults of what is not sampled."""
     entries = [
         *_motion(tracks, structure),
         *_turning(tracks, structure),
         *_matter(tracks, structure),
         *_physics(tracks, model, structure),
-        *_measurement(tracks),
+        *_measurement(tracks, noise),
     ]
     return Coordinates(tuple(entries), _defaults(tracks, model))
 
@@ -117,10 +123,12 @@ def _physics(tracks: Tracks, model: PhysicsModel, structure: Structure) -> Itera
                 yield Coordinate.of(parameter, body)
 
 
-def _measurement(tracks: Tracks) -> Iterator[Coordinate]:
+def _measurement(tracks: Tracks, noise: NoiseFamily) -> Iterator[Coordinate]:
     yield Coordinate(NOISE, None, Transform.LOG, Prior(0.0, NOISE_LOG_SD), scale=0.1)
     if Observations.of(tracks).angle_bodies:
         yield Coordinate(ANGLE_NOISE, None, Transform.LOG, Prior(0.0, NOISE_LOG_SD), scale=0.1)
+    if noise is NoiseFamily.STUDENT_T:
+        yield Coordinate(DEGREES_OF_FREEDOM, None, Transform.LOG, DEGREES_PRIOR, scale=0.1)
 
 
 def _defaults(tracks: Tracks, model: PhysicsModel) -> dict[str, Float[np.ndarray, "owner"]]:
@@ -137,6 +145,7 @@ def _defaults(tracks: Tracks, model: PhysicsModel) -> dict[str, Float[np.ndarray
         WALL_RESTITUTION.name: np.array([WALL_RESTITUTION.default if value is None else value for value in known]),
         NOISE: np.ones(1),
         ANGLE_NOISE: np.ones(1),
+        DEGREES_OF_FREEDOM: np.full(1, math.exp(DEGREES_PRIOR.mean)),
     }
     for parameter in model.parameters:
         if parameter.name not in defaults:

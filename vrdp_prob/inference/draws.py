@@ -10,7 +10,7 @@ from torch import Tensor
 
 from vrdp_prob.models.likelihood import Likelihood
 from vrdp_prob.models.parameters import MASS, RESTITUTION, WALL_RESTITUTION, Scope
-from vrdp_prob.models.unknowns import ANGLE_NOISE, NOISE
+from vrdp_prob.models.unknowns import ANGLE_NOISE, DEGREES_OF_FREEDOM, NOISE
 
 UNITS = {
     "position": "m",
@@ -23,6 +23,7 @@ UNITS = {
     WALL_RESTITUTION.name: WALL_RESTITUTION.unit,
     NOISE: "1",
     ANGLE_NOISE: "1",
+    DEGREES_OF_FREEDOM: "1",
 }
 """Units of the variables that every posterior has."""
 PLANAR = {"position": ("x", "y"), "velocity": ("velocity_x", "velocity_y")}
@@ -34,6 +35,8 @@ def named_draws(likelihood: Likelihood, points: Float[np.ndarray, "chain draw di
     """All quantities of the worlds that points stand for, sampled or not, with axes `chain`, `draw` and their own."""
     quantities = likelihood.coordinates.quantities(flat_draws(points))
     fields = {name: column.numpy().reshape(*points.shape[:2], -1) for name, column in quantities.items()}
+    if (DEGREES_OF_FREEDOM, None) not in likelihood.coordinates.places:
+        del fields[DEGREES_OF_FREEDOM]
     dataset = named_fields(likelihood, fields)
     units = {**UNITS, **{parameter.name: parameter.unit for parameter in likelihood.model.parameters}}
     for name, variable in dataset.data_vars.items():
@@ -49,7 +52,11 @@ def named_fields(likelihood: Likelihood, fields: Mapping[str, Float[np.ndarray, 
     for name, parts in PLANAR.items():
         if parts[0] in values:
             variables[name] = ((*PER_BODY, "axis"), np.stack([values.pop(part) for part in parts], axis=-1))
-    shared = {p.name for p in likelihood.model.parameters if p.scope is Scope.SHARED} | {NOISE, ANGLE_NOISE}
+    shared = {p.name for p in likelihood.model.parameters if p.scope is Scope.SHARED} | {
+        NOISE,
+        ANGLE_NOISE,
+        DEGREES_OF_FREEDOM,
+    }
     for name, value in values.items():
         if name in shared:
             variables[name] = (PER_BODY[:2], value[..., 0])

@@ -90,9 +90,12 @@ def local_fit(
     return LocalFit(coefficients[0], coefficients[1], velocity_sd)
 
 
-def release_fit(tracks: Tracks, body: int, noise: float, until: float) -> LocalFit:
-    """State of a body at its first seen frame, from the longest stretch before `until` (s) that a quadratic fits."""
-    start = float(tracks.first_seen[body])
+def release_fit(tracks: Tracks, body: int, noise: float, until: float, start: float | None = None) -> LocalFit:
+    """State of a body at a time (s), that of its first seen frame where None.
+
+    It comes from the longest stretch before `until` (s) that a quadratic fits.
+    """
+    start = float(tracks.first_seen[body]) if start is None else start
     times, positions = tracks.times, tracks.positions[:, body]
     seen = np.flatnonzero(np.isfinite(positions).all(axis=1))
     best: LocalFit | None = None
@@ -109,7 +112,8 @@ def release_fit(tracks: Tracks, body: int, noise: float, until: float) -> LocalF
         return best
     first, second = seen[0], seen[1]
     velocity = (positions[second] - positions[first]) / (times[second] - times[first])
-    return LocalFit(positions[first], velocity, noise * np.sqrt(2) / float(times[second] - times[first]))
+    position = positions[first] + (start - times[first]) * velocity
+    return LocalFit(position, velocity, noise * np.sqrt(2) / float(times[second] - times[first]))
 
 
 def seen_contacts(tracks: Tracks, noise: float) -> tuple[SeenContact, ...]:

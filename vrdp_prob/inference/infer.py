@@ -140,7 +140,7 @@ def _warnings(
 ) -> list[str]:
     """What limits the result, the model's misfit first."""
     names = [body.id for body in fit.likelihood.tracks.bodies]
-    sentences = [fit.misfit.sentence] if not fit.misfit.fits else []
+    sentences = list(fit.misfit.sentences)
     if not fit.converged:
         sentences.append("The search for the most probable values ended before it had converged.")
     found = {frozenset(pair) for pair in contacts}

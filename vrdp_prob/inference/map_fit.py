@@ -9,21 +9,23 @@ from functools import cached_property
 
 import numpy as np
 import torch
-from jaxtyping import Bool, Float
+from jaxtyping import Float
 from scipy.optimize import minimize as scipy_minimize
 
 from vrdp_prob.errors import InputError
+from vrdp_prob.inference.clues import Clues
 from vrdp_prob.inference.curved_gaussian import CurvedGaussian
 from vrdp_prob.inference.events import first_contacts
-from vrdp_prob.inference.free_flight import SeenContact, noise_scale, release_fit, seen_contacts
+from vrdp_prob.inference.free_flight import SeenContact
 from vrdp_prob.inference.growing_fit import GrowingFit
 from vrdp_prob.inference.least_squares import jacobian
 from vrdp_prob.inference.misfit import Misfit, judge
 from vrdp_prob.inference.mode import Mode
-from vrdp_prob.inference.noise_fit import noise_curvature
+from vrdp_prob.inference.model_error_fit import fit_model_error
+from vrdp_prob.inference.noise_fit import noise_curvature, noise_sd
 from vrdp_prob.inference.samples import Gaussian, evaluate
 from vrdp_prob.models.likelihood import Likelihood
-from vrdp_prob.models.observation import prior_noise
+from vrdp_prob.models.noise import NoiseFamily
 from vrdp_prob.models.physics import PhysicsModel
 from vrdp_prob.models.unknowns import NOISE, Structure, unknowns
 from vrdp_prob.progress import ProgressDisplay, SilentProgress
@@ -31,14 +33,8 @@ from vrdp_prob.scene import Tracks
 
 WINDOW = 8
 """Frames by which the window grows."""
-REST_TEST = 3.0
-"""A body rests until its first contact if its scatter about one place exceeds the noise by less than so many sd."""
-REST_LOOK = 0.6
-"""Time in s after its release for which a body that rests must at least stay where it is."""
-SHORTEST_REST_TEST = 6
-"""Degrees of freedom (two per position) below which a scatter says nothing."""
-STILL_ANGLE_SD = 0.06
-"""Scatter (rad) of measured angles up to which a body does not turn; shadows and occlusion let angles drift."""
+MODEL_ERROR_ROUNDS = 2
+"""Times that the model error and the fit are found in turn."""
 LBFGS_ITERATIONS = 30
 
 
@@ -99,6 +95,7 @@ def fit_map(
     generator: np.random.Generator,
     progress: ProgressDisplay | None = None,
     *,
+    noise: NoiseFamily | None = None,
     climb: bool = True,
 ) -> MapFit:
     """Find the most probable values of a video.
@@ -113,6 +110,8 @@ def fit_map(
         Source of the candidate worlds.
     progress
         Told how many windows are done.
+    noise
+        Distribution of the measurement errors; where None, Student-t if the tracks show gross outliers, else Gaussian.
     climb
         Whether L-BFGS on the exact log posterior follows the least squares.
 
@@ -121,105 +120,58 @@ def fit_map(
     InputError
         If no object moves.
     """
-    noise = _noise(tracks)
-    contacts = seen_contacts(tracks, noise)
-    if not _moving(tracks, noise, contacts) and not contacts:
+    clues = Clues.of(tracks)
+    if not clues.moving and not clues.contacts:
         raise InputError(f"{tracks.video}: no object moves, so nothing can be inferred; give tracks with motion.")
-    growing = _grow(tracks, model, noise=noise, contacts=contacts, generator=generator, progress=progress)
-    everything = growing.likelihood
-    pairs = _pairs(everything, growing.point)
-    structure = Structure(
-        moving=_moving(tracks, noise, contacts), colliding=frozenset(body for pair in pairs for body in pair)
-    )
-    reduced = Likelihood(tracks, model, unknowns(tracks, model, structure))
-    start = _carry(everything, growing.point, reduced)
-    final = GrowingFit(reduced, start, contacts, generator)
+    family = clues.noise_family if noise is None else noise
+    growing = _grow(clues, model, family, generator, progress)
+    pairs = _pairs(growing.likelihood, growing.point)
+    structure = Structure(moving=clues.moving, colliding=frozenset(body for pair in pairs for body in pair))
+    reduced = Likelihood(tracks, model, unknowns(tracks, model, structure, family), family)
+    final = GrowingFit(reduced, _carry(growing.likelihood, growing.point, reduced), clues.contacts, generator)
     final.finish()
-    misfit = _misfit(reduced, final.point, noise)
-    if not (misfit.fits and misfit.independent):
-        final.likelihood = reduced.informed(1 / misfit.memory)
+    misfit = judge(reduced, final.point, clues.noise, int(clues.outliers.sum()))
+    evaluations = growing.evaluations + final.evaluations
+    for _ in range(MODEL_ERROR_ROUNDS):
+        error = fit_model_error(final.likelihood, final.point)
+        if error is None:
+            break
+        coordinates = unknowns(tracks, model, structure)
+        widened = Likelihood(tracks, model, coordinates, NoiseFamily.GAUSSIAN, error)
+        final = GrowingFit(widened, _carry(final.likelihood, final.point, widened), clues.contacts, generator)
         final.finish()
+        evaluations += final.evaluations
+        misfit = misfit.with_error(error, noise_sd(widened, final.point))
     point, log_density, converged = _climb(final.likelihood, final.point, LBFGS_ITERATIONS if climb else 0)
     _, derivative = jacobian(final.likelihood.residuals, point, final.likelihood.coordinates.scale, central=True)
     precision = _with_noise(final.likelihood, point, derivative)
-    evaluations = growing.evaluations + final.evaluations
     return MapFit(
         final.likelihood,
         (Mode(point, precision, log_density),),
         final.converged or converged,
-        contacts,
-        noise,
+        clues.contacts,
+        clues.noise,
         misfit,
         evaluations,
     )
 
 
-def _noise(tracks: Tracks) -> float:
-    """Measurement noise (m) from the tracks alone; the prior's where they are too short to tell."""
-    noise = noise_scale(tracks)
-    return noise if np.isfinite(noise) and noise > 0 else prior_noise(tracks)
-
-
-def _moving(tracks: Tracks, noise: float, contacts: tuple[SeenContact, ...]) -> frozenset[int]:
-    """Bodies that are not at rest when they are released."""
-    moving = set()
-    for body in range(len(tracks.bodies)):
-        start = float(tracks.first_seen[body])
-        until = (_first_contact(tracks, body, contacts), start + REST_LOOK)
-        if not any(_stays(tracks, body, noise, tracks.times < end) for end in until):
-            moving.add(body)
-    return frozenset(moving)
-
-
-def _stays(tracks: Tracks, body: int, noise: float, chosen: Bool[np.ndarray, "time"]) -> bool:
-    """Whether the positions and angles of a body in some frames scatter about one value, and are enough to tell."""
-    chosen = chosen & tracks.seen[:, body]
-    places = tracks.positions[chosen, body]
-    freedom = 2 * (len(places) - 1)
-    if freedom < SHORTEST_REST_TEST:
-        return False
-    sd = _position_sd(tracks, body, noise)[chosen, None]
-    scatter = float((((places - np.average(places, axis=0, weights=sd[:, 0] ** -2)) / sd) ** 2).sum())
-    turning = 0.0 if tracks.angles is None else float(np.std(_finite(tracks.angles[chosen, body])))
-    return bool(scatter <= freedom + REST_TEST * np.sqrt(2 * freedom)) and turning <= STILL_ANGLE_SD
-
-
-def _position_sd(tracks: Tracks, body: int, noise: float) -> Float[np.ndarray, "time"]:
-    """Standard deviation (m) per axis: the stated one where it is larger, since errors that last look like motion."""
-    if tracks.position_covariance is None:
-        return np.full(len(tracks.times), noise)
-    stated = np.trace(tracks.position_covariance[:, body], axis1=-2, axis2=-1) / 2
-    return np.sqrt(np.fmax(stated, noise**2))
-
-
-def _finite(values: Float[np.ndarray, "seen"]) -> Float[np.ndarray, "finite"]:
-    """The finite values, or a 0 where there is none."""
-    finite = values[np.isfinite(values)]
-    return finite if len(finite) else np.zeros(1)
-
-
-def _first_contact(tracks: Tracks, body: int, contacts: tuple[SeenContact, ...]) -> float:
-    """Time (s) shortly before the first contact of a body that shows in the tracks."""
-    step = float(np.median(np.diff(tracks.times)))
-    times = [contact.time - step / 2 for contact in contacts if body in (contact.first, contact.second)]
-    return min(times, default=float(tracks.times[-1]) + step)
-
-
 def _grow(
-    tracks: Tracks,
+    clues: Clues,
     model: PhysicsModel,
-    *,
-    noise: float,
-    contacts: tuple[SeenContact, ...],
+    noise: NoiseFamily,
     generator: np.random.Generator,
     progress: ProgressDisplay | None,
 ) -> GrowingFit:
     """Fit windows that grow to the whole video, with everything that might matter among the unknowns."""
+    tracks = clues.tracks
     everything = frozenset(body for body, one in enumerate(tracks.bodies) if one.radius is not None)
-    structure = Structure(moving=_moving(tracks, noise, contacts), colliding=everything)
-    likelihood = Likelihood(tracks, model, unknowns(tracks, model, structure))
-    growing = GrowingFit(likelihood, _start(likelihood, noise, contacts), contacts, generator)
-    growing.trust_release_fits({body: _release_sd(tracks, body, noise, contacts) for body in range(len(tracks.bodies))})
+    structure = Structure(moving=clues.moving, colliding=everything)
+    likelihood = Likelihood(tracks, model, unknowns(tracks, model, structure, noise), noise)
+    growing = GrowingFit(likelihood, _start(likelihood, clues), clues.contacts, generator)
+    growing.trust_release_fits(
+        {body: (clues.noise, clues.release(body).velocity_sd) for body in range(len(tracks.bodies))}
+    )
     ends = _windows(tracks)
     with (progress or SilentProgress()).stage("Fitting the motion (MAP)", total=len(ends)) as advance:
         previous = 0
@@ -238,36 +190,20 @@ def _windows(tracks: Tracks) -> list[int]:
     return [*ends, count]
 
 
-def _release_sd(tracks: Tracks, body: int, noise: float, contacts: tuple[SeenContact, ...]) -> tuple[float, float]:
-    """Standard deviations of release position (m) and velocity (m/s) of a body as its local fit knows them."""
-    return noise, release_fit(tracks, body, noise, _first_contact(tracks, body, contacts)).velocity_sd
-
-
-def _start(likelihood: Likelihood, noise: float, contacts: tuple[SeenContact, ...]) -> Float[np.ndarray, "dimension"]:
+def _start(likelihood: Likelihood, clues: Clues) -> Float[np.ndarray, "dimension"]:
     """Release states of local fits, everything else at the mean of its prior."""
-    tracks, coordinates = likelihood.tracks, likelihood.coordinates
+    coordinates = likelihood.coordinates
     start = coordinates.prior_mean.copy()
-    for body in range(len(tracks.bodies)):
-        fit = release_fit(tracks, body, noise, _first_contact(tracks, body, contacts))
+    for body in range(len(likelihood.tracks.bodies)):
+        fit = clues.release(body)
         values = dict(zip(("x", "y", "velocity_x", "velocity_y"), (*fit.position, *fit.velocity), strict=True))
-        values["spin"] = _first_spin(tracks, body, _first_contact(tracks, body, contacts))
+        values["spin"] = clues.release_spin(body)
         for field, value in values.items():
             place = coordinates.places.get((field, body))
             if place is not None:
                 start[place] = value
-    start[coordinates.places[NOISE, None]] = np.log(noise / likelihood.observations.position_reference)
+    start[coordinates.places[NOISE, None]] = np.log(clues.noise / likelihood.observations.position_reference)
     return start
-
-
-def _first_spin(tracks: Tracks, body: int, until: float) -> float:
-    """Spin in rad/s from the first measured angles; 0 where there are none."""
-    if tracks.angles is None:
-        return 0.0
-    angles = tracks.angles[:, body]
-    chosen = np.flatnonzero(np.isfinite(angles) & (tracks.times < until))[:12]
-    if len(chosen) < 2:
-        return 0.0
-    return float(np.polyfit(tracks.times[chosen], angles[chosen], 1)[0])
 
 
 def _pairs(likelihood: Likelihood, point: Float[np.ndarray, "dimension"]) -> set[tuple[int, int]]:
@@ -283,12 +219,6 @@ def _carry(
     places = source.coordinates.places
     entries = target.coordinates.entries
     return np.array([point[places[entry.field, entry.owner]] for entry in entries])
-
-
-def _misfit(likelihood: Likelihood, point: Float[np.ndarray, "dimension"], noise: float) -> Misfit:
-    with torch.no_grad():
-        trajectory = likelihood.rollout(torch.from_numpy(point[None])).trajectory
-    return judge(likelihood.tracks, trajectory[0, :, :, :2].numpy(), noise)
 
 
 def _climb(

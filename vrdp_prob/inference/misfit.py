@@ -1,18 +1,16 @@
 """Whether the model explains the tracks: chi-square against the measured noise, and residuals that remember."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
+import torch
 from jaxtyping import Float
 
-from vrdp_prob.scene import Tracks
+from vrdp_prob.models.likelihood import Likelihood
+from vrdp_prob.models.model_error import ModelError
 
 LARGEST_RATIO = 1.5
 """Residuals this much larger than the measurement noise are called a misfit."""
-LARGEST_CORRELATION = 0.3
-"""Correlation of neighbouring residuals from which on they are called a misfit."""
-LONGEST_MEMORY = 40.0
-"""Upper limit of the number of frames that count as one observation."""
 
 
 @dataclass(frozen=True)
@@ -22,7 +20,7 @@ class Misfit:
     Parameters
     ----------
     residual_sd
-        Standard deviation (m) of the residuals per axis.
+        Standard deviation (m) of the residuals per axis, outliers discounted.
     noise_sd
         Standard deviation (m) of the measurement noise: the stated one where there is one, at least that of the
         tracks' roughness.
@@ -30,76 +28,102 @@ class Misfit:
         Whether whoever measured the tracks stated their noise. Such noise may be alike in neighbouring frames.
     correlation
         Correlation of the residuals of neighbouring frames.
-    memory
-        Number of frames that together count as one independent observation.
     worst
         Id of the body with the largest residuals, and `worst_sd` their standard deviation in m.
+    outliers
+        Number of positions that lie far off those before and after.
+    error_sd, error_duration
+        Size (m) and duration (s) of the model error by which the intervals are widened; None where none is needed.
     """
 
     residual_sd: float
     noise_sd: float
     noise_stated: bool
     correlation: float
-    memory: float
     worst: str
     worst_sd: float
+    outliers: int = 0
+    error_sd: float | None = None
+    error_duration: float | None = None
+
+    @property
+    def chi_square(self) -> float:
+        """Mean squared residual in units of the squared noise; about 1 where the model fits."""
+        return (self.residual_sd / self.noise_sd) ** 2
 
     @property
     def fits(self) -> bool:
         """Whether nothing speaks against the model."""
         small = self.residual_sd <= LARGEST_RATIO * self.noise_sd
-        return small and (self.noise_stated or self.independent)
+        return small and (self.noise_stated or self.error_sd is None)
 
     @property
-    def independent(self) -> bool:
-        """Whether every frame can count as an observation of its own."""
-        return self.correlation < LARGEST_CORRELATION
+    def sentences(self) -> tuple[str, ...]:
+        """What is wrong, in plain words."""
+        found: tuple[str, ...] = () if self.fits else (self._misfit_sentence(),)
+        if self.outliers:
+            positions = "1 position lies" if self.outliers == 1 else f"{self.outliers} positions lie"
+            found += (
+                f"{positions} far off those before and after; the noise is taken as Student-t, which discounts them.",
+            )
+        return found
 
-    @property
-    def sentence(self) -> str:
-        """What is wrong, in plain words; empty where the model fits."""
-        if self.fits:
-            return ""
-        return (
-            f"The model does not explain this motion: after the best fit positions are still off by "
-            f"{self.residual_sd:.3g} m where measurement noise is {self.noise_sd:.3g} m (most for object {self.worst}, "
-            f"{self.worst_sd:.3g} m), and errors persist over about {self.memory:.0f} frames; the intervals were "
-            "widened accordingly, but masses, restitutions and predictions may still be biased."
+    def with_error(self, error: ModelError, noise_sd: float) -> "Misfit":
+        """The same with a model error, for noise (m) of a size."""
+        return replace(self, error_sd=error.position * noise_sd, error_duration=error.duration)
+
+    def _misfit_sentence(self) -> str:
+        text = (
+            f"The model does not explain this motion: after the best fit positions are off by {self.residual_sd:.2g} m "
+            f"where measurement noise is {self.noise_sd:.2g} m (most for object {self.worst}, {self.worst_sd:.2g} m), "
+            f"and neighbouring errors are alike (correlation {self.correlation:.2f})."
         )
+        if self.error_sd is not None:
+            text += (
+                f" The intervals contain a model error of {self.error_sd:.2g} m that lasts about "
+                f"{self.error_duration:.2g} s; masses, restitutions and predictions may still be biased."
+            )
+        return text
 
 
-def judge(tracks: Tracks, predicted: Float[np.ndarray, "time body 2"], noise: float) -> Misfit:
-    """Compare predicted positions with the seen ones."""
-    residuals = tracks.positions - predicted
-    with np.errstate(all="ignore"):
-        per_body = np.sqrt(np.nanmean(residuals**2, axis=(0, 2)))
-    worst = int(np.nanargmax(per_body))
-    overall = float(np.sqrt(np.nanmean(residuals**2)))
-    correlations = autocorrelation(residuals)
-    memory = float(np.clip(1 + 2 * _first_positive_sum(correlations[1:]), 1, LONGEST_MEMORY))
-    first = float(correlations[1]) if len(correlations) > 1 else 0.0
-    covariance = tracks.position_covariance
-    stated = 0.0 if covariance is None else float(np.sqrt(np.nanmedian(covariance[..., [0, 1], [0, 1]])))
-    noise = max(noise, stated)
+def judge(likelihood: Likelihood, point: Float[np.ndarray, "dimension"], noise: float, outliers: int) -> Misfit:
+    """Compare what a fit predicts with what was seen.
+
+    Parameters
+    ----------
+    likelihood
+        The density that was fitted.
+    point
+        The fit.
+    noise
+        Measurement noise (m) from the tracks' roughness.
+    outliers
+        Number of gross outliers in the tracks.
+    """
+    tracks, observations = likelihood.tracks, likelihood.observations
+    residuals = tracks.positions - likelihood.predicted(torch.from_numpy(point[None]))[0, :, :, :2]
+    shares = np.full(tracks.seen.shape, np.nan)
+    shares[observations.frame, observations.body] = likelihood.information_shares(torch.from_numpy(point[None]))[0][0]
+    weights = shares[..., None] * np.ones(2)
+    squares = np.where(np.isnan(weights), 0.0, weights * np.nan_to_num(residuals) ** 2)
+    counted = np.nansum(weights, axis=(0, 2))
+    per_body = np.sqrt(squares.sum(axis=(0, 2)) / counted)
+    worst = int(np.argmax(per_body))
+    stated = 0.0 if tracks.position_covariance is None else observations.position_reference
     return Misfit(
-        overall, noise, covariance is not None, first, memory, tracks.bodies[worst].id, float(per_body[worst])
+        residual_sd=float(np.sqrt(squares.sum() / counted.sum())),
+        noise_sd=max(noise, stated),
+        noise_stated=tracks.position_covariance is not None,
+        correlation=_neighbour_correlation(np.sqrt(weights) * residuals),
+        worst=tracks.bodies[worst].id,
+        worst_sd=float(per_body[worst]),
+        outliers=outliers,
     )
 
 
-def autocorrelation(residuals: Float[np.ndarray, "time body 2"]) -> Float[np.ndarray, "lag"]:
-    """Autocorrelation over frames, about zero (a constant offset is an error too), missing frames left out."""
-    count = len(residuals)
-    lags = min(count - 1, 60)
+def _neighbour_correlation(residuals: Float[np.ndarray, "time body 2"]) -> float:
+    """Correlation of neighbouring frames, about zero (a constant offset is an error too), missing frames left out."""
+    products = residuals[1:] * residuals[:-1]
+    known = np.isfinite(products)
     variance = np.nanmean(residuals**2)
-    values = np.ones(lags + 1)
-    for lag in range(1, lags + 1):
-        products = residuals[lag:] * residuals[:-lag]
-        known = np.isfinite(products)
-        values[lag] = products[known].sum() / max(int(known.sum()), 1) / variance if variance > 0 else 0.0
-    return values
-
-
-def _first_positive_sum(correlations: Float[np.ndarray, "lag"]) -> float:
-    """Sum up to the first value lost in noise."""
-    lost = np.flatnonzero(correlations < 0.05)
-    return float(correlations[: lost[0] if len(lost) else None].sum())
+    return float(products[known].mean() / variance) if known.any() and variance > 0 else 0.0

@@ -56,6 +56,12 @@ def noise_curvature(
     return places, (vectors * least) @ vectors.T
 
 
+def noise_sd(likelihood: Likelihood, point: Float[np.ndarray, "dimension"]) -> float:
+    """Standard deviation in m that the noise scale of a point stands for."""
+    place = likelihood.coordinates.places[NOISE, None]
+    return float(np.exp(point[place])) * likelihood.observations.position_reference
+
+
 def _places(likelihood: Likelihood) -> Int[np.ndarray, "noise"]:
     return np.flatnonzero(likelihood.coordinates.mask(NOISE_FIELDS))
 

@@ -5,7 +5,8 @@ from jaxtyping import Float
 from torch import Tensor
 
 from vrdp_prob.models.likelihood import Likelihood
-from vrdp_prob.models.unknowns import NOISE
+from vrdp_prob.models.noise import NoiseFamily
+from vrdp_prob.models.unknowns import DEGREES_OF_FREEDOM, NOISE
 
 
 def replicated(
@@ -20,7 +21,8 @@ def replicated(
     points
         The worlds.
     generator
-        Draws the noise. Where a position was seen it has that position's covariance, in gaps the one in the middle.
+        Draws the noise, and the model's error where there is one. Where a position was seen the noise has that
+        position's covariance, in gaps the one in the middle.
 
     Returns
     -------
@@ -30,7 +32,16 @@ def replicated(
     observations, tracks = likelihood.observations, likelihood.tracks
     spread = np.broadcast_to(observations.position_reference * np.eye(2), (*tracks.seen.shape, 2, 2)).copy()
     spread[observations.frame, observations.body] = np.linalg.inv(observations.whitening)
-    scale = likelihood.coordinates.quantities(points)[NOISE].numpy()[:, None, :, None]
+    quantities = likelihood.coordinates.quantities(points)
     normal = generator.standard_normal(predicted.shape)
-    measured = predicted + scale * np.einsum("tbij,ptbj->ptbi", spread, normal)
+    if likelihood.noise is NoiseFamily.STUDENT_T:
+        degrees = quantities[DEGREES_OF_FREEDOM].numpy()[:, :, None]
+        normal /= np.sqrt(generator.chisquare(degrees, predicted.shape[:-1]) / degrees)[..., None]
+    errors = np.einsum("tbij,ptbj->ptbi", spread, normal)
+    if likelihood.model_error is not None:
+        error = likelihood.model_error
+        root = np.linalg.cholesky(error.correlation(tracks.times) + 1e-10 * np.eye(len(tracks.times)))
+        straying = np.einsum("ts,psbj->ptbj", root, generator.standard_normal(predicted.shape))
+        errors += error.position * observations.position_reference * straying
+    measured = predicted + quantities[NOISE].numpy()[:, None, :, None] * errors
     return np.where((tracks.times[:, None] >= tracks.first_seen - 1e-9)[..., None], measured, np.nan)

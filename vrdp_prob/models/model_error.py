@@ -107,8 +107,8 @@ class Whitening:
         Per strand its places and the inverse of its covariance's Cholesky factor.
     """
 
-    positions: tuple[tuple[Int[Tensor, "number"], Float[Tensor, "number number"]], ...]
-    angles: tuple[tuple[Int[Tensor, "number"], Float[Tensor, "number number"]], ...]
+    positions: tuple[tuple[Int[Tensor, "_"], Float[Tensor, "_ _"]], ...]
+    angles: tuple[tuple[Int[Tensor, "_"], Float[Tensor, "_ _"]], ...]
 
     @classmethod
     def of(cls, error: ModelError, strands: Strands) -> "Whitening":
@@ -133,7 +133,7 @@ class Whitening:
         return _whitened(residuals, self.angles)
 
 
-Factors = tuple[tuple[Int[Tensor, "number"], Float[Tensor, "number number"]], ...]
+Factors = tuple[tuple[Int[Tensor, "_"], Float[Tensor, "_ _"]], ...]
 
 
 def _factor(strand: Strand, covariance: Float[np.ndarray, "number number"]) -> tuple[Tensor, Tensor]:

@@ -1,0 +1,128 @@
+"""What a video shows before anything is simulated: noise, outliers, contacts, resting bodies, release states."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+from vrdp_prob.inference.free_flight import LocalFit, SeenContact, noise_scale, release_fit, seen_contacts
+from vrdp_prob.inference.outliers import gross_outliers, without
+from vrdp_prob.models.noise import NoiseFamily
+from vrdp_prob.models.observation import prior_noise
+from vrdp_prob.scene import Tracks
+
+REST_TEST = 3.0
+"""A body rests until its first contact if its scatter about one place exceeds the noise by less than so many sd."""
+REST_LOOK = 0.6
+"""Time in s after its release for which a body that rests must at least stay where it is."""
+SHORTEST_REST_TEST = 6
+"""Degrees of freedom (two per position) below which a scatter says nothing."""
+STILL_ANGLE_SD = 0.06
+"""Scatter (rad) of measured angles up to which a body does not turn; shadows and occlusion let angles drift."""
+
+
+@dataclass(frozen=True)
+class Clues:
+    """What local fits and scatters say about a video.
+
+    Parameters
+    ----------
+    tracks
+        What was seen.
+    outliers
+        Which positions lie far off those before and after.
+    """
+
+    tracks: Tracks
+    outliers: Bool[np.ndarray, "time body"]
+
+    @classmethod
+    def of(cls, tracks: Tracks) -> "Clues":
+        """The clues of a video."""
+        return cls(tracks, gross_outliers(tracks, _roughness(tracks)))
+
+    @cached_property
+    def clean(self) -> Tracks:
+        """The tracks without outliers."""
+        return without(self.tracks, self.outliers)
+
+    @cached_property
+    def noise(self) -> float:
+        """Measurement noise (m)."""
+        return _roughness(self.clean)
+
+    @property
+    def noise_family(self) -> NoiseFamily:
+        """Distribution of the noise that the tracks call for."""
+        return NoiseFamily.STUDENT_T if self.outliers.any() else NoiseFamily.GAUSSIAN
+
+    @cached_property
+    def contacts(self) -> tuple[SeenContact, ...]:
+        """Contacts between bodies."""
+        return seen_contacts(self.clean, self.noise)
+
+    @cached_property
+    def moving(self) -> frozenset[int]:
+        """Bodies that are not at rest when they are released."""
+        times = self.tracks.times
+        moving = set()
+        for body, start in enumerate(self.tracks.first_seen.tolist()):
+            until = (self.first_contact(body), start + REST_LOOK)
+            if not any(self._stays(body, times < end) for end in until):
+                moving.add(body)
+        return frozenset(moving)
+
+    def first_contact(self, body: int) -> float:
+        """Time (s) shortly before the first contact of a body; after the video where there is none."""
+        step = float(np.median(np.diff(self.tracks.times)))
+        times = [contact.time - step / 2 for contact in self.contacts if body in (contact.first, contact.second)]
+        return min(times, default=float(self.tracks.times[-1]) + step)
+
+    def release(self, body: int) -> LocalFit:
+        """Position and velocity of a body when it is first seen."""
+        start = float(self.tracks.first_seen[body])
+        return release_fit(self.clean, body, self.noise, self.first_contact(body), start)
+
+    def release_spin(self, body: int) -> float:
+        """Spin in rad/s from the first measured angles; 0 where there are none."""
+        angles = self.tracks.angles
+        if angles is None:
+            return 0.0
+        chosen = np.flatnonzero(np.isfinite(angles[:, body]) & (self.tracks.times < self.first_contact(body)))[:12]
+        if len(chosen) < 2:
+            return 0.0
+        return float(np.polyfit(self.tracks.times[chosen], angles[chosen, body], 1)[0])
+
+    def _stays(self, body: int, chosen: Bool[np.ndarray, "time"]) -> bool:
+        """Whether positions and angles in some frames scatter about one value, and are enough to tell."""
+        chosen = chosen & self.clean.seen[:, body]
+        places = self.clean.positions[chosen, body]
+        freedom = 2 * (len(places) - 1)
+        if freedom < SHORTEST_REST_TEST:
+            return False
+        sd = self._position_sd(body)[chosen, None]
+        scatter = float((((places - np.average(places, axis=0, weights=sd[:, 0] ** -2)) / sd) ** 2).sum())
+        angles = self.tracks.angles
+        turning = 0.0 if angles is None else float(np.std(_finite(angles[chosen, body])))
+        return bool(scatter <= freedom + REST_TEST * np.sqrt(2 * freedom)) and turning <= STILL_ANGLE_SD
+
+    def _position_sd(self, body: int) -> Float[np.ndarray, "time"]:
+        """Standard deviation (m) per axis: the stated one where it is larger; errors that last look like motion."""
+        covariance = self.tracks.position_covariance
+        if covariance is None:
+            return np.full(len(self.tracks.times), self.noise)
+        stated = np.trace(covariance[:, body], axis1=-2, axis2=-1) / 2
+        return np.sqrt(np.fmax(stated, self.noise**2))
+
+
+def _roughness(tracks: Tracks) -> float:
+    """Measurement noise (m) from the tracks alone; the prior's where they are too short to tell."""
+    noise = noise_scale(tracks)
+    return noise if np.isfinite(noise) and noise > 0 else prior_noise(tracks)
+
+
+def _finite(values: Float[np.ndarray, "seen"]) -> Float[np.ndarray, "finite"]:
+    """The finite values, or a 0 where there is none."""
+    finite = values[np.isfinite(values)]
+    return finite if len(finite) else np.zeros(1)

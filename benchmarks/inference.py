@@ -20,6 +20,7 @@ from vrdp_prob.datasets import load_all
 from vrdp_prob.inference import SAMPLERS, default_model
 from vrdp_prob.inference.events import first_contacts
 from vrdp_prob.inference.map_fit import MapFit, fit_map
+from vrdp_prob.inference.proposals import proposals
 from vrdp_prob.inference.samples import assess
 from vrdp_prob.models.simulator.rollout import compile_model
 from vrdp_prob.scene import Tracks
@@ -120,7 +121,10 @@ def samplers(videos: Sequence[Tracks], names: Sequence[str]) -> list[Check]:
         for key in names:
             begin = time.process_time()
             samples = SAMPLERS[key](
-                fit.likelihood.log_density, fit.gaussian, draws=DRAWS, generator=np.random.default_rng(1)
+                fit.likelihood.log_density,
+                proposals(fit.modes, fit.likelihood.residuals),
+                draws=DRAWS,
+                generator=np.random.default_rng(1),
             )
             seconds = time.process_time() - begin
             convergence = assess(key, samples)

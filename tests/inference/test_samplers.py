@@ -8,6 +8,7 @@ from scipy.stats import norm
 from vrdp_prob.inference.curved_gaussian import CurvedGaussian
 from vrdp_prob.inference.emcee_sampler import sample_emcee
 from vrdp_prob.inference.laplace import sample_laplace, smoothed_weights
+from vrdp_prob.inference.mixture import Mixture
 from vrdp_prob.inference.nuts_sampler import sample_nuts
 from vrdp_prob.inference.samples import Gaussian, Samples, assess, chain_statistics
 
@@ -34,9 +35,9 @@ class SkewedRidge:
         return self.root[:, 0] * (digamma - np.log(4))
 
     @property
-    def start(self) -> CurvedGaussian:
+    def start(self) -> Mixture:
         scales = np.array([0.5] + [1.0] * (DIMENSION - 1))
-        return CurvedGaussian.straight(Gaussian(np.zeros(DIMENSION), self.root * scales))
+        return Mixture.of(CurvedGaussian.straight(Gaussian(np.zeros(DIMENSION), self.root * scales)))
 
 
 @pytest.mark.parametrize("name", SAMPLERS)

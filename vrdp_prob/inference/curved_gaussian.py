@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import torch
 from jaxtyping import Float
+from scipy.linalg import solve_triangular
 from torch import Tensor
 
 from vrdp_prob.inference.least_squares import Residuals, robust_cost
@@ -105,6 +106,15 @@ class CurvedGaussian:
         """The same for arrays."""
         points: np.ndarray = self.mapped(torch.from_numpy(np.ascontiguousarray(whitened))).numpy()
         return points
+
+    def whitened(self, points: Float[np.ndarray, "*batch dimension"]) -> Float[np.ndarray, "*batch dimension"]:
+        """The inverse of `points`; bends leave the coordinates along their axes alone, so these can be read off."""
+        centred = np.moveaxis(points - self.gaussian.mean, -1, 0)
+        bent = solve_triangular(self.gaussian.root, centred.reshape(self.dimension, -1), lower=True)
+        along = self.axes.numpy().T @ bent
+        places = bent - np.einsum("an,bn,abk->kn", along, along, self.bend.numpy()) / 2
+        whitened = solve_triangular(self.scale.numpy(), places - self.shift.numpy()[:, None], lower=True)
+        return np.ascontiguousarray(np.moveaxis(whitened.reshape(centred.shape), 0, -1))
 
     def moved(
         self, shift: Float[np.ndarray, "dimension"], covariance: Float[np.ndarray, "dimension dimension"]

@@ -20,6 +20,7 @@ from numpy.random import RandomState
 from vrdp_prob.inference.curved_gaussian import CurvedGaussian
 from vrdp_prob.inference.hamiltonian_move import HamiltonianMove
 from vrdp_prob.inference.laplace import DEGREES_OF_FREEDOM, adapted, starting_places, tail_log_density
+from vrdp_prob.inference.mixture import Mixture
 from vrdp_prob.inference.samples import (
     ESS_GOAL,
     R_HAT_GOAL,
@@ -46,7 +47,7 @@ START_POOL = 16
 
 def sample_emcee(
     density: LogDensity,
-    start: CurvedGaussian,
+    start: Mixture,
     *,
     draws: int,
     generator: np.random.Generator,
@@ -60,7 +61,7 @@ def sample_emcee(
     density
         The log posterior, differentiable.
     start
-        Gaussian around the MAP, from which the walkers set out.
+        What is known of the posterior, from which the walkers set out.
     draws
         Number of draws that are wanted over all ensembles; ensembles are run until they have converged, which gives
         more.
@@ -77,9 +78,9 @@ def sample_emcee(
     The R-hat that goes with it compares the ensembles' earlier with their later steps.
     """
     del draws
-    start, adapting = adapted(density, start, generator, lambda _steps: None)
-    walkers = 2 * (start.dimension + 1)
-    ensembles = [_Ensemble(density, start, walkers, generator) for _ in range(ENSEMBLES)]
+    cloud, adapting = adapted(density, start.components[0], generator, lambda _steps: None)
+    walkers = 2 * (cloud.dimension + 1)
+    ensembles = [_Ensemble(density, cloud, walkers, generator) for _ in range(ENSEMBLES)]
     workers = ThreadPoolExecutor(max_workers=min(ENSEMBLES, os.cpu_count() or 1))
     display = (progress or SilentProgress()).stage("Sampling (emcee)", total=WARM_UP + rounds * STEPS_PER_ROUND)
     with workers, display as advance:
@@ -92,7 +93,7 @@ def sample_emcee(
         run(WARM_UP, tune=True)
         for _round in range(rounds):
             run(STEPS_PER_ROUND, tune=False)
-            points = start.points(np.stack([ensemble.chain() for ensemble in ensembles]))
+            points = cloud.points(np.stack([ensemble.chain() for ensemble in ensembles]))
             drift = _drift(points)
             r_hat, ess = chain_statistics(_by_walker(points))
             if max(r_hat, drift) <= R_HAT_GOAL and ess >= 1.25 * ESS_GOAL:

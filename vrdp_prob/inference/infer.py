@@ -14,6 +14,7 @@ from vrdp_prob.inference.laplace import sample_laplace
 from vrdp_prob.inference.map_fit import MapFit, fit_map
 from vrdp_prob.inference.nuts_sampler import sample_nuts
 from vrdp_prob.inference.posterior import Posterior
+from vrdp_prob.inference.proposals import proposals
 from vrdp_prob.inference.samples import Convergence, Samples, assess
 from vrdp_prob.inference.tree import posterior_tree
 from vrdp_prob.models.effects.body_friction import BodyFriction
@@ -26,7 +27,7 @@ SAMPLERS: Mapping[str, Callable[..., Samples]] = {
     "nuts": sample_nuts,
     "laplace": sample_laplace,
 }
-"""The samplers by name; all take the log density and the Gaussian around the MAP."""
+"""The samplers by name; all take the log density and what its modes propose."""
 BATCH = 500
 """Worlds simulated at once when the draws are looked at again."""
 
@@ -81,7 +82,11 @@ def infer(
     generator = np.random.default_rng(seed)
     fit = fit_map(tracks, physics, generator, progress)
     samples = SAMPLERS[sampler](
-        fit.likelihood.log_density, fit.gaussian, draws=draws, generator=generator, progress=progress
+        fit.likelihood.log_density,
+        proposals(fit.modes, fit.likelihood.residuals),
+        draws=draws,
+        generator=generator,
+        progress=progress,
     )
     return _posterior(fit, samples, sampler, seed=seed, draws=draws, generator=generator)
 

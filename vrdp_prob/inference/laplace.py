@@ -9,6 +9,7 @@ from jaxtyping import Float
 from scipy.special import gammaln
 
 from vrdp_prob.inference.curved_gaussian import CurvedGaussian
+from vrdp_prob.inference.mixture import Mixture
 from vrdp_prob.inference.samples import LogDensity, Samples, evaluate
 from vrdp_prob.progress import Advance, ProgressDisplay, SilentProgress
 
@@ -33,7 +34,7 @@ NEAR_THE_MEAN = 0.01
 
 def sample_laplace(
     density: LogDensity,
-    start: CurvedGaussian,
+    start: Mixture,
     *,
     draws: int,
     generator: np.random.Generator,
@@ -46,7 +47,7 @@ def sample_laplace(
     density
         The log posterior.
     start
-        Gaussian around the MAP.
+        What is known of the posterior.
     draws
         Number of draws to hand back, resampled by their smoothed weights.
     generator
@@ -60,7 +61,7 @@ def sample_laplace(
     """
     count = OVERSAMPLING * draws
     with (progress or SilentProgress()).stage("Importance sampling", total=count + ROUNDS * ROUND_DRAWS) as advance:
-        proposal, evaluations = adapted(density, start, generator, advance)
+        proposal, evaluations = adapted(density, start.components[0], generator, advance)
         whitened, log_density, log_ratio = _weighted(density, proposal, count, generator, advance)
     weights, pareto_k = smoothed_weights(log_ratio)
     effective = effective_count(weights)

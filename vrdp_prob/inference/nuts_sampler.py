@@ -14,6 +14,7 @@ from torch import Tensor
 
 from vrdp_prob.inference.curved_gaussian import CurvedGaussian
 from vrdp_prob.inference.laplace import adapted, starting_places
+from vrdp_prob.inference.mixture import Mixture
 from vrdp_prob.inference.samples import LogDensity, Samples, evaluate
 from vrdp_prob.progress import Advance, ProgressDisplay, SilentProgress
 
@@ -29,7 +30,7 @@ OUT_OF_SUPPORT = 1e10
 
 def sample_nuts(
     density: LogDensity,
-    start: CurvedGaussian,
+    start: Mixture,
     *,
     draws: int,
     generator: np.random.Generator,
@@ -43,7 +44,7 @@ def sample_nuts(
     density
         The log posterior, differentiable.
     start
-        Gaussian around the MAP; chains set out from points drawn near it.
+        What is known of the posterior; chains set out from points drawn near it.
     draws
         Number of draws over all chains.
     generator
@@ -58,9 +59,9 @@ def sample_nuts(
     The chains, with the number of divergences.
     """
     per_chain = -(-draws // CHAINS)
-    start, adapting = adapted(density, start, generator, lambda _steps: None)
-    potential = _Potential(density, start)
-    starts = starting_places(density, start, CHAINS, START_POOL, generator)
+    cloud, adapting = adapted(density, start.components[0], generator, lambda _steps: None)
+    potential = _Potential(density, cloud)
+    starts = starting_places(density, cloud, CHAINS, START_POOL, generator)
     chains: list[np.ndarray] = []
     divergences = 0
     with (progress or SilentProgress()).stage("Sampling (NUTS)", total=CHAINS * (warm_up + per_chain)) as advance:
@@ -70,7 +71,7 @@ def sample_nuts(
             chains.append(whitened)
             divergences += divergent
     whitened_chains = np.stack(chains)
-    points = start.points(whitened_chains)
+    points = cloud.points(whitened_chains)
     log_density = np.stack([evaluate(density, chain) for chain in points])
     return Samples(points, log_density, divergences=divergences, evaluations=adapting, gradients=potential.gradients)
 

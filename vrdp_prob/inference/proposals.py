@@ -1,0 +1,26 @@
+"""What the modes of a fit propose: one curved cloud each, weighted by the evidence under it."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from vrdp_prob.inference.curved_gaussian import CurvedGaussian
+from vrdp_prob.inference.least_squares import Residuals
+from vrdp_prob.inference.mixture import Mixture
+from vrdp_prob.inference.mode import Mode
+from vrdp_prob.inference.samples import Gaussian
+
+HOPELESS = 20.0
+"""A mode whose evidence (nats) is so much lower than the best one's is left out."""
+LEAST_WEIGHT = 0.02
+"""Weight that every other mode is proposed with at least, since the evidence of a Gaussian is a guess."""
+
+
+def proposals(modes: Sequence[Mode], residuals: Residuals) -> Mixture:
+    """A curved Gaussian around every mode, weighted by Laplace evidence."""
+    best = max(mode.log_evidence for mode in modes)
+    kept = [mode for mode in modes if mode.log_evidence > best - HOPELESS]
+    clouds = [CurvedGaussian.around(Gaussian.from_precision(mode.point, mode.precision), residuals) for mode in kept]
+    evidence = np.exp([mode.log_evidence - best for mode in kept])
+    weights = np.maximum(evidence / evidence.sum(), LEAST_WEIGHT)
+    return Mixture.of(*clouds, log_weights=np.log(weights))

@@ -35,6 +35,10 @@ class Scope(StrEnum):
     """One value per body."""
 
 
+LARGEST_LOG = 50.0
+"""Logarithms beyond it, which a wild proposal may hold, count as it, so that no quantity becomes 0 or infinite."""
+
+
 class Transform(StrEnum):
     """Map from a parameter to the coordinate in which it is inferred."""
 
@@ -45,7 +49,7 @@ class Transform(StrEnum):
 
     def from_coordinate(self, coordinate: Float[Tensor, "..."]) -> Float[Tensor, "..."]:
         """Parameter that belongs to a coordinate."""
-        return torch.exp(coordinate) if self is Transform.LOG else coordinate
+        return coordinate.clamp(-LARGEST_LOG, LARGEST_LOG).exp() if self is Transform.LOG else coordinate
 
     @property
     def support(self) -> tuple[float, float]:

@@ -17,6 +17,7 @@ from vrdp_prob.models.physics import PhysicsModel
 from vrdp_prob.models.simulator.arrays import KernelArrays, kernel_arrays
 from vrdp_prob.models.simulator.events import EventTable, Tapes
 from vrdp_prob.models.simulator.outcome import Outcome
+from vrdp_prob.models.simulator.work import record_work
 from vrdp_prob.models.simulator.worlds import Worlds
 from vrdp_prob.scene import Shape
 
@@ -143,6 +144,7 @@ class _Run:
             self.kinds, bodies, shared, start, times, self.event_limit, trajectory, velocity, self.outcomes
         )
         self.tapes = Tapes(*rows)
+        record_work(int(self.tapes.first_row[-1]))
         return torch.from_numpy(trajectory), torch.from_numpy(velocity)
 
     def backward(

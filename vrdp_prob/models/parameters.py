@@ -5,7 +5,6 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 import numpy as np
-import torch
 from jaxtyping import Float
 from scipy.special import expit
 from torch import Tensor

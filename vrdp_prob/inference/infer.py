@@ -1,6 +1,7 @@
 """From tracks to posterior: the most probable values first, then a sampler that sets out from them."""
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 
 import numpy as np
 import torch
@@ -88,7 +89,7 @@ def infer(
         generator=generator,
         progress=progress,
     )
-    return _posterior(fit, samples, sampler, seed=seed, draws=draws, generator=generator)
+    return posterior_from(fit, samples.thinned(draws), assess(sampler, samples), seed=seed, generator=generator)
 
 
 def check_sampler(name: str) -> None:
@@ -103,23 +104,37 @@ def check_sampler(name: str) -> None:
         raise InputError(f"sampler '{name}' is not known; use one of {', '.join(SAMPLERS)}.")
 
 
-def _posterior(
-    fit: MapFit, samples: Samples, sampler: str, *, seed: int, draws: int, generator: np.random.Generator
+def posterior_from(
+    fit: MapFit, samples: Samples, convergence: Convergence, *, seed: int, generator: np.random.Generator
 ) -> Posterior:
+    """The posterior that draws of a fit make.
+
+    Parameters
+    ----------
+    fit
+        The most probable values and the density around them.
+    samples
+        The draws to keep.
+    convergence
+        Whether all draws can be trusted.
+    seed
+        Seed that is noted in the posterior.
+    generator
+        Draws the prior and the noise of predicted measurements.
+    """
     tracks = fit.likelihood.tracks
     with torch.no_grad():
         rollout = fit.likelihood.rollout(torch.from_numpy(fit.point[None]))
     contacts = first_contacts(rollout, 0)
     status = identifiability(tracks, contacts, wall_contacts(rollout, 0))
-    kept = samples.thinned(draws)
-    changed = _changed_order(fit, kept.points, contacts)
-    convergence = assess(sampler, samples, order_changes=float(changed.mean()))
+    changed = _changed_order(fit, samples.points, contacts)
+    convergence = replace(convergence, collision_order_changes=float(changed.mean()))
     names = [body.id for body in tracks.bodies]
     return Posterior(
         tracks=tracks,
         model=fit.likelihood.model,
         seed=seed,
-        data=posterior_tree(fit, kept, changed, generator),
+        data=posterior_tree(fit, samples, changed, generator),
         status=status,
         convergence=convergence,
         warnings=tuple(_warnings(fit, convergence, status, contacts)),

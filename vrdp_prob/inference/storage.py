@@ -2,6 +2,8 @@
 
 import json
 import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -43,13 +45,24 @@ def fill_file(posterior: Posterior, path: Path) -> None:
     OSError
         If the file cannot be written.
     """
-    tree = posterior.data.copy()
-    tree.attrs = {"vrdp_prob": json.dumps(_document(posterior)), "format": FORMAT}
+    tree = to_tree(posterior)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         # in memory first: on a full disk the HDF5 library would go on to fail whenever it frees an object
         content = tree.to_netcdf(engine="h5netcdf", encoding=_compressed(tree))
     path.write_bytes(content)
+
+
+def to_tree(posterior: Posterior) -> xr.DataTree:
+    """The groups of a posterior, with all that it holds beside them as an attribute of the root."""
+    tree = posterior.data.copy()
+    tree.attrs = {"vrdp_prob": json.dumps(_document(posterior)), "format": FORMAT}
+    return tree
+
+
+def from_tree(tree: xr.DataTree, tracks: Tracks | None = None) -> Posterior:
+    """The posterior of such groups; the tracks come from them unless given."""
+    return _posterior(json.loads(tree.attrs["vrdp_prob"]), tree, tracks)
 
 
 def read_posterior(path: Path, tracks: Tracks | None = None) -> Posterior:
@@ -60,11 +73,23 @@ def read_posterior(path: Path, tracks: Tracks | None = None) -> Posterior:
     InputError
         If the file cannot be read or is not a posterior.
     """
-    try:
+    with reading(path):
         with xr.open_datatree(path, engine="h5netcdf") as opened:
             tree = opened.load().copy()
-        document = json.loads(tree.attrs["vrdp_prob"])
-        return _posterior(document, tree, tracks)
+        return from_tree(tree, tracks)
+
+
+@contextmanager
+def reading(path: Path) -> Iterator[None]:
+    """Turn what goes wrong while a posterior is read into one sentence.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read or is not a posterior.
+    """
+    try:
+        yield
     except OSError as error:
         reason = error.strerror or error
         raise InputError(f"{path}: the posterior cannot be read ({reason}); check the path.") from error

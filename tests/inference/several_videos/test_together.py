@@ -1,0 +1,279 @@
+import subprocess
+import sys
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import emcee
+import numpy as np
+import pytest
+import torch
+
+from tests.inference.several_videos.videos import DRAG, FRICTION, NOISE, colliding, sliding
+from vrdp_prob.errors import InputError
+from vrdp_prob.inference.samples import chain_statistics
+from vrdp_prob.inference.several_videos import (
+    SharedFit,
+    SharedPosterior,
+    fit_together,
+    infer_together,
+    predictive_log_density,
+    sample_together,
+)
+from vrdp_prob.models.effects.body_friction import BodyFriction
+from vrdp_prob.models.parameters import AIR_DRAG, Prior
+from vrdp_prob.models.physics import PhysicsModel
+from vrdp_prob.scene import Body, Tracks, Wall
+
+BASE = PhysicsModel.base()
+
+
+@cache
+def two() -> SharedFit:
+    return fit_together([colliding(1), sliding(2)], model=BASE)
+
+
+@cache
+def posterior_of_two(sampler: str) -> SharedPosterior:
+    return sample_together(two(), sampler=sampler, draws=600)
+
+
+def test_the_joint_fit_is_a_maximum_of_the_joint_density() -> None:
+    fit = two()
+    assert fit.joint.converged
+    generator = np.random.default_rng(0)
+    for size in (0.02, 0.2):
+        whitened = size * generator.standard_normal((50, fit.joint.gaussian.dimension))
+        assert joint_density(fit, whitened).max() <= fit.joint.log_density + 1e-3
+    assert joint_density(fit, np.zeros((1, fit.joint.gaussian.dimension)))[0] == pytest.approx(fit.joint.log_density)
+
+
+def joint_density(fit: SharedFit, whitened: np.ndarray) -> np.ndarray:
+    """Density of the vector of all numbers, put together here from the densities of the single videos."""
+    gaussian, numbers = fit.joint.gaussian, fit.joint.numbers
+    count = len(numbers)
+    shared = gaussian.mean + whitened[:, :count] @ gaussian.root.T
+    total, begin = np.zeros(len(whitened)), count
+    for video, part, local in zip(fit.joint.videos, fit.fits, gaussian.locals, strict=True):
+        size = len(local.centre)
+        own = local.centre + (shared - gaussian.mean) @ local.slope.T + whitened[:, begin : begin + size] @ local.root.T
+        begin += size
+        points = np.empty((len(whitened), len(part.likelihood.coordinates)))
+        points[:, video.shared_places] = shared + video.offset
+        points[:, video.local_places] = own
+        vector = torch.from_numpy(points)
+        with torch.no_grad():
+            density = part.likelihood.log_density(vector).numpy()
+            prior = part.likelihood.coordinates.log_prior(vector)[:, video.shared_places].sum(dim=1).numpy()
+        total += density - prior
+    return total + numbers.log_prior(shared)
+
+
+@pytest.mark.slow
+def test_both_samplers_agree_with_plain_emcee_on_the_whole_vector() -> None:
+    fit = fit_together([sliding(1), sliding(2)], model=BASE)
+    dimension, count = fit.joint.gaussian.dimension, len(fit.joint.numbers)
+    walkers = 4 * dimension
+    moves = [(emcee.moves.DEMove(), 0.8), (emcee.moves.DEMove(gamma0=1.0), 0.2)]
+    sampler = emcee.EnsembleSampler(
+        walkers, dimension, lambda points: joint_density(fit, points), moves=moves, vectorize=True
+    )
+    random = np.random.RandomState(5)
+    state = emcee.State(random.standard_normal((walkers, dimension)), random_state=random.get_state())
+    sampler.run_mcmc(state, 6000, progress=False)
+    whitened = sampler.get_chain(discard=1000)[..., :count]
+    plain = fit.joint.gaussian.mean + whitened @ fit.joint.gaussian.root.T
+    lasting = emcee.autocorr.integrated_time(plain, quiet=True)
+    for name in ("gibbs", "laplace"):
+        posterior = sample_together(fit, sampler=name, draws=4000)
+        assert posterior.convergence.converged
+        for place in range(count):
+            ours, sd = posterior.points[..., place], plain[..., place].std()
+            error = sd * np.sqrt(lasting[place] / plain[..., 0].size) + standard_error(ours)
+            assert abs(plain[..., place].mean() - ours.mean()) < 4 * error
+            assert ours.std() == pytest.approx(sd, rel=0.12)
+
+
+def standard_error(draws: np.ndarray) -> float:
+    return float(draws.std() / np.sqrt(chain_statistics(draws.reshape(4, -1, 1))[1]))
+
+
+@pytest.mark.parametrize("sampler", ["gibbs", "laplace"])
+def test_the_truth_is_covered_and_nothing_is_wrong(sampler: str) -> None:
+    posterior = posterior_of_two(sampler)
+    assert posterior.convergence.converged, posterior.convergence.sentence
+    assert posterior.warnings == ()
+    for name, truth in (("sliding_friction", FRICTION), ("air_drag", DRAG)):
+        summary = posterior.summary(name)
+        assert abs(summary.mean - truth) < 3.5 * summary.sd
+    noise = posterior.shared["noise_scale"]
+    assert float(noise.mean()) * noise.attrs["reference_m"] == pytest.approx(NOISE, rel=0.2)
+    assert float(posterior.map_estimate["sliding_friction"]) == pytest.approx(FRICTION, rel=0.1)
+
+
+@pytest.mark.parametrize("sampler", ["gibbs", "laplace"])
+def test_each_video_has_a_posterior_that_goes_with_the_shared_draws(sampler: str) -> None:
+    posterior = posterior_of_two(sampler)
+    for name in ("hit 1", "slide 2"):
+        video = posterior.video(name)
+        assert video.tracks.video == name
+        np.testing.assert_allclose(
+            video.data["posterior"]["sliding_friction"].values, posterior.shared["sliding_friction"].values
+        )
+        assert len(video.worlds(10)) == 10
+    (pair,) = posterior.video("hit 1").mass_ratios()
+    assert pair.summary.sd < 0.3 * pair.summary.mean
+    assert posterior.video("hit 1").warnings == ()
+
+
+def test_intervals_narrow_with_the_root_of_the_number_of_videos_and_cover_the_truth() -> None:
+    # drag is known, so that all that is learned of friction comes from the videos
+    known = replace(AIR_DRAG, prior=Prior(float(np.log(DRAG)), 0.01))
+    model = PhysicsModel("drag known", BASE.effects, {"air_drag": known})
+    groups = [fit_together([sliding(3 * group + k) for k in range(3)], model=model) for group in range(3)]
+    single = [fit_together([sliding(seed)], model=model) for seed in range(3)]
+    place = groups[0].joint.numbers.names.index("sliding_friction")
+    information = sum(fit.joint.gaussian.sd[place] ** -2 for fit in single)
+    assert groups[0].joint.gaussian.sd[place] == pytest.approx(information**-0.5, rel=0.1)
+    away = [(fit.joint.gaussian.mean[place] - np.log(FRICTION)) / fit.joint.gaussian.sd[place] for fit in groups]
+    assert np.abs(away).max() < 3.5
+    assert 0.01 < np.mean(np.square(away)) < 3
+
+
+def test_noise_is_shared_in_metres_where_bodies_differ_in_size() -> None:
+    small, large = sliding(1), sliding(2)
+    large = Tracks("large", (Body("0", large.bodies[0].shape, 0.5),), large.data)
+    fit = fit_together([small, large], model=BASE)
+    sizes = [
+        np.exp(part.point[part.likelihood.coordinates.places["noise_scale", None]])
+        * part.likelihood.observations.position_reference
+        for part in fit.fits
+    ]
+    assert sizes[0] == pytest.approx(sizes[1])
+    assert sizes[0] == pytest.approx(NOISE, rel=0.25)
+
+
+def test_what_is_not_shared_stays_each_video_s_own() -> None:
+    fit = fit_together([sliding(1), sliding(2, noise=0.02)], model=BASE, shared=["air_drag"])
+    assert fit.joint.numbers.names == ("air_drag",)
+    scales = [part.point[part.likelihood.coordinates.places["noise_scale", None]] for part in fit.fits]
+    assert np.exp(scales[1] - scales[0]) == pytest.approx(5, rel=0.4)
+    posterior = sample_together(fit, sampler="laplace", draws=100)
+    assert list(posterior.shared) == ["air_drag"]
+    alone = sample_together(fit_together([sliding(1)], model=BASE, shared=[]), sampler="laplace", draws=100)
+    assert list(alone.shared) == []
+    assert alone.video("slide 1").draw_count == 100
+
+
+def test_walls_at_the_same_place_share_their_restitution() -> None:
+    walls = (Wall(2.0, -3.0, 2.0, 3.0, None), Wall(-2.0, -3.0, -2.0, 3.0, 0.9))
+    first = Tracks("first", sliding(1).bodies, sliding(1).data, walls)
+    again = (Wall(2.0, 3.0, 2.0, -3.0, None), Wall(0.0, 3.0, 2.0, 3.0, None))
+    second = Tracks("second", sliding(2).bodies, sliding(2).data, again)
+    fit = fit_together([first, second], model=BASE)
+    names = [name for name in fit.joint.numbers.names if name.startswith("wall")]
+    assert names == ["wall_restitution(2, -3, 2, 3)", "wall_restitution(0, 3, 2, 3)"]
+    posterior = sample_together(fit, sampler="laplace", draws=50)
+    assert posterior.shared["wall_restitution"].sizes == {"chain": 1, "draw": 50, "wall": 2}
+    drawn = posterior.video("second").data["posterior"]["wall_restitution"]
+    np.testing.assert_allclose(drawn.values, posterior.shared["wall_restitution"].values)
+
+
+def test_the_same_seed_gives_the_same_numbers_whatever_the_order() -> None:
+    again = sample_together(fit_together([colliding(1), sliding(2)], model=BASE), sampler="laplace", draws=600)
+    first = posterior_of_two("laplace")
+    np.testing.assert_array_equal(again.points, first.points)
+    assert again.video("hit 1").data.equals(first.video("hit 1").data)
+    turned = fit_together([sliding(2), colliding(1)], model=BASE)
+    assert turned.joint.gaussian.mean == pytest.approx(
+        two().joint.gaussian.mean, abs=0.1 * two().joint.gaussian.sd.min()
+    )
+
+
+def test_a_posterior_is_written_and_read_again(tmp_path: Path) -> None:
+    posterior = posterior_of_two("laplace")
+    posterior.write(tmp_path / "shared.nc")
+    again = SharedPosterior.read(tmp_path / "shared.nc")
+    assert again.shared.equals(posterior.shared)
+    assert again.map_estimate.equals(posterior.map_estimate)
+    assert again.shared["sliding_friction"].attrs == {"units": "1"}
+    assert (again.seed, again.warnings, again.convergence) == (0, (), posterior.convergence)
+    assert again.numbers == posterior.numbers
+    assert list(again.videos) == ["hit 1", "slide 2"]
+    assert again.video("hit 1").data.equals(posterior.video("hit 1").data)
+    assert predictive_log_density(again, sliding(3)) == predictive_log_density(posterior, sliding(3))
+    (tmp_path / "other.nc").write_text("nothing", encoding="utf-8")
+    with pytest.raises(InputError, match=r"other\.nc"):
+        SharedPosterior.read(tmp_path / "other.nc")
+
+
+def test_a_held_out_video_is_as_probable_as_the_evidence_of_all_says() -> None:
+    posterior = posterior_of_two("laplace")
+    more = infer_together([colliding(1), sliding(2), sliding(3)], model=BASE, sampler="laplace")
+    found = predictive_log_density(posterior, sliding(3))
+    assert found.trusted
+    assert found.error < 0.15
+    assert found.log_density == pytest.approx(more.log_evidence - posterior.log_evidence, abs=0.5)
+
+
+def test_another_model_is_fitted_from_what_is_known() -> None:
+    fit = two()
+    extended = fit.under(BASE.with_effect(BodyFriction()))
+    fresh = fit_together([colliding(1), sliding(2)], model=BASE.with_effect(BodyFriction()))
+    assert extended.joint.converged
+    assert extended.joint.log_density == pytest.approx(fresh.joint.log_density, abs=0.3)
+    assert extended.log_evidence == pytest.approx(fresh.log_evidence, abs=0.3)
+    assert extended.log_evidence < fit.log_evidence  # all bodies slide alike
+
+
+def test_a_video_that_the_model_does_not_explain_is_named() -> None:
+    odd = sliding(9, friction=3 * FRICTION)
+    posterior = infer_together([sliding(1), sliding(2), sliding(3), odd], model=BASE, sampler="laplace", draws=100)
+    assert [sentence for sentence in posterior.warnings if sentence.startswith("slide 9: The model does not explain")]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "sentence"),
+    [
+        ({"videos": []}, "there are 0 videos"),
+        ({"videos": [sliding(1), sliding(1)]}, "2 videos have the name 'slide 1'"),
+        ({"shared": ["wind"]}, "videos cannot share 'wind' under the model base"),
+        ({"shared": ["mass"]}, "videos cannot share 'mass'"),
+        ({"sampler": "nuts"}, "sampler 'nuts' is not known for several videos"),
+        ({"draws": 2}, "draws is 2"),
+        ({"seed": -1}, "seed is -1"),
+    ],
+)
+def test_bad_input_is_refused_in_one_sentence(arguments: dict[str, object], sentence: str) -> None:
+    given: dict[str, object] = {"videos": [sliding(1)], "model": BASE} | arguments
+    with pytest.raises(InputError, match=sentence):
+        infer_together(**given)  # type: ignore[arg-type]  # some are wrong on purpose
+
+
+def test_a_video_without_motion_is_refused_by_name() -> None:
+    resting = sliding(2)
+    places = np.zeros((30, 1, 2)) + 0.001 * np.random.default_rng(0).standard_normal((30, 1, 2))
+    still = Tracks.from_arrays("still", resting.bodies, resting.times, places)
+    with pytest.raises(InputError, match="still: no object moves"):
+        infer_together([sliding(1), still], model=BASE)
+
+
+def test_an_unknown_video_or_quantity_is_refused() -> None:
+    posterior = posterior_of_two("laplace")
+    with pytest.raises(InputError, match="no video 'slide 3'; the videos are hit 1, slide 2"):
+        posterior.video("slide 3")
+    with pytest.raises(InputError, match="share no single 'mass'; they share sliding_friction, air_drag, noise_scale"):
+        posterior.summary("mass")
+
+
+@pytest.mark.slow
+def test_memory_does_not_grow_with_the_number_of_videos() -> None:
+    """Peak memory of a process that fits and samples 100 videos, over that of 10."""
+    peaks = {}
+    for count in (10, 100):
+        script = Path(__file__).with_name("peak_memory.py")
+        done = subprocess.run(
+            [sys.executable, str(script), str(count)], capture_output=True, text=True, check=True, cwd=Path.cwd()
+        )
+        peaks[count] = float(done.stdout)
+    assert peaks[100] < peaks[10] + 150  # MB; the draws of 100 videos take some 40

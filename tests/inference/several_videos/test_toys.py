@@ -1,0 +1,156 @@
+"""The samplers of several videos on densities whose marginals are known by quadrature."""
+
+from dataclasses import dataclass
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.special import logsumexp
+
+from tests.inference.several_videos.videos import sliding
+from vrdp_prob.inference.samples import chain_statistics
+from vrdp_prob.inference.several_videos.arrow import ArrowGaussian, Expansion, Expansions, SharedExpansion
+from vrdp_prob.inference.several_videos.gibbs import sample_gibbs
+from vrdp_prob.inference.several_videos.importance import sample_by_importance
+from vrdp_prob.inference.several_videos.joint_fit import JointFit
+from vrdp_prob.inference.several_videos.linking import LinkedVideo, SharedNumbers
+from vrdp_prob.inference.several_videos.slice_steps import Chains, slice_step
+from vrdp_prob.models.coordinates import Coordinate, Coordinates
+from vrdp_prob.models.likelihood import Likelihood
+from vrdp_prob.models.parameters import Prior, Transform
+from vrdp_prob.models.physics import PhysicsModel
+
+SEEN = np.array([0.9, 1.6, 1.2, 0.7, 1.4])
+"""One number per toy video."""
+SD = 0.3
+WIGGLE = 0.8
+
+
+@dataclass(frozen=True)
+class Toy(LinkedVideo):
+    """A video that sees `shared + exp(WIGGLE own)` with noise; the own number is standard normal before."""
+
+    seen: float = 0.0
+
+    @property
+    def data(self) -> Any:
+        return SimpleNamespace(residuals=self._residuals)
+
+    def _residuals(self, points: np.ndarray) -> np.ndarray:
+        shared, own = points[:, 0], points[:, 1]
+        return np.stack([(shared + np.exp(WIGGLE * own) - self.seen) / SD, own], axis=1)
+
+    def log_density(self, shared: np.ndarray, local: np.ndarray) -> np.ndarray:
+        values: np.ndarray = -(self._residuals(self.points(shared, local)) ** 2).sum(axis=1) / 2
+        return values
+
+
+def toy_fit(seen: np.ndarray) -> JointFit:
+    """The toy videos around a rough guess of their mode."""
+    numbers = SharedNumbers((("shared", ()),), (Coordinate("shared", None, Transform.IDENTITY, Prior(0.0, 1.0)),), None)
+    own = Coordinate("own", 0, Transform.IDENTITY, Prior(0.0, 1.0))
+    coordinates = Coordinates((numbers.entries[0], own), {})
+    likelihood = Likelihood(sliding(0), PhysicsModel.base(), coordinates)
+    one = np.zeros(1, dtype=np.int64)
+    videos = tuple(Toy(likelihood, one, one, np.zeros(1), seen=float(value)) for value in seen)
+    shared = np.zeros(1)
+    locals_, expansions = [], []
+    for value in seen:
+        local = np.array([np.log(max(value, 0.3)) / WIGGLE])
+        slope = WIGGLE * np.exp(WIGGLE * local[0]) / SD
+        block = np.array([[SD**-2]])
+        expansion = Expansion(np.zeros(1), np.zeros(1), block, block * slope * SD, np.array([[slope**2 + 1]]))
+        locals_.append(local)
+        expansions.append(expansion)
+    prior = SharedExpansion(np.zeros(1), np.eye(1))
+    gaussian = Expansions(prior, tuple(expansions)).gaussian(shared, locals_)
+    return JointFit(numbers, videos, gaussian, 0.0, converged=True)
+
+
+def by_quadrature(seen: np.ndarray) -> tuple[float, float, float, float]:
+    """Mean and sd of the shared number, mean of the first video's own, and the log evidence."""
+    shared, own = np.linspace(-4, 4, 1601)[:, None], np.linspace(-6, 6, 2401)[None]
+    log_own = -(own**2) / 2 - np.log(2 * np.pi) / 2 + np.log(own[0, 1] - own[0, 0])
+    log_each = [log_own - ((shared + np.exp(WIGGLE * own) - value) / SD) ** 2 / 2 for value in seen]
+    log_shared = -(shared[:, 0] ** 2) / 2 - np.log(2 * np.pi) / 2 + np.log(shared[1, 0] - shared[0, 0])
+    log_joint = log_shared + sum(logsumexp(one, axis=1) for one in log_each)
+    weights = np.exp(log_joint - logsumexp(log_joint))
+    mean = float(weights @ shared[:, 0])
+    sd = float(np.sqrt(weights @ (shared[:, 0] - mean) ** 2))
+    conditional = np.exp(log_each[0] - logsumexp(log_each[0], axis=1, keepdims=True)) @ own[0]
+    return mean, sd, float(weights @ conditional), float(logsumexp(log_joint))
+
+
+def test_an_arrow_is_the_whole_matrix() -> None:
+    generator = np.random.default_rng(0)
+    shared, owns = 3, (2, 4, 1)
+    whole = np.zeros((shared + sum(owns), shared + sum(owns)))
+    gradient = np.zeros(len(whole))
+    expansions, begin = [], shared
+    for own in owns:
+        root = generator.standard_normal((shared + own, shared + own + 3))
+        block, slope = root @ root.T, generator.standard_normal(shared + own)
+        places = np.r_[:shared, begin : begin + own]
+        whole[np.ix_(places, places)] += block
+        gradient[places] += slope
+        parts = block[:shared, :shared], block[shared:, :shared], block[shared:, shared:]
+        expansions.append(Expansion(slope[:shared], slope[shared:], *parts))
+        begin += own
+    prior = SharedExpansion(generator.standard_normal(shared), np.eye(shared))
+    whole[:shared, :shared] += np.eye(shared)
+    gradient[:shared] += prior.gradient
+    arrow = Expansions(prior, tuple(expansions))
+    step = -np.linalg.solve(whole, gradient)
+    assert arrow.shared_step == pytest.approx(step[:shared], rel=1e-6)
+    own_step = expansions[1].local_step + expansions[1].slope @ arrow.shared_step
+    assert own_step == pytest.approx(step[shared + 2 : shared + 6], rel=1e-6)
+    assert arrow.expected_gain == pytest.approx(-gradient @ step / 2, rel=1e-6)
+    gaussian: ArrowGaussian = arrow.gaussian(np.zeros(shared), [np.zeros(own) for own in owns])
+    covariance = np.linalg.inv(whole)
+    assert gaussian.root @ gaussian.root.T == pytest.approx(covariance[:shared, :shared], rel=1e-6)
+    assert gaussian.log_volume == pytest.approx(-np.linalg.slogdet(whole)[1] / 2)
+
+
+@pytest.mark.parametrize("count", [1, 5])
+def test_chains_have_the_marginal_of_the_product_of_all_videos(count: int) -> None:
+    mean, sd, own, _ = by_quadrature(SEEN[:count])
+    draws = sample_gibbs(toy_fit(SEEN[:count]), generator=np.random.default_rng(1))
+    shared = draws.shared[..., 0]
+    _, ess = chain_statistics(draws.shared)
+    assert ess > 400
+    assert abs(shared.mean() - mean) < 4 * sd / np.sqrt(ess)
+    assert shared.std() == pytest.approx(sd, rel=4 / np.sqrt(ess))
+    _, ess = chain_statistics(draws.locals[0])
+    assert abs(draws.locals[0].mean() - own) < 4 * draws.locals[0].std() / np.sqrt(ess)
+    assert draws.drift < 1.03
+
+
+@pytest.mark.parametrize("count", [1, 5])
+def test_weighted_draws_have_it_too(count: int) -> None:
+    mean, sd, own, log_evidence = by_quadrature(SEEN[:count])
+    draws = sample_by_importance(toy_fit(SEEN[:count]), draws=2000, generator=np.random.default_rng(1))
+    assert draws.effective > 200
+    assert draws.log_evidence == pytest.approx(log_evidence, abs=0.1)
+    error = sd / np.sqrt(min(draws.effective, 2000))
+    assert abs(draws.shared.mean() - mean) < 4 * error
+    assert abs(draws.locals[0].mean() - own) < 4 * draws.locals[0].std() / np.sqrt(draws.effective)
+
+
+def test_slice_steps_leave_a_density_with_an_edge_as_it_is() -> None:
+    # an exponential in the first coordinate, a normal in the second
+    generator = np.random.default_rng(3)
+    places = np.stack([generator.exponential(size=400), generator.standard_normal(400)], axis=1)
+
+    def log_density(_chosen: np.ndarray, points: np.ndarray) -> np.ndarray:
+        return np.where(points[:, 0] > 0, -points[:, 0] - points[:, 1] ** 2 / 2, -np.inf)
+
+    chains = Chains(places, log_density(np.arange(400), places))
+    kept = []
+    for _ in range(50):
+        slice_step(chains, log_density, generator)
+        assert chains.log_density == pytest.approx(log_density(np.arange(400), chains.places))
+        kept.append(chains.places.copy())
+    later = np.concatenate(kept[10:])
+    assert later.mean(axis=0) == pytest.approx([1.0, 0.0], abs=0.05)
+    assert later.std(axis=0) == pytest.approx([1.0, 1.0], abs=0.05)

@@ -1,0 +1,287 @@
+"""The joint fit of several videos: each by itself first, then all together, then what the model leaves unexplained."""
+
+import os
+import zlib
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+from typing import TypeVar
+
+import numpy as np
+from jaxtyping import Float
+
+from vrdp_prob.errors import InputError
+from vrdp_prob.inference.clues import Clues
+from vrdp_prob.inference.map_fit import MapFit, fit_map
+from vrdp_prob.inference.misfit import judge
+from vrdp_prob.inference.mode import Mode
+from vrdp_prob.inference.model_error_fit import fit_model_error
+from vrdp_prob.inference.noise_fit import noise_sd
+from vrdp_prob.inference.several_videos.joint_fit import JointFit, climb, first_guess
+from vrdp_prob.inference.several_videos.linking import check_names, link
+from vrdp_prob.models.coordinates import Coordinates
+from vrdp_prob.models.likelihood import Likelihood
+from vrdp_prob.models.parameters import MASS, RESTITUTION, Transform
+from vrdp_prob.models.physics import PhysicsModel
+from vrdp_prob.models.unknowns import Structure, unknowns
+from vrdp_prob.progress import ProgressDisplay, SilentProgress
+from vrdp_prob.scene import Tracks
+
+MODEL_ERROR_ROUNDS = 2
+
+Item = TypeVar("Item")
+Result = TypeVar("Result")
+
+
+@dataclass(frozen=True)
+class SharedFit:
+    """The most probable values of several videos with shared parameters.
+
+    Parameters
+    ----------
+    model
+        The physics.
+    joint
+        The most probable values, the Gaussian around them, and the evidence.
+    fits
+        Each video's part of it, as a fit of its own: its best point and whether the model explains it.
+    structures
+        Which bodies of each video have which unknowns.
+    shared
+        Names of the quantities that were asked to be shared; None for all that have one value per video.
+    """
+
+    model: PhysicsModel
+    joint: JointFit
+    fits: tuple[MapFit, ...]
+    structures: tuple[Structure, ...]
+    shared: tuple[str, ...] | None
+
+    @property
+    def log_evidence(self) -> float:
+        """Log probability (nats) of the tracks under the model, up to a constant of the tracks (Laplace)."""
+        return self.joint.log_evidence
+
+    @property
+    def videos(self) -> tuple[str, ...]:
+        """Names of the videos."""
+        return tuple(video.name for video in self.joint.videos)
+
+    def under(
+        self, model: PhysicsModel, *, start: Mapping[str, float] | None = None, model_error: bool = True
+    ) -> "SharedFit":
+        """The fit of another model, from the values of this one; much faster than a new one.
+
+        Parameters
+        ----------
+        model
+            The other model.
+        start
+            Where its shared parameters begin, by name and in their units; else where they are now, and new ones at the
+            value at which their effect vanishes (or at the middle of their prior where that is infinitely far).
+        model_error
+            Whether what the model leaves unexplained is looked for.
+        """
+        joint = self.joint
+        likelihoods = [
+            plain_likelihood(fit.likelihood.tracks, model, structure)
+            for fit, structure in zip(self.fits, self.structures, strict=True)
+        ]
+        numbers, videos = link(likelihoods, self.shared)
+        first = _vanishing(model) | dict(start or {})
+        known = dict(zip(joint.numbers.keys, joint.gaussian.mean, strict=True))
+        shared = numbers.prior_mean.copy()
+        for place, (key, entry) in enumerate(zip(numbers.keys, numbers.entries, strict=True)):
+            if key in known and key[0] not in (start or {}):
+                shared[place] = known[key]
+            elif key[0] in first and first[key[0]] > entry.transform.support[0]:
+                shared[place] = _coordinate(entry.transform, first[key[0]])
+        locals_ = [
+            video.split(carried(old.likelihood.coordinates, joint.point(index), video.likelihood.coordinates))[1]
+            for index, (old, video) in enumerate(zip(joint.videos, videos, strict=True))
+        ]
+        found = climb(numbers, videos, shared, locals_)
+        return _finished(found, model, self.fits, self.structures, self.shared, model_error=model_error)
+
+
+def fit_together(
+    videos: Sequence[Tracks],
+    *,
+    model: PhysicsModel,
+    shared: Sequence[str] | None = None,
+    seed: int = 0,
+    model_error: bool = True,
+    progress: ProgressDisplay | None = None,
+) -> SharedFit:
+    """Find the most probable values of several videos at once.
+
+    Parameters
+    ----------
+    videos
+        What was seen.
+    model
+        The physics.
+    shared
+        Names of the quantities with one value for all videos; where None all that have one value per video (the
+        model's shared parameters and the noise), and the restitutions of walls at the same place.
+    seed
+        Seed of the searches; a video is searched alike whatever the others are.
+    model_error
+        Whether what the model leaves unexplained in a video is looked for, and widens its part of the density.
+    progress
+        Told how many videos are done.
+
+    Raises
+    ------
+    InputError
+        If there is no video, two have one name, a name is none that videos can share, or a video shows no motion.
+    """
+    check_videos(videos)
+    if shared is not None:
+        check_names(shared, model)
+    with (progress or SilentProgress()).stage("Fitting each video (MAP)", total=len(videos)) as advance:
+
+        def fit(tracks: Tracks) -> MapFit:
+            found = fit_map(tracks, model, stream(seed, tracks.video))
+            advance(1)
+            return found
+
+        fits = in_parallel(fit, videos)
+    structures = tuple(structure_of(one.likelihood.coordinates) for one in fits)
+    likelihoods = [plain_likelihood(tracks, model, one) for tracks, one in zip(videos, structures, strict=True)]
+    numbers, linked = link(likelihoods, shared)
+    starts = [
+        np.array([carried(fit.likelihood.coordinates, mode.point, video.likelihood.coordinates) for mode in fit.modes])
+        for fit, video in zip(fits, linked, strict=True)
+    ]
+    joint = climb(numbers, linked, *first_guess(numbers, linked, starts))
+    names = None if shared is None else tuple(shared)
+    return _finished(joint, model, fits, structures, names, model_error=model_error)
+
+
+def check_videos(videos: Sequence[Tracks]) -> None:
+    """Refuse no videos at all, and two of one name.
+
+    Raises
+    ------
+    InputError
+        In these cases.
+    """
+    if not videos:
+        raise InputError("there are 0 videos; give tracks of at least one.")
+    names = [tracks.video for tracks in videos]
+    twice = sorted({name for name in names if names.count(name) > 1})
+    if twice:
+        raise InputError(f"{names.count(twice[0])} videos have the name '{twice[0]}'; name them apart.")
+
+
+def stream(seed: int, video: str) -> np.random.Generator:
+    """Source of randomness of one video, the same whatever the other videos are."""
+    return np.random.default_rng([seed, zlib.crc32(video.encode())])
+
+
+def in_parallel(task: Callable[[Item], Result], items: Sequence[Item]) -> list[Result]:
+    """Results of a task, one thread per processor; the simulator lets threads run side by side."""
+    with ThreadPoolExecutor(max_workers=max(1, min(len(items), os.cpu_count() or 1))) as workers:
+        return list(workers.map(task, items))
+
+
+def _finished(
+    joint: JointFit,
+    model: PhysicsModel,
+    fits: Sequence[MapFit],
+    structures: tuple[Structure, ...],
+    shared: tuple[str, ...] | None,
+    *,
+    model_error: bool,
+) -> SharedFit:
+    """The joint fit with what the model leaves unexplained, and each video's part of it."""
+    misfits = [
+        judge(video.likelihood, joint.point(index), fits[index].noise, fits[index].misfit.outliers)
+        for index, video in enumerate(joint.videos)
+    ]
+    for _ in range(MODEL_ERROR_ROUNDS if model_error else 0):
+        errors = [
+            fit_model_error(video.believing(joint.gaussian.mean, joint.gaussian.sd), joint.point(index))
+            for index, video in enumerate(joint.videos)
+        ]
+        if not any(errors):
+            break
+        likelihoods = []
+        for video, structure, error in zip(joint.videos, structures, errors, strict=True):
+            plain = plain_likelihood(video.likelihood.tracks, model, structure)
+            if error is None:
+                likelihoods.append(plain)
+                continue
+            coordinates = unknowns(plain.tracks, model, structure)
+            likelihoods.append(replace(plain, coordinates=coordinates).with_model_error(error))
+        joint = _again(joint, likelihoods, shared)
+        misfits = [
+            misfit if error is None else misfit.with_error(error, noise_sd(video.likelihood, joint.point(index)))
+            for index, (misfit, error, video) in enumerate(zip(misfits, errors, joint.videos, strict=True))
+        ]
+    parts = tuple(
+        replace(
+            fit,
+            likelihood=video.likelihood,
+            modes=(_mode(joint, index),),
+            converged=joint.converged,
+            misfit=misfit,
+        )
+        for index, (fit, video, misfit) in enumerate(zip(fits, joint.videos, misfits, strict=True))
+    )
+    return SharedFit(model, joint, parts, structures, shared)
+
+
+def _again(joint: JointFit, likelihoods: Sequence[Likelihood], shared: tuple[str, ...] | None) -> JointFit:
+    """Climb with other densities from where a fit is."""
+    numbers, videos = link(likelihoods, shared)
+    known = dict(zip(joint.numbers.keys, joint.gaussian.mean, strict=True))
+    start = np.array([known[key] for key in numbers.keys])
+    locals_ = [
+        video.split(carried(old.likelihood.coordinates, joint.point(index), video.likelihood.coordinates))[1]
+        for index, (old, video) in enumerate(zip(joint.videos, videos, strict=True))
+    ]
+    return climb(numbers, videos, start, locals_)
+
+
+def _mode(joint: JointFit, index: int) -> Mode:
+    """A video's part of the fit, with the precision that its numbers have by themselves and all videos together."""
+    video, point = joint.videos[index], joint.point(index)
+    return Mode(point, joint.precision(index), video.value(joint.gaussian.mean, joint.gaussian.locals[index].centre))
+
+
+def plain_likelihood(tracks: Tracks, model: PhysicsModel, structure: Structure) -> Likelihood:
+    """Density of a video without a model error."""
+    family = Clues.of(tracks).noise_family
+    return Likelihood(tracks, model, unknowns(tracks, model, structure, family), family)
+
+
+def structure_of(coordinates: Coordinates) -> Structure:
+    """Which bodies have which unknowns in a fit."""
+    owners = {
+        field: frozenset(e.owner for e in coordinates.entries if e.field == field and e.owner is not None)
+        for field in ("velocity_x", MASS.name, RESTITUTION.name)
+    }
+    return Structure(moving=owners["velocity_x"], colliding=owners[MASS.name] | owners[RESTITUTION.name])
+
+
+def carried(
+    source: Coordinates, point: Float[np.ndarray, "dimension"], target: Coordinates
+) -> Float[np.ndarray, "target_dimension"]:
+    """The same values in another vector; what is new there at the mean of its prior."""
+    places = source.places
+    carried = target.prior_mean.copy()
+    for place, entry in enumerate(target.entries):
+        if (entry.field, entry.owner) in places:
+            carried[place] = point[places[entry.field, entry.owner]]
+    return carried
+
+
+def _vanishing(model: PhysicsModel) -> dict[str, float]:
+    """Values at which the model's effects vanish."""
+    return {name: value for effect in model.effects for name, value in effect.vanishes_at.items()}
+
+
+def _coordinate(transform: Transform, value: float) -> float:
+    return float(np.log(value)) if transform is Transform.LOG else value

@@ -1,0 +1,249 @@
+"""The most probable values of several videos at once: Gauss-Newton steps of arrow shape, tried before they are taken.
+
+Each video is expanded by itself, its own numbers are eliminated, the shared numbers take one common step, and every
+video then picks the best of a few moves of its own. So memory holds one video's batch of worlds at a time, and a video
+whose events change their order under a step does not stop the others.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from jaxtyping import Float
+from scipy.linalg import solve_triangular
+
+from vrdp_prob.inference.least_squares import jacobian, minimise
+from vrdp_prob.inference.noise_fit import NOISE_FIELDS, noise_curvature
+from vrdp_prob.inference.samples import evaluate_with_gradient
+from vrdp_prob.inference.several_videos.arrow import (
+    LOG_TWO_PI,
+    ArrowGaussian,
+    Expansion,
+    Expansions,
+    SharedExpansion,
+)
+from vrdp_prob.inference.several_videos.linking import LinkedVideo, SharedNumbers
+from vrdp_prob.inference.several_videos.prior_mass import log_prior_constant
+
+DAMPINGS = 10.0 ** np.array([-2.0, -1.0, 0.0, 1.0, 2.0])
+"""Factors on the current damping that one round of trial steps covers."""
+SMALLEST_DAMPING, LARGEST_DAMPING = 1e-9, 1e6
+LOCAL_SHARES = (1.0, 0.3, 0.0)
+"""Shares of its own Newton step among which each video chooses, beside following the shared numbers."""
+ROUNDS = 30
+TOLERANCE = 0.01
+"""Gain (nats) of a step, expected or real, below which the search has converged."""
+LOCAL_ITERATIONS = 8
+
+
+@dataclass(frozen=True)
+class JointFit:
+    """The most probable values of several videos and the Gaussian around them.
+
+    Parameters
+    ----------
+    numbers
+        The shared numbers.
+    videos
+        The videos in terms of them.
+    gaussian
+        Gaussian around the most probable values, which are its mean.
+    log_density
+        Log posterior (nats, up to the constants of the priors and of the data) there.
+    converged
+        Whether the last step gained next to nothing.
+    """
+
+    numbers: SharedNumbers
+    videos: tuple[LinkedVideo, ...]
+    gaussian: ArrowGaussian
+    log_density: float
+    converged: bool
+
+    @cached_property
+    def log_evidence(self) -> float:
+        """Log probability (nats) of the tracks under the model by Laplace's approximation.
+
+        It holds the priors' constants but not those of the data, so only differences between models of the same tracks
+        mean something.
+        """
+        constants = log_prior_constant(self.numbers.entries)
+        for video in self.videos:
+            entries = video.likelihood.coordinates.entries
+            constants += log_prior_constant(entries[place] for place in video.local_places)
+        gaussian = self.gaussian
+        return self.log_density + constants + gaussian.dimension * LOG_TWO_PI / 2 + gaussian.log_volume
+
+    def precision(self, index: int) -> Float[np.ndarray, "dimension dimension"]:
+        """Curvature of the negative log posterior of one video's vector, the other videos integrated out."""
+        video, gaussian = self.videos[index], self.gaussian
+        own, local = video.local_places, gaussian.locals[index]
+        slope = local.slope[:, video.shared_columns]
+        covariance = (gaussian.root @ gaussian.root.T)[np.ix_(video.shared_columns, video.shared_columns)]
+        result = np.zeros((len(own) + len(slope.T), len(own) + len(slope.T)))
+        inverse = solve_triangular(local.root, np.eye(len(own)), lower=True)
+        precision = inverse.T @ inverse
+        result[np.ix_(own, own)] = precision
+        result[np.ix_(own, video.shared_places)] = -precision @ slope
+        result[np.ix_(video.shared_places, own)] = -slope.T @ precision
+        result[np.ix_(video.shared_places, video.shared_places)] = (
+            np.linalg.inv(covariance) + slope.T @ precision @ slope
+        )
+        return result
+
+    def point(self, index: int) -> Float[np.ndarray, "dimension"]:
+        """Most probable vector of one video."""
+        return self.videos[index].points(self.gaussian.mean, self.gaussian.locals[index].centre)
+
+
+def expand(
+    video: LinkedVideo,
+    shared: Float[np.ndarray, "shared"],
+    local: Float[np.ndarray, "local"],
+    *,
+    central: bool = False,
+) -> Expansion:
+    """Expand a video's negative log density; the gradient is exact, the curvature that of its residuals."""
+    likelihood, point = video.data, video.points(shared, local)
+    _, derivative = jacobian(likelihood.residuals, point, likelihood.coordinates.scale, central=central)
+    curvature = derivative.T @ derivative
+    places, noise = noise_curvature(likelihood, point)
+    curvature[places, :] = curvature[:, places] = 0.0
+    curvature[np.ix_(places, places)] = noise
+    _, gradient = evaluate_with_gradient(likelihood.log_density, point[None])
+    own, used, columns = video.local_places, video.shared_places, video.shared_columns
+    count = len(shared)
+    shared_gradient, block = np.zeros(count), np.zeros((count, count))
+    cross = np.zeros((len(own), count))
+    shared_gradient[columns] = -gradient[0, used]
+    block[np.ix_(columns, columns)] = curvature[np.ix_(used, used)]
+    cross[:, columns] = curvature[np.ix_(own, used)]
+    return Expansion(shared_gradient, -gradient[0, own], block, cross, curvature[np.ix_(own, own)])
+
+
+def expand_prior(numbers: SharedNumbers, shared: Float[np.ndarray, "shared"]) -> SharedExpansion:
+    """Expand the negative log prior of the shared numbers."""
+    if not len(numbers):
+        return SharedExpansion(np.zeros(0), np.zeros((0, 0)))
+    residuals, derivative = jacobian(numbers.prior_residuals, shared, numbers.scale, central=True)
+    return SharedExpansion(derivative.T @ residuals, derivative.T @ derivative)
+
+
+def climb(
+    numbers: SharedNumbers,
+    videos: Sequence[LinkedVideo],
+    shared: Float[np.ndarray, "shared"],
+    locals_: Sequence[Float[np.ndarray, "_"]],
+) -> JointFit:
+    """Climb the joint log posterior from a start."""
+    state = _State(shared, list(locals_), [v.value(shared, x) for v, x in zip(videos, locals_, strict=True)])
+    damping, converged = 1e-3, False
+    for _ in range(ROUNDS):
+        prior = expand_prior(numbers, state.shared)
+        expansions = [expand(v, state.shared, x) for v, x in zip(videos, state.locals, strict=True)]
+        slopes = Expansions(prior, tuple(expansions))
+        expected = slopes.expected_gain
+        trial, damping = _tried(numbers, videos, state, slopes, damping)
+        gain = trial.total(numbers) - state.total(numbers) if trial is not state else 0.0
+        state = trial
+        converged = min(expected, gain) < TOLERANCE and expected < 1.0
+        if converged or damping > LARGEST_DAMPING:
+            break
+    prior = expand_prior(numbers, state.shared)
+    expansions = [expand(v, state.shared, x, central=True) for v, x in zip(videos, state.locals, strict=True)]
+    gaussian = Expansions(prior, tuple(expansions)).gaussian(state.shared, state.locals)
+    return JointFit(numbers, tuple(videos), gaussian, state.total(numbers), converged)
+
+
+@dataclass(frozen=True)
+class _State:
+    shared: Float[np.ndarray, "shared"]
+    locals: list[Float[np.ndarray, "_"]]
+    values: list[float]
+
+    def total(self, numbers: SharedNumbers) -> float:
+        return float(numbers.log_prior(self.shared[None])[0]) + sum(self.values)
+
+
+def _tried(
+    numbers: SharedNumbers, videos: Sequence[LinkedVideo], state: _State, slopes: Expansions, damping: float
+) -> tuple[_State, float]:
+    """The best of several damped steps, or the state as it is, and the next damping."""
+    dampings = np.clip(damping * DAMPINGS, SMALLEST_DAMPING, LARGEST_DAMPING)
+    damped = [slopes, *(slopes.damped(value) for value in dampings)]
+    steps = [np.zeros_like(state.shared), *(one.shared_step for one in damped[1:])]
+    trials = state.shared + np.array(steps)
+    totals = numbers.log_prior(trials)
+    locals_, values = [], []
+    for index, video in enumerate(videos):
+        mine = [one.videos[index] for one in damped]
+        moves = [
+            [one.slope @ step + share * one.local_step for share in LOCAL_SHARES]
+            for one, step in zip(mine, steps, strict=True)
+        ]
+        candidates = state.locals[index] + np.array(moves)
+        repeated = np.repeat(trials, len(LOCAL_SHARES), axis=0)
+        found = video.log_density(repeated, candidates.reshape(-1, candidates.shape[-1])).reshape(len(trials), -1)
+        best = found.argmax(axis=1)
+        locals_.append(candidates[np.arange(len(trials)), best])
+        values.append(found.max(axis=1))
+        totals = totals + values[-1]
+    chosen = int(np.argmax(totals))
+    if not totals[chosen] > state.total(numbers):
+        return state, damping * 1e3
+    after = _State(trials[chosen], [one[chosen] for one in locals_], [float(one[chosen]) for one in values])
+    return after, float(dampings[chosen - 1]) if chosen else damping
+
+
+def first_guess(
+    numbers: SharedNumbers,
+    videos: Sequence[LinkedVideo],
+    starts: Sequence[Float[np.ndarray, "start _"]],
+) -> tuple[Float[np.ndarray, "shared"], list[Float[np.ndarray, "_"]]]:
+    """Shared numbers that the videos' own fits agree on best, and each video's own numbers for them.
+
+    Parameters
+    ----------
+    numbers, videos
+        What is fitted.
+    starts
+        Vectors of each video at the modes of its own fit, the best first.
+    """
+    places, expansions = [], []
+    for video, points in zip(videos, starts, strict=True):
+        used, local = video.split(points[0])
+        shared = numbers.prior_mean.copy()
+        shared[video.shared_columns] = used
+        places.append(shared)
+        expansions.append(expand(video, shared, local))
+    middle = np.mean(places, axis=0)
+    agreed = Expansions(expand_prior(numbers, middle), tuple(expansions)).consensus(middle, places)
+    agreed = np.clip(agreed, np.min(places, axis=0), np.max(places, axis=0))
+    locals_ = []
+    for video, points, one, place in zip(videos, starts, expansions, places, strict=True):
+        _, own = video.split(points)
+        following = own[0] + one.slope @ (agreed - place) + one.local_step
+        locals_.append(settle(video, agreed, [*own, following]))
+    return agreed, locals_
+
+
+def settle(
+    video: LinkedVideo, shared: Float[np.ndarray, "shared"], starts: Sequence[Float[np.ndarray, "local"]]
+) -> Float[np.ndarray, "local"]:
+    """Best own numbers of a video for given shared ones, from several starts."""
+    active = np.zeros(len(video.likelihood.coordinates), dtype=bool)
+    active[video.local_places] = True
+    active &= ~video.likelihood.coordinates.mask(NOISE_FIELDS)
+    found = []
+    for start in starts:
+        minimum = minimise(
+            video.data.residuals,
+            video.points(shared, start),
+            video.data.coordinates.scale,
+            active=active,
+            iterations=LOCAL_ITERATIONS,
+            tolerance=0.1,
+        )
+        found.append(video.split(minimum.point)[1])
+    return found[int(np.argmax(video.log_density(np.tile(shared, (len(found), 1)), np.array(found))))]

@@ -1,0 +1,169 @@
+"""From the tracks of several videos to one posterior: the joint fit first, then draws of everything together."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+
+from vrdp_prob.errors import InputError
+from vrdp_prob.inference.infer import default_model, posterior_from
+from vrdp_prob.inference.map_fit import MapFit
+from vrdp_prob.inference.posterior import Posterior
+from vrdp_prob.inference.samples import Convergence, Samples, assess
+from vrdp_prob.inference.several_videos.fitting import SharedFit, fit_together, stream
+from vrdp_prob.inference.several_videos.gibbs import sample_gibbs
+from vrdp_prob.inference.several_videos.importance import sample_by_importance
+from vrdp_prob.inference.several_videos.posterior import SharedPosterior, VideoPosteriors
+from vrdp_prob.models.physics import PhysicsModel
+from vrdp_prob.progress import ProgressDisplay
+from vrdp_prob.scene import Tracks
+
+SAMPLERS = ("gibbs", "laplace")
+FEWEST_DRAWS = 4
+
+
+@dataclass(frozen=True)
+class _Drawn:
+    """Draws of the shared numbers, and of each video's vector in the same order."""
+
+    shared: Samples
+    videos: tuple[Samples, ...]
+    log_evidence: float
+
+
+def infer_together(
+    videos: Sequence[Tracks],
+    *,
+    shared: Sequence[str] | None = None,
+    model: PhysicsModel | None = None,
+    sampler: str = "gibbs",
+    seed: int = 0,
+    draws: int = 1000,
+    model_error: bool = True,
+    progress: ProgressDisplay | None = None,
+) -> SharedPosterior:
+    """Infer what several videos share, and each video's motion, masses and restitutions with it.
+
+    Parameters
+    ----------
+    videos
+        What was seen.
+    shared
+        Names of the quantities with one value for all videos; where None all that have one value per video (the
+        model's shared parameters and the noise), and the restitutions of walls at the same place.
+    model
+        The physics; `default_model()` where None.
+    sampler
+        `gibbs` (chains that move the shared numbers and each video's own in turn) or `laplace` (fast: the Gaussian of
+        the joint fit, corrected by importance sampling).
+    seed
+        Seed of all randomness: the same seed gives the same posterior.
+    draws
+        Number of draws to keep.
+    model_error
+        Whether what the model leaves unexplained in a video is looked for, and widens its part of the density.
+    progress
+        Told how far the work is.
+
+    Raises
+    ------
+    InputError
+        If there is no video, two have one name, a name is none that videos can share, a video shows no motion, the
+        sampler is unknown, fewer than 4 draws are asked for or the seed is negative.
+    """
+    _check(sampler, draws, seed)
+    physics = default_model() if model is None else model
+    fit = fit_together(videos, model=physics, shared=shared, seed=seed, model_error=model_error, progress=progress)
+    return sample_together(fit, sampler=sampler, seed=seed, draws=draws, progress=progress)
+
+
+def sample_together(
+    fit: SharedFit,
+    *,
+    sampler: str = "gibbs",
+    seed: int = 0,
+    draws: int = 1000,
+    progress: ProgressDisplay | None = None,
+) -> SharedPosterior:
+    """The posterior around a joint fit; parameters as in `infer_together`."""
+    _check(sampler, draws, seed)
+    generator = np.random.default_rng(seed)
+    if sampler == "gibbs":
+        drawn = _by_gibbs(fit, generator, progress)
+    else:
+        drawn = _by_importance(fit, draws, generator, progress)
+    convergence = assess(sampler, drawn.shared) if len(fit.joint.numbers) else _nothing_shared(sampler)
+    return SharedPosterior(
+        model=fit.model,
+        seed=seed,
+        numbers=fit.joint.numbers,
+        points=drawn.shared.thinned(draws).points,
+        most_probable=fit.joint.gaussian.mean,
+        log_evidence=drawn.log_evidence,
+        convergence=convergence,
+        warnings=tuple(_warnings(fit, convergence)),
+        videos=VideoPosteriors(
+            {
+                part.likelihood.tracks.video: _maker(part, samples.thinned(draws), assess(sampler, samples), seed)
+                for part, samples in zip(fit.fits, drawn.videos, strict=True)
+            }
+        ),
+    )
+
+
+def _check(sampler: str, draws: int, seed: int) -> None:
+    if sampler not in SAMPLERS:
+        raise InputError(f"sampler '{sampler}' is not known for several videos; use one of {', '.join(SAMPLERS)}.")
+    if draws < FEWEST_DRAWS:
+        raise InputError(f"draws is {draws}; ask for at least {FEWEST_DRAWS}.")
+    if seed < 0:
+        raise InputError(f"seed is {seed}; give a number that is not negative.")
+
+
+def _by_gibbs(fit: SharedFit, generator: np.random.Generator, progress: ProgressDisplay | None) -> _Drawn:
+    found = sample_gibbs(fit.joint, generator=generator, progress=progress)
+    shape = found.shared.shape
+    log_prior = fit.joint.numbers.log_prior(found.shared.reshape(-1, shape[-1])).reshape(shape[:2])
+    shared = Samples(found.shared, log_prior + np.sum(found.log_density, axis=0), r_hat=found.drift)
+    parts = zip(fit.joint.videos, found.locals, found.log_density, strict=True)
+    videos = tuple(Samples(video.points(found.shared, own), value, r_hat=found.drift) for video, own, value in parts)
+    return _Drawn(shared, videos, fit.log_evidence)
+
+
+def _by_importance(
+    fit: SharedFit, draws: int, generator: np.random.Generator, progress: ProgressDisplay | None
+) -> _Drawn:
+    found = sample_by_importance(fit.joint, draws=draws, generator=generator, progress=progress)
+
+    def samples(points: Float[np.ndarray, "draw dimension"], values: Float[np.ndarray, "draw"]) -> Samples:
+        return Samples(points[None], values[None], pareto_k=found.pareto_k, effective=found.effective)
+
+    shared = samples(found.shared, fit.joint.numbers.log_prior(found.shared) + np.sum(found.log_density, axis=0))
+    parts = zip(fit.joint.videos, found.locals, found.log_density, strict=True)
+    videos = tuple(samples(video.points(found.shared, own), value) for video, own, value in parts)
+    return _Drawn(shared, videos, found.log_evidence)
+
+
+def _maker(part: MapFit, samples: Samples, convergence: Convergence, seed: int) -> Callable[[], Posterior]:
+    def make() -> Posterior:
+        generator = stream(seed, part.likelihood.tracks.video)
+        return posterior_from(part, samples, convergence, seed=seed, generator=generator)
+
+    return make
+
+
+def _nothing_shared(sampler: str) -> Convergence:
+    return Convergence(sampler, converged=True, r_hat=None, ess_bulk=None, divergences=None, pareto_k=None)
+
+
+def _warnings(fit: SharedFit, convergence: Convergence) -> list[str]:
+    """What limits the result."""
+    sentences = []
+    if not fit.joint.converged:
+        sentences.append("The search for the most probable values of all videos ended before it had converged.")
+    if not convergence.converged:
+        sentences.append(convergence.sentence)
+    for part in fit.fits:
+        sentences += [f"{part.likelihood.tracks.video}: {sentence}" for sentence in part.misfit.sentences]
+    return sentences

@@ -4,6 +4,15 @@ from vrdp_prob.inference.identifiability import BodyStatus, ParameterStatus, Sta
 from vrdp_prob.inference.infer import SAMPLERS, check_sampler, default_model, infer
 from vrdp_prob.inference.posterior import Posterior
 from vrdp_prob.inference.samples import Convergence
+from vrdp_prob.inference.several_videos import (
+    PredictiveDensity,
+    SharedFit,
+    SharedPosterior,
+    fit_together,
+    infer_together,
+    predictive_log_density,
+    sample_together,
+)
 from vrdp_prob.inference.summaries import ObjectSummary, PairSummary, ParameterSummary, Summary
 
 __all__ = [
@@ -15,9 +24,16 @@ __all__ = [
     "ParameterStatus",
     "ParameterSummary",
     "Posterior",
+    "PredictiveDensity",
+    "SharedFit",
+    "SharedPosterior",
     "Status",
     "Summary",
     "check_sampler",
     "default_model",
+    "fit_together",
     "infer",
+    "infer_together",
+    "predictive_log_density",
+    "sample_together",
 ]

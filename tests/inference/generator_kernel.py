@@ -1,3 +1,4 @@
+# ruff: noqa: PLR0912, PLR0917  compiled functions take plain arrays, and inlining is left to the reader of one loop
 """The integrator of `generator.py`, compiled: small steps, and bisection where two outlines begin to overlap.
 
 State of a body: x, y, vx, vy, angle, spin. SI units. Nothing of the simulator is used here.

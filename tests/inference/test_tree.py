@@ -1,5 +1,6 @@
 """What the groups of a posterior hold, and that ArviZ works on them."""
 
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
@@ -13,8 +14,13 @@ import xarray as xr
 from tests.inference.generator import Scene, observe
 from vrdp_prob.inference import Posterior, default_model, infer, tree
 from vrdp_prob.inference.map_fit import MapFit, fit_map
+from vrdp_prob.inference.predictive import replicated
 from vrdp_prob.inference.samples import Samples
 from vrdp_prob.inference.tree import PREDICTIVE_DRAWS, posterior_tree
+from vrdp_prob.models.model_error import ModelError
+from vrdp_prob.models.noise import NoiseFamily
+from vrdp_prob.models.unknowns import DEGREES_OF_FREEDOM
+from vrdp_prob.models.unknowns import NOISE as NOISE_SCALE
 from vrdp_prob.scene import Shape, Tracks
 
 NOISE = 0.005
@@ -91,6 +97,24 @@ def test_predicted_measurements_scatter_like_the_measured_ones() -> None:
     added = predicted.values.reshape(PREDICTIVE_DRAWS, *observed.shape) - fit().likelihood.predicted(chosen)[..., :2]
     assert added[:, seen].std() == pytest.approx(NOISE, rel=0.15)
     assert np.abs(predicted.values.mean(axis=(0, 1)) - observed.values)[seen].max() < 5 * NOISE
+
+
+def test_predicted_measurements_stray_as_the_model_error_and_have_the_tails_of_the_noise() -> None:
+    likelihood, point = fit().likelihood, torch.from_numpy(np.tile(fit().point, (2000, 1)))
+    exact, noise = likelihood.predicted(point[:1])[..., :2], likelihood.coordinates.quantities(point)[NOISE_SCALE][0, 0]
+    unit = float(noise) * likelihood.observations.position_reference
+    count, angles = len(likelihood.observations.frame), len(likelihood.observations.angle)
+    error = ModelError(3.0, 1.0, 0.5, np.ones(count), np.ones(angles))
+    strayed = replicated(likelihood.with_model_error(error), point, np.random.default_rng(0)) - exact
+    seen = strayed[:, :, 0] / unit
+    assert (seen**2).mean() == pytest.approx(1 + 9, rel=0.05)
+    correlation = (seen[:, 5] * seen[:, 10]).mean() / 9
+    assert correlation == pytest.approx(error.correlation(tracks().times)[5, 10], abs=0.05)
+    robust = replace(likelihood, noise=NoiseFamily.STUDENT_T)
+    degrees = float(likelihood.coordinates.quantities(point)[DEGREES_OF_FREEDOM][0, 0])
+    wide = replicated(robust, point, np.random.default_rng(0))[:, :, 0] - exact[:, :, 0]
+    share = (np.linalg.norm(wide, axis=-1) > 3 * unit).mean()
+    assert share == pytest.approx((1 + 9 / degrees) ** (-degrees / 2), rel=0.1)  # two-dimensional Student-t
 
 
 def test_the_installed_arviz_takes_the_result() -> None:

@@ -17,31 +17,51 @@ def replicated(
     Parameters
     ----------
     likelihood
-        The density, which knows how noise is spread.
+        The density, which knows how noise is spread, and how far the model may be off.
     points
         The worlds.
     generator
-        Draws the noise, and the model's error where there is one. Where a position was seen the noise has that
-        position's covariance, in gaps the one in the middle.
+        Draws the noise and the error of the model. Where a position was seen, noise has that position's covariance, in
+        gaps the one in the middle.
 
     Returns
     -------
     A position in every frame from the release on, NaN before.
     """
+    quantities, tracks = likelihood.coordinates.quantities(points), likelihood.tracks
     predicted = likelihood.predicted(points)[..., :2]
-    observations, tracks = likelihood.observations, likelihood.tracks
-    spread = np.broadcast_to(observations.position_reference * np.eye(2), (*tracks.seen.shape, 2, 2)).copy()
-    spread[observations.frame, observations.body] = np.linalg.inv(observations.whitening)
-    quantities = likelihood.coordinates.quantities(points)
-    normal = generator.standard_normal(predicted.shape)
+    errors = _noise(likelihood, generator.standard_normal(predicted.shape))
     if likelihood.noise is NoiseFamily.STUDENT_T:
         degrees = quantities[DEGREES_OF_FREEDOM].numpy()[:, :, None]
-        normal /= np.sqrt(generator.chisquare(degrees, predicted.shape[:-1]) / degrees)[..., None]
-    errors = np.einsum("tbij,ptbj->ptbi", spread, normal)
-    if likelihood.model_error is not None:
-        error = likelihood.model_error
-        root = np.linalg.cholesky(error.correlation(tracks.times) + 1e-10 * np.eye(len(tracks.times)))
-        straying = np.einsum("ts,psbj->ptbj", root, generator.standard_normal(predicted.shape))
-        errors += error.position * observations.position_reference * straying
+        chi_square = generator.chisquare(np.broadcast_to(degrees, predicted.shape[:3]))
+        errors = errors / np.sqrt(chi_square / degrees)[..., None]
+    errors = errors + _straying(likelihood, generator.standard_normal(predicted.shape))
     measured = predicted + quantities[NOISE].numpy()[:, None, :, None] * errors
     return np.where((tracks.times[:, None] >= tracks.first_seen - 1e-9)[..., None], measured, np.nan)
+
+
+def _noise(
+    likelihood: Likelihood, normal: Float[np.ndarray, "point time body 2"]
+) -> Float[np.ndarray, "point time body 2"]:
+    """Gaussian noise (m) at noise scale 1."""
+    observations, seen = likelihood.observations, likelihood.tracks.seen
+    spread = np.broadcast_to(observations.position_reference * np.eye(2), (*seen.shape, 2, 2)).copy()
+    spread[observations.frame, observations.body] = np.linalg.inv(observations.whitening)
+    error = likelihood.model_error
+    if error is not None:
+        spread[observations.frame, observations.body] *= np.sqrt(error.position_variance)[:, None, None]
+    drawn: np.ndarray = np.einsum("tbij,ptbj->ptbi", spread, normal)
+    return drawn
+
+
+def _straying(
+    likelihood: Likelihood, normal: Float[np.ndarray, "point time body 2"]
+) -> Float[np.ndarray, "point time body 2"]:
+    """Paths (m) along which bodies stray from the model, at noise scale 1."""
+    error = likelihood.model_error
+    if error is None:
+        return np.zeros_like(normal)
+    times = likelihood.tracks.times
+    root = np.linalg.cholesky(error.correlation(times) + 1e-9 * np.eye(len(times)))
+    paths: np.ndarray = np.einsum("ts,psbi->ptbi", root, normal)
+    return likelihood.observations.position_reference * error.position * paths

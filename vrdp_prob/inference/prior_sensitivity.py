@@ -16,13 +16,14 @@ from jaxtyping import Float
 from vrdp_prob.errors import InputError
 from vrdp_prob.inference.posterior import Posterior
 from vrdp_prob.models.parameters import MASS, RESTITUTION, ROLLING_RESISTANCE, SLIDING_FRICTION
+from vrdp_prob.models.unknowns import ANGLE_NOISE, DEGREES_OF_FREEDOM, NOISE
 
 THRESHOLD = 0.05
 """Sensitivity from which on a change of the prior (or the likelihood) counts; about a shift of the mean by 0.3 standard
 deviations where the logarithm of the power changes by 1."""
 POWERS = (0.99, 1.01)
 SHUFFLES = 20
-MOTION = frozenset({"position", "velocity", "angle", "spin", "angle_zero"})
+OTHERS = frozenset({"position", "velocity", "angle", "spin", "angle_zero", NOISE, ANGLE_NOISE, DEGREES_OF_FREEDOM})
 """Quantities whose priors say nothing of masses, restitutions and friction."""
 FRICTIONS = (SLIDING_FRICTION, ROLLING_RESISTANCE)
 
@@ -104,7 +105,7 @@ def prior_sensitivity(posterior: Posterior) -> tuple[Sensitivity, ...]:
         raise InputError("the posterior holds no log prior; run the inference again.")
     names = set(posterior.data["log_prior"].data_vars)
     total = _summed(posterior, names)
-    physics = _summed(posterior, {name for name in names if name not in MOTION and "noise" not in str(name)})
+    physics = _summed(posterior, names - OTHERS)
     likelihood = posterior.data["sample_stats"]["lp"].transpose("chain", "draw").values - total
     return tuple(
         Sensitivity(

@@ -1,8 +1,8 @@
 """Whether a fit is as probable as the truth, both under one likelihood that holds all unknowns.
 
 The fit's vector lacks what it took for unimportant (the velocity of a body at rest, mass and restitution of a body that
-meets nobody); these take the prior's mean, which is their default. In the truth, too, matter and yaw of bodies that meet
-nobody in either world take it: they say nothing about the tracks, and their true values would only cost the truth
+meets nobody); these take the prior's mean, which is their default. In the truth, too, matter and yaw of bodies that
+meet nobody in either world take it: they say nothing about the tracks, and their true values would only cost the truth
 probability and make the comparison easy.
 """
 

@@ -6,7 +6,15 @@ from functools import cached_property
 import numpy as np
 from jaxtyping import Bool, Float
 
-from vrdp_prob.inference.free_flight import LocalFit, SeenContact, noise_scale, release_fit, seen_contacts
+from vrdp_prob.inference.free_flight import (
+    Approach,
+    LocalFit,
+    SeenContact,
+    approaches,
+    noise_scale,
+    release_fit,
+    seen_contacts,
+)
 from vrdp_prob.inference.outliers import gross_outliers, without
 from vrdp_prob.models.noise import NoiseFamily
 from vrdp_prob.models.observation import prior_noise
@@ -61,6 +69,11 @@ class Clues:
     def contacts(self) -> tuple[SeenContact, ...]:
         """Contacts between bodies."""
         return seen_contacts(self.clean, self.noise)
+
+    @cached_property
+    def approaches(self) -> tuple[Approach, ...]:
+        """Times at which two bodies may touch."""
+        return approaches(self.clean, self.noise)
 
     @cached_property
     def moving(self) -> frozenset[int]:

@@ -64,6 +64,15 @@ class SeenContact:
     restitution: float
 
 
+@dataclass(frozen=True)
+class Approach:
+    """Two bodies, by index, that may touch at a time (s)."""
+
+    first: int
+    second: int
+    time: float
+
+
 def noise_scale(tracks: Tracks) -> float:
     """Standard deviation (m) of the positions, from third differences of neighbouring frames (kinks are outvoted)."""
     differences = np.diff(tracks.positions, n=3, axis=0)
@@ -134,7 +143,17 @@ def contact_distances(first: Body, second: Body) -> tuple[float, float] | None:
     return first.radius + second.radius, float(sum(reach))
 
 
-def _contacts_of_pair(tracks: Tracks, first: int, second: int, noise: float) -> list[SeenContact]:
+def approaches(tracks: Tracks, noise: float) -> tuple[Approach, ...]:
+    """Times at which two bodies come so near to each other that they may touch, in order of time."""
+    found = [
+        Approach(first, second, time)
+        for first, second in combinations(range(len(tracks.bodies)), 2)
+        for time in _approaches_of_pair(tracks, first, second, noise)
+    ]
+    return tuple(sorted(found, key=lambda approach: approach.time))
+
+
+def _approaches_of_pair(tracks: Tracks, first: int, second: int, noise: float) -> list[float]:
     limits = contact_distances(tracks.bodies[first], tracks.bodies[second])
     if limits is None:
         return []
@@ -142,16 +161,18 @@ def _contacts_of_pair(tracks: Tracks, first: int, second: int, noise: float) -> 
     difference = _interpolated(tracks, first) - _interpolated(tracks, second)
     distance = np.linalg.norm(difference, axis=1)
     step = float(np.median(np.diff(times)))
-    contacts = []
+    near = []
     for frame in _local_minima(distance):
         speed = np.linalg.norm(np.gradient(difference, times, axis=0)[max(frame - 2, 0) : frame + 3], axis=1)
         slack = 4 * noise + step * float(np.nanmax(speed, initial=0.0))
-        if distance[frame] > limits[1] + slack:
-            continue
-        contact = _judge(tracks, first, second, float(times[frame]), noise)
-        if contact is not None:
-            contacts.append(contact)
-    return _strongest_of_neighbours(contacts)
+        if distance[frame] <= limits[1] + slack:
+            near.append(float(times[frame]))
+    return near
+
+
+def _contacts_of_pair(tracks: Tracks, first: int, second: int, noise: float) -> list[SeenContact]:
+    judged = [_judge(tracks, first, second, time, noise) for time in _approaches_of_pair(tracks, first, second, noise)]
+    return _strongest_of_neighbours([contact for contact in judged if contact is not None])
 
 
 def _strongest_of_neighbours(contacts: list[SeenContact]) -> list[SeenContact]:

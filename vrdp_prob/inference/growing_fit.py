@@ -1,26 +1,33 @@
-"""A fit whose window grows in small steps, with fresh candidates where the video brings something new.
+"""Explanations of a video whose window grows in small steps.
 
-Growing matters more than the optimiser: a collision is only reached by a fit whose motion before it is right. At each
-window with something new (a contact, a body that enters, a fit that got worse) many candidate worlds are drawn from
-what is known so far, simulated in one batch, and the best are refined.
+Growing matters more than the optimiser: a collision is only reached by a fit whose motion before it is right. Where a
+window brings something new many candidate worlds are simulated in one batch and the best are refined; once a contact is
+some frames old, other explanations of it are tried. What remains nearly as good is followed on.
 """
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 import torch
 from jaxtyping import Bool, Float
 
+from vrdp_prob.inference.alternatives import Encounter, alternatives, suggest
+from vrdp_prob.inference.clues import Clues
+from vrdp_prob.inference.descent import Descent
 from vrdp_prob.inference.events import first_contacts
-from vrdp_prob.inference.free_flight import SeenContact
-from vrdp_prob.inference.least_squares import Minimum, minimise, robust_cost
-from vrdp_prob.inference.noise_fit import NOISE_FIELDS, best_noise
+from vrdp_prob.inference.free_flight import Approach
+from vrdp_prob.inference.hypothesis import Hypothesis, distances, turned_least, yaw_places
+from vrdp_prob.inference.least_squares import Minimum, robust_cost
+from vrdp_prob.inference.noise_fit import NOISE_FIELDS
+from vrdp_prob.inference.plan import FitPlan
 from vrdp_prob.inference.samples import Gaussian
 from vrdp_prob.models.likelihood import Likelihood
+from vrdp_prob.models.simulator.events import RolloutEventKind
 
-CANDIDATES = 128
+CANDIDATES = 64
 """Worlds drawn where a window brings something new."""
-REFINED = 3
+REFINED = 2
 """Candidates that are refined after that."""
 SPREADS = (0.3, 1.0, 2.0, 4.0)
 """Candidates are drawn from the Gaussian of the fit so far, wider by these factors."""
@@ -28,14 +35,35 @@ WIDEST = 2.0
 """...but no coordinate wanders further than so many prior standard deviations."""
 HUBER = 4.0
 """Residuals beyond it (in units of the noise) pull less while the fit is not finished."""
+QUIET = 1.15
+"""A window is taken as it comes while its new frames fit better than this (root mean square over the noise)..."""
+MOST_UNREFINED = 2
+"""...at most so often in a row."""
 WORSE = 1.3
-"""A window whose new frames fit worse than this (root mean square in units of the noise) gets fresh candidates."""
+"""A window whose new frames fit worse than this gets fresh candidates."""
 GOOD_FIT = 1.1
 """No further candidate is refined once the mean squared residual is below this (in units of the noise)."""
+FOLLOWED = 4
+"""Explanations that are followed at most."""
+NEARLY = 15.0
+"""...as long as they are not so many nats worse than the best."""
+SAME = 3.0
+"""Explanations that are no further apart (standard deviations) are the same."""
+SETTLED = 0.4
+"""Time (s) after a contact at which other explanations of it are tried."""
+SUSPICIOUS = 3.0
+"""The motion of a body needs another explanation if its squared residuals exceed their number by so many sd."""
+CONTACT_FIELDS = ("angle", "mass", "restitution")
+"""What of a body only contacts tell."""
+MOST_TRIED = 2
+"""Times that an approach is looked at."""
 
 
 class GrowingFit:
-    """State of a fit while its window grows.
+    """Explanations of the first frames, the best one first.
+
+    `doubtful` says whether it met a situation in which the search may well have gone astray: a motion that nothing
+    explained at first, or several open yaws at once.
 
     Parameters
     ----------
@@ -43,28 +71,34 @@ class GrowingFit:
         The density with everything that may matter among its unknowns.
     start
         First values: release states from local fits, the rest at the prior's mean.
-    contacts
-        Contacts seen in the tracks.
+    clues
+        What shows in the tracks.
     generator
         Source of the candidates.
+    plan
+        How starts are refined, and whether there are several.
     """
 
     def __init__(
         self,
         likelihood: Likelihood,
         start: Float[np.ndarray, "dimension"],
-        contacts: Sequence[SeenContact],
+        clues: Clues,
         generator: np.random.Generator,
+        plan: FitPlan,
     ) -> None:
-        self.likelihood, self.point = likelihood, start.copy()
-        self._contacts, self._generator = contacts, generator
+        self.likelihood, self._plan = likelihood, plan
+        self._descent = Descent(likelihood, plan.optimiser)
+        self._clues, self._generator = clues, generator
         self._coordinates = likelihood.coordinates
         self._noise_places = self._coordinates.mask(NOISE_FIELDS)
+        self._yaws = yaw_places(likelihood)
         self._idle_sd = self._coordinates.prior_sd.copy()
-        self._precision = np.diag(self._idle_sd**-2)
-        self._events: set[tuple[int, int]] = set()
+        self._tried: dict[Approach, int] = {}
+        self._turned: set[int] = set()
+        self.hypotheses = [Hypothesis(start, np.inf, np.diag(self._idle_sd**-2))]
+        self.doubtful = False
         self.evaluations = 0
-        self.converged = False
 
     def trust_release_fits(self, deviations: Mapping[int, tuple[float, float]]) -> None:
         """Take release positions (m) and velocities (m/s) as known that well until the window reaches the body."""
@@ -78,57 +112,106 @@ class GrowingFit:
                 place = self._coordinates.places.get((field, body))
                 if place is not None:
                     self._idle_sd[place] = sd
-        self._precision = np.diag(self._idle_sd**-2)
+        self.hypotheses = [replace(one, precision=np.diag(self._idle_sd**-2)) for one in self.hypotheses]
+
+    def fit_free_flight(self) -> None:
+        """Find release states and friction from the frames before the first contact of each body."""
+        tracks, observations = self.likelihood.tracks, self.likelihood.observations
+        until = np.array([self._clues.first_contact(body) for body in range(len(tracks.bodies))])
+        free = tracks.times[observations.frame] < until[observations.body]
+        turning = tracks.times[observations.angle_frame] < until[observations.angle_body]
+        weights = np.concatenate([np.repeat(free, 2), turning]).astype(float)
+        active = ~(self._noise_places | self._coordinates.mask(CONTACT_FIELDS))
+        (best,) = self.hypotheses
+        count = self.likelihood.residuals(best.point[None]).shape[1]
+        weights = np.concatenate([weights, np.ones(count - len(weights))])
+        (minimum,) = self._descent(best.point[None], active, weights=weights, iterations=10, threshold=HUBER)
+        self.evaluations += minimum.evaluations
+        if np.isfinite(minimum.cost):
+            self.hypotheses = [replace(best, point=minimum.point)]
 
     def grow(self, frame_count: int, previous: int) -> None:
-        """Fit the first frames, starting from the fit of fewer."""
+        """Explain the first frames, starting from what explains fewer."""
+        self.hypotheses = [one if one.earlier else one.noted(-np.inf) for one in self.hypotheses]
+        self._keep([self._followed(one, frame_count, previous) for one in self.hypotheses], frame_count)
+        if not self._plan.alternatives:
+            return
+        best = self.hypotheses[0]
+        for encounter in self._encounters(best, frame_count):
+            self.doubtful |= encounter.odd or len(yaw_places(self.likelihood, encounter.bodies)) > 1
+            active = self._active(frame_count, encounter.bodies)
+            found = alternatives(
+                self._descent,
+                best,
+                encounter,
+                frame_count,
+                active,
+                threshold=HUBER,
+                generator=self._generator,
+            )
+            self.evaluations += sum(one.evaluations for one in found)
+            others = [self._refined(best, one, active, frame_count) for one in found]
+            self._keep([*self.hypotheses, *others], frame_count)
+
+    def _keep(self, hypotheses: Sequence[Hypothesis], frame_count: int) -> None:
+        """Keep the best explanations that differ, with their yaws near zero."""
+        kept = merged(self.likelihood, hypotheses, frame_count)
+        end = float(self.likelihood.tracks.times[frame_count - 1])
+        self.hypotheses = [replace(one, point=turned_least(one.point, self._yaws)).noted(end) for one in kept]
+
+    def _followed(self, hypothesis: Hypothesis, frame_count: int, previous: int) -> Hypothesis:
+        """An explanation on a larger window; refined unless nothing has happened that it does not know."""
+        residuals = self.likelihood.residuals(hypothesis.point[None], frame_count)[0]
+        pairs = self._pairs(hypothesis.point, frame_count)
+        self.evaluations += 2
+        new = self._added(frame_count, previous)
+        added = residuals[: len(new)][new]
+        deviation = float(np.sqrt(np.mean(added**2))) if len(added) else 0.0
+        contact = self._contact_within(frame_count, previous)
+        entered = self._entered(frame_count, previous)
+        known = pairs == hypothesis.pairs and not contact and not entered
+        last = frame_count == len(self.likelihood.tracks.times)
+        if known and not last and deviation < QUIET and hypothesis.unrefined < MOST_UNREFINED:
+            cost = float(robust_cost(residuals, HUBER))
+            return replace(hypothesis, cost=cost, unrefined=hypothesis.unrefined + 1)
+        surprise = contact or bool(set(pairs) - set(hypothesis.pairs)) or not deviation <= WORSE
+        hypothesis = replace(hypothesis, pairs=pairs)
         active = self._active(frame_count)
-        candidates = self.point[None]
-        if self._news(frame_count, previous):
-            candidates = np.concatenate([candidates, self._candidates(active, previous, frame_count)])
-        self._refine(candidates, frame_count, active)
+        starts = hypothesis.point[None]
+        if surprise and self._plan.alternatives:
+            starts = np.concatenate([starts, self._candidates(hypothesis, active, previous, frame_count)])
+        return self._refine(hypothesis, starts, frame_count, active)
 
-    def finish(self, rounds: int = 4) -> None:
-        """Refine on all frames with plain least squares, the noise scale in turn with the rest."""
-        frame_count = len(self.likelihood.tracks.times)
-        for _ in range(rounds):
-            self.point = best_noise(self.likelihood, self.point)
-            before = self.point
-            active = self._active(frame_count)
-            self._refine(self.point[None], frame_count, active, iterations=12, threshold=None, tolerance=1e-3)
-            if np.abs((self.point - before) / self._coordinates.scale).max() < 1e-3:
-                break
-
-    def _active(self, frame_count: int) -> Bool[np.ndarray, "dimension"]:
+    def _active(self, frame_count: int, touched: frozenset[int] = frozenset()) -> Bool[np.ndarray, "dimension"]:
         """Coordinates that can matter in the first frames."""
         tracks = self.likelihood.tracks
         released = np.flatnonzero(tracks.seen[:frame_count].any(axis=0)).tolist()
         last = float(tracks.times[frame_count - 1])
-        seen = {body for contact in self._contacts if contact.time <= last for body in (contact.first, contact.second)}
-        touched = seen | {body for pair in self._events for body in pair}
-        owners = [entry.owner for entry in self._coordinates.entries]
-        fields = [entry.field for entry in self._coordinates.entries]
-        contact_fields = {"angle", "mass", "restitution"}
+        contacts = self._clues.contacts
+        seen = {body for contact in contacts if contact.time <= last for body in (contact.first, contact.second)}
+        met = {body for one in self.hypotheses for pair in one.pairs for body in pair}
+        meeting = seen | met | touched
         active = [
-            owner is None or field == "wall_restitution" or owner in (touched if field in contact_fields else released)
-            for owner, field in zip(owners, fields, strict=True)
+            entry.owner is None
+            or entry.field == "wall_restitution"
+            or entry.owner in (meeting if entry.field in CONTACT_FIELDS else released)
+            for entry in self._coordinates.entries
         ]
         return np.array(active, dtype=bool) & ~self._noise_places
 
-    def _news(self, frame_count: int, previous: int) -> bool:
-        """Whether the added frames bring something that the fit so far cannot know."""
-        tracks = self.likelihood.tracks
-        start, stop = float(tracks.times[max(previous - 3, 0)]), float(tracks.times[frame_count - 1])
-        if any(start <= contact.time <= stop for contact in self._contacts):
-            return True
-        pairs = self._pairs(frame_count)
-        if pairs - self._events:
-            self._events |= pairs
-            return True
-        residuals = self.likelihood.residuals(self.point[None], frame_count)[0]
-        new = self._added(frame_count, previous)
-        added = residuals[: len(new)][new]
-        return not np.isfinite(added).all() or (len(added) > 0 and float(np.sqrt(np.mean(added**2))) > WORSE)
+    def _contact_within(self, frame_count: int, previous: int) -> bool:
+        """Whether a contact shows in the tracks in the added frames or just before them."""
+        start, stop = self._span(frame_count, previous)
+        return any(start <= contact.time <= stop for contact in self._clues.contacts)
+
+    def _span(self, frame_count: int, previous: int) -> tuple[float, float]:
+        times = self.likelihood.tracks.times
+        return float(times[max(previous - 3, 0)]), float(times[frame_count - 1])
+
+    def _entered(self, frame_count: int, previous: int) -> bool:
+        """Whether a body is seen for the first time in the added frames."""
+        first = self.likelihood.tracks.seen.argmax(axis=0)
+        return bool(((first >= previous) & (first < frame_count)).any())
 
     def _added(self, frame_count: int, previous: int) -> Bool[np.ndarray, "residual"]:
         """Which position residuals of a window are new."""
@@ -136,83 +219,158 @@ class GrowingFit:
         return np.repeat(frames[frames < frame_count] >= previous, 2)
 
     def _candidates(
-        self, active: Bool[np.ndarray, "dimension"], previous: int, frame_count: int
+        self, hypothesis: Hypothesis, active: Bool[np.ndarray, "dimension"], previous: int, frame_count: int
     ) -> Float[np.ndarray, "candidate dimension"]:
         """Worlds drawn from what is known so far, half of them with the collisions that local fits suggest."""
         places = np.flatnonzero(active)
-        gaussian = Gaussian.from_precision(self.point[places], self._precision[np.ix_(places, places)])
+        gaussian = Gaussian.from_precision(hypothesis.point[places], hypothesis.precision[np.ix_(places, places)])
         normal = self._generator.standard_normal((CANDIDATES, len(places)))
         spreads = np.resize(np.array(SPREADS), CANDIDATES)[:, None]
         widest = WIDEST * self._coordinates.prior_sd[places]
-        moves = np.clip(spreads * (normal @ gaussian.root.T), -widest, widest)
-        candidates = np.tile(self.point, (CANDIDATES, 1))
-        candidates[:, places] += moves
-        tracks = self.likelihood.tracks
-        start, stop = float(tracks.times[max(previous - 3, 0)]), float(tracks.times[frame_count - 1])
-        for contact in self._contacts:
+        candidates = np.tile(hypothesis.point, (CANDIDATES, 1))
+        candidates[:, places] += np.clip(spreads * (normal @ gaussian.root.T), -widest, widest)
+        start, stop = self._span(frame_count, previous)
+        for contact in self._clues.contacts:
             if start <= contact.time <= stop:
-                self._suggest(candidates[::2], contact)
+                suggest(candidates[::2], contact, self.likelihood, 1 / np.diag(hypothesis.precision))
         return candidates
-
-    def _suggest(self, candidates: Float[np.ndarray, "candidate dimension"], contact: SeenContact) -> None:
-        """Move masses and restitutions of candidates towards what momentum balance says of a contact, in place."""
-        variance = 1 / np.diag(self._precision)
-        for field, sign, target in (
-            ("mass", -1.0, np.log(contact.mass_ratio)),
-            ("restitution", 1.0, np.log(contact.restitution)),
-        ):
-            first, second = (self._coordinates.places.get((field, body)) for body in (contact.first, contact.second))
-            if first is None or second is None:
-                continue
-            missing = target - (candidates[:, first] + sign * candidates[:, second])
-            share = variance[first] / (variance[first] + variance[second])
-            candidates[:, first] += share * missing
-            candidates[:, second] += sign * (1 - share) * missing
 
     def _refine(
         self,
+        hypothesis: Hypothesis,
         candidates: Float[np.ndarray, "candidate dimension"],
         frame_count: int,
         active: Bool[np.ndarray, "dimension"],
-        *,
-        iterations: int = 6,
-        threshold: float | None = HUBER,
-        tolerance: float = 0.05,
-    ) -> None:
-        """Refine the best candidates and keep the best result."""
-        chosen = candidates
+    ) -> Hypothesis:
+        """Refine the best candidates, the present values among them, and give the best result."""
+        order = [0]
         if len(candidates) > 1:
-            costs = robust_cost(self.likelihood.residuals(candidates, frame_count), threshold)
+            costs = robust_cost(self.likelihood.residuals(candidates, frame_count), HUBER)
             self.evaluations += len(candidates)
             order = np.argsort(costs)[:REFINED].tolist()
-            chosen = candidates[order if 0 in order else [*order, 0]]
+            order = order if 0 in order else [*order, 0]
         best: Minimum | None = None
-        for start in chosen:
-            minimum = minimise(
-                lambda points: self.likelihood.residuals(points, frame_count),
-                start,
-                self._coordinates.scale,
-                active=active,
-                iterations=iterations,
-                tolerance=tolerance,
-                threshold=threshold,
+        for start in candidates[order]:
+            (minimum,) = self._descent(
+                start[None], active, frame_count=frame_count, iterations=6, tolerance=0.05, threshold=HUBER
             )
             self.evaluations += minimum.evaluations
             if best is None or minimum.cost < best.cost:
                 best = minimum
             if best.cost < GOOD_FIT * len(best.jacobian) / 2:
                 break
-        if best is None or not np.isfinite(best.cost):
-            return
-        self.point, self.converged = best.point, best.converged
-        self._events |= self._pairs(frame_count)
-        self._precision = best.jacobian.T @ best.jacobian
-        diagonal = np.arange(len(active))
-        self._precision[diagonal, diagonal] = np.maximum(np.diag(self._precision), self._coordinates.prior_sd**-2)
-        idle = np.flatnonzero(~active)
-        self._precision[idle, idle] = self._idle_sd[idle] ** -2
+        assert best is not None  # there is at least one candidate
+        return self._refined(hypothesis, best, active, frame_count)
 
-    def _pairs(self, frame_count: int) -> set[tuple[int, int]]:
+    def _refined(
+        self, hypothesis: Hypothesis, minimum: Minimum, active: Bool[np.ndarray, "dimension"], frame_count: int
+    ) -> Hypothesis:
+        """The explanation at a minimum; the old one where the world failed."""
+        if not np.isfinite(minimum.cost):
+            return hypothesis
+        precision = minimum.jacobian.T @ minimum.jacobian
+        diagonal = np.arange(len(active))
+        precision[diagonal, diagonal] = np.maximum(np.diag(precision), self._coordinates.prior_sd**-2)
+        idle = np.flatnonzero(~active)
+        precision[idle, idle] = self._idle_sd[idle] ** -2
+        pairs = self._pairs(minimum.point, frame_count)
+        self.evaluations += 1
+        return Hypothesis(minimum.point, minimum.cost, precision, pairs, 0, hypothesis.earlier)
+
+    def _pairs(self, point: Float[np.ndarray, "dimension"], frame_count: int) -> tuple[tuple[int, int], ...]:
         with torch.no_grad():
-            rollout = self.likelihood.rollout(torch.from_numpy(self.point[None]), frame_count)
-        return set(first_contacts(rollout, 0))
+            rollout = self.likelihood.rollout(torch.from_numpy(point[None]), frame_count)
+        return first_contacts(rollout, 0)
+
+    def _encounters(self, hypothesis: Hypothesis, frame_count: int) -> list[Encounter]:
+        """Contacts that are old enough to be looked at, and that might be explained otherwise."""
+        times = self.likelihood.tracks.times
+        now = float(times[frame_count - 1])
+        due = now - SETTLED if frame_count < len(times) else now
+        ready = [one for one in self._clues.approaches if one.time <= due and self._tried.get(one, 0) < MOST_TRIED]
+        if not ready:
+            return []
+        contacts = self._contact_times(hypothesis, frame_count)
+        suspects = self._suspects(hypothesis, frame_count)
+        chosen = []
+        for one in ready:
+            pair = (one.first, one.second)
+            fresh = self._tried.get(one, 0) == 0
+            met = any(pair == (i, j) for _, i, j in contacts) or any(
+                pair == (seen.first, seen.second) for seen in self._clues.contacts
+            )
+            open_yaw = met and any(place not in self._turned for place in yaw_places(self.likelihood, pair))
+            odd = bool(suspects & set(pair)) and now - one.time < 3 * SETTLED
+            if (fresh and open_yaw) or odd:
+                chosen.append(one)
+            elif fresh and not suspects & set(pair) and now - one.time > 2 * SETTLED:
+                self._tried[one] = 1
+        for one in chosen:
+            self._tried[one] = self._tried.get(one, 0) + 1
+            self._turned.update(yaw_places(self.likelihood, (one.first, one.second)))
+        return [self._encounter(group, contacts, suspects) for group in _groups(chosen)]
+
+    def _encounter(
+        self, group: Sequence[Approach], contacts: Sequence[tuple[float, int, int]], suspects: set[int]
+    ) -> Encounter:
+        bodies = frozenset(body for one in group for body in (one.first, one.second))
+        begin = min(one.time for one in group)
+        seen = tuple(
+            contact
+            for contact in self._clues.contacts
+            if any((contact.first, contact.second) == (one.first, one.second) for one in group)
+            and contact.time >= begin - SETTLED / 2
+        )
+        first: dict[int, float] = {}
+        for time, i, j in contacts:
+            for body in {i, j} & bodies:
+                if time < begin - SETTLED / 2:
+                    first.setdefault(body, time)
+        return Encounter(bodies, begin, seen, first, odd=bool(suspects & bodies))
+
+    def _contact_times(self, hypothesis: Hypothesis, frame_count: int) -> list[tuple[float, int, int]]:
+        with torch.no_grad():
+            rollout = self.likelihood.rollout(torch.from_numpy(hypothesis.point[None]), frame_count)
+        events = rollout.events.of_kind(RolloutEventKind.COLLISION)
+        return sorted(zip(events.time.tolist(), events.first.tolist(), events.second.tolist(), strict=True))
+
+    def _suspects(self, hypothesis: Hypothesis, frame_count: int) -> set[int]:
+        """Bodies whose latest motion is not explained."""
+        residuals = self.likelihood.residuals(hypothesis.point[None], frame_count)[0]
+        self.evaluations += 1
+        observations = self.likelihood.observations.until(frame_count)
+        squares = (residuals[: 2 * len(observations.frame)].reshape(-1, 2) ** 2).sum(axis=1)
+        late = self.likelihood.tracks.times[observations.frame] > self._span(frame_count, frame_count)[1] - 2 * SETTLED
+        suspects = set()
+        for body in range(len(self.likelihood.tracks.bodies)):
+            chosen = squares[late & (observations.body == body)]
+            freedom = 2 * len(chosen)
+            if freedom and not chosen.sum() < freedom + SUSPICIOUS * np.sqrt(2 * freedom):
+                suspects.add(body)
+        return suspects
+
+
+def merged(
+    likelihood: Likelihood, hypotheses: Sequence[Hypothesis], frame_count: int | None = None
+) -> list[Hypothesis]:
+    """The best of some explanations that differ and are nearly as good as the best one."""
+    ordered = sorted((one for one in hypotheses if np.isfinite(one.cost)), key=lambda one: one.cost)
+    kept, left = ordered[:1] or list(hypotheses[:1]), ordered[1:]
+    left = [one for one in left if one.cost <= kept[0].cost + NEARLY]
+    while left and len(kept) < FOLLOWED:
+        points = np.array([one.point for one in left])
+        apart = distances(likelihood, kept[-1].point, kept[-1].precision, points, frame_count) > SAME
+        left = [one for one, far in zip(left, apart.tolist(), strict=True) if far]
+        kept += left[:1]
+        left = left[1:]
+    return kept
+
+
+def _groups(approaches: Sequence[Approach]) -> list[list[Approach]]:
+    """Approaches that share bodies together."""
+    groups: list[list[Approach]] = []
+    for one in approaches:
+        touching = [group for group in groups if any({one.first, one.second} & {o.first, o.second} for o in group)]
+        merged = [one, *(other for group in touching for other in group)]
+        groups = [*(group for group in groups if group not in touching), merged]
+    return groups

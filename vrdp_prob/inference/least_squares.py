@@ -4,11 +4,11 @@ The residuals come from a simulator whose event order may change under a step, s
 evaluated, and a world that fails counts as infinitely bad.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
 Residuals = Callable[[Float[np.ndarray, "point dimension"]], Float[np.ndarray, "point residual"]]
 """Residuals (unit variance) of a batch of points; a row that holds NaN marks a point that could not be simulated."""
@@ -92,13 +92,35 @@ def minimise(
     tolerance: float = 1e-3,
     threshold: float | None = None,
 ) -> Minimum:
-    """Lower half the sum of squared residuals from a start.
+    """Lower half the sum of squared residuals from one start; see `minimise_all`."""
+    return minimise_all(
+        residuals,
+        start[None],
+        scale,
+        active=active,
+        iterations=iterations,
+        tolerance=tolerance,
+        threshold=threshold,
+    )[0]
+
+
+def minimise_all(
+    residuals: Residuals,
+    starts: Float[np.ndarray, "start dimension"],
+    scale: Float[np.ndarray, "dimension"],
+    *,
+    active: np.ndarray | None = None,
+    iterations: int = 10,
+    tolerance: float = 1e-3,
+    threshold: float | None = None,
+) -> list[Minimum]:
+    """Lower half the sum of squared residuals from several starts side by side.
 
     Parameters
     ----------
     residuals
         Residuals of a batch of points, those of the prior included.
-    start
+    starts
         Where to begin.
     scale
         Typical size of each coordinate, for the difference steps and the damping.
@@ -107,41 +129,105 @@ def minimise(
     iterations
         At most so many accepted or refused rounds of trial steps.
     tolerance
-        Decrease of the cost (nats) below which the search has converged.
+        Decrease of the cost (nats) below which a search has converged.
     threshold
         Residuals beyond it count linearly (Huber), so that outliers and unfinished parts of a fit do not pull; None for
         plain least squares.
+
+    Returns
+    -------
+    Where each search ended, in the order of the starts.
     """
-    point, damping, evaluations, converged = start.copy(), 1e-2, 0, False
-    current, derivative = jacobian(residuals, point, scale, active=active)
-    cost = float(robust_cost(current, threshold))
-    evaluations += 1 + derivative.shape[1]
+    columns = np.flatnonzero(np.ones(len(scale), bool) if active is None else active)
+    searches = [_Search(start.copy(), row, threshold) for start, row in zip(starts, residuals(starts), strict=True)]
+    running = [search for search in searches if np.isfinite(search.cost)]
+    _differentiate(residuals, running, scale, columns)
     for _ in range(iterations):
-        if not np.isfinite(cost):
+        if not running:
             break
-        weight = _huber_weight(current, threshold)
-        gradient = derivative.T @ (weight * current)
+        trials = np.concatenate([search.trials(scale, columns) for search in running])
+        values = residuals(trials).reshape(len(running), len(DAMPINGS), -1)
+        moved = [
+            search
+            for search, points, rows in zip(
+                running, trials.reshape(len(running), len(DAMPINGS), -1), values, strict=True
+            )
+            if search.judge(points, rows, tolerance)
+        ]
+        _differentiate(residuals, moved, scale, columns)
+        running = [search for search in running if not search.converged]
+    return [search.minimum for search in searches]
+
+
+class _Search:
+    """One search that runs beside others."""
+
+    def __init__(
+        self, point: Float[np.ndarray, "dimension"], values: Float[np.ndarray, "residual"], threshold: float | None
+    ) -> None:
+        self.point, self.values, self._threshold = point, values, threshold
+        self.cost = float(robust_cost(values, threshold))
+        self.derivative = np.zeros((len(values), len(point)))
+        self.converged, self.evaluations, self._damping = False, 1, 1e-2
+
+    @property
+    def minimum(self) -> Minimum:
+        return Minimum(self.point, self.cost, self.derivative, self.converged, self.evaluations)
+
+    def trials(
+        self, scale: Float[np.ndarray, "dimension"], columns: Int[np.ndarray, "active"]
+    ) -> Float[np.ndarray, "trial dimension"]:
+        """Points that steps of different damping lead to."""
+        weight = _huber_weight(self.values, self._threshold)
+        derivative = self.derivative[:, columns]
+        gradient = derivative.T @ (weight * self.values)
         curvature = (derivative * weight[:, None]).T @ derivative
-        trial_dampings = np.clip(damping * DAMPINGS, SMALLEST_DAMPING, LARGEST_DAMPING)
-        trials = point + _steps(curvature, gradient, scale, trial_dampings)
-        costs = robust_cost(residuals(trials), threshold)
-        evaluations += len(trials)
+        points = np.tile(self.point, (len(DAMPINGS), 1))
+        points[:, columns] += _steps(curvature, gradient, scale[columns], self._dampings)
+        return points
+
+    @property
+    def _dampings(self) -> Float[np.ndarray, "trial"]:
+        return np.clip(self._damping * DAMPINGS, SMALLEST_DAMPING, LARGEST_DAMPING)
+
+    def judge(
+        self,
+        points: Float[np.ndarray, "trial dimension"],
+        values: Float[np.ndarray, "trial residual"],
+        tolerance: float,
+    ) -> bool:
+        """Take the best of the trials if it is better; whether it was."""
+        self.evaluations += len(points)
+        costs = robust_cost(values, self._threshold)
         best = int(np.argmin(costs))
-        if not costs[best] < cost:
-            damping *= 1e3
-            converged = damping > LARGEST_DAMPING / 1e2
-            if converged:
-                break
-            continue
-        decrease = cost - float(costs[best])
-        point, damping = trials[best], float(trial_dampings[best])
-        current, derivative = jacobian(residuals, point, scale, active=active)
-        cost = float(robust_cost(current, threshold))
-        evaluations += 1 + derivative.shape[1]
-        if decrease < tolerance:
-            converged = True
-            break
-    return Minimum(point, cost, derivative, converged, evaluations)
+        if not costs[best] < self.cost:
+            self._damping *= 1e3
+            self.converged = self._damping > LARGEST_DAMPING / 1e2
+            return False
+        self.converged = bool(self.cost - costs[best] < tolerance)
+        self._damping = float(self._dampings[best])
+        self.point, self.values, self.cost = points[best], values[best], float(costs[best])
+        return True
+
+
+def _differentiate(
+    residuals: Residuals,
+    searches: Sequence[_Search],
+    scale: Float[np.ndarray, "dimension"],
+    columns: Int[np.ndarray, "active"],
+) -> None:
+    """Derivatives of all searches by forward differences in one batch."""
+    if not searches:
+        return
+    steps = STEP * scale[columns]
+    moves = np.zeros((len(columns), len(scale)))
+    moves[np.arange(len(columns)), columns] = steps
+    values = residuals(np.concatenate([search.point + moves for search in searches]))
+    for search, rows in zip(searches, values.reshape(len(searches), len(columns), -1), strict=True):
+        difference = (rows - search.values) / steps[:, None]
+        search.derivative = np.zeros((rows.shape[1], len(scale)))
+        search.derivative[:, columns] = np.where(np.isfinite(difference), difference, 0.0).T
+        search.evaluations += len(columns)
 
 
 def _huber_weight(residuals: Float[np.ndarray, "residual"], threshold: float | None) -> Float[np.ndarray, "residual"]:
@@ -151,16 +237,16 @@ def _huber_weight(residuals: Float[np.ndarray, "residual"], threshold: float | N
 
 
 def _steps(
-    curvature: Float[np.ndarray, "dimension dimension"],
-    gradient: Float[np.ndarray, "dimension"],
-    scale: Float[np.ndarray, "dimension"],
+    curvature: Float[np.ndarray, "active active"],
+    gradient: Float[np.ndarray, "active"],
+    scale: Float[np.ndarray, "active"],
     dampings: Float[np.ndarray, "trial"],
-) -> Float[np.ndarray, "trial dimension"]:
+) -> Float[np.ndarray, "trial active"]:
     """Damped Gauss-Newton steps; the damping is relative to the curvature of each coordinate."""
     diagonal = np.maximum(np.diag(curvature), 1e-6 / scale**2)
     root = 1 / np.sqrt(diagonal)
     values, vectors = np.linalg.eigh(root[:, None] * curvature * root)
     rotated = vectors.T @ (root * gradient)
     scaled = rotated / (np.maximum(values, 0) + dampings[:, None])
-    steps: Float[np.ndarray, "trial dimension"] = -(scaled @ vectors.T) * root
+    steps: Float[np.ndarray, "trial active"] = -(scaled @ vectors.T) * root
     return steps

@@ -4,26 +4,25 @@ L-BFGS on the exact gradient and Levenberg-Marquardt on the residuals climb the 
 `docs/decisions/0020-map-by-growing-windows.md` for which is faster.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
-import torch
 from jaxtyping import Float
-from scipy.optimize import minimize as scipy_minimize
 
 from vrdp_prob.errors import InputError
 from vrdp_prob.inference.clues import Clues
-from vrdp_prob.inference.curved_gaussian import CurvedGaussian
-from vrdp_prob.inference.events import first_contacts
+from vrdp_prob.inference.descent import Descent
 from vrdp_prob.inference.free_flight import SeenContact
-from vrdp_prob.inference.growing_fit import GrowingFit
-from vrdp_prob.inference.least_squares import jacobian
+from vrdp_prob.inference.growing_fit import GrowingFit, merged
 from vrdp_prob.inference.misfit import Misfit, judge
 from vrdp_prob.inference.mode import Mode
+from vrdp_prob.inference.mode_search import ModeSearch
 from vrdp_prob.inference.model_error_fit import fit_model_error
-from vrdp_prob.inference.noise_fit import noise_curvature, noise_sd
-from vrdp_prob.inference.samples import Gaussian, evaluate
+from vrdp_prob.inference.modes import HOPELESS, carried, colliding, distinct_modes, without_idle
+from vrdp_prob.inference.noise_fit import noise_sd
+from vrdp_prob.inference.plan import FitPlan
+from vrdp_prob.inference.refinement import Refined, climb, refine
 from vrdp_prob.models.likelihood import Likelihood
 from vrdp_prob.models.noise import NoiseFamily
 from vrdp_prob.models.physics import PhysicsModel
@@ -31,8 +30,12 @@ from vrdp_prob.models.unknowns import NOISE, Structure, unknowns
 from vrdp_prob.progress import ProgressDisplay, SilentProgress
 from vrdp_prob.scene import Tracks
 
-WINDOW = 8
-"""Frames by which the window grows."""
+AGREED = 1.0
+"""Fits are grown anew until the two best agree to so many nats..."""
+MOST_ATTEMPTS, MOST_IF_BAD = 3, 5
+"""...but at most so many, or so many where none is as good as noise alone would make it..."""
+GOOD_COST = 1.15
+"""...give or take this factor."""
 MODEL_ERROR_ROUNDS = 2
 """Times that the model error and the fit are found in turn."""
 LBFGS_ITERATIONS = 30
@@ -50,6 +53,8 @@ class MapFit:
         Its modes that were found, best first; the first is the MAP.
     converged
         Whether the last refinement ended by itself.
+    search
+        How far other modes were looked for.
     contacts
         Contacts seen in the tracks by local fits.
     noise
@@ -63,6 +68,7 @@ class MapFit:
     likelihood: Likelihood
     modes: tuple[Mode, ...]
     converged: bool
+    search: ModeSearch
     contacts: tuple[SeenContact, ...]
     noise: float
     misfit: Misfit
@@ -83,11 +89,6 @@ class MapFit:
         """Log posterior at the MAP."""
         return self.modes[0].log_density
 
-    @cached_property
-    def gaussian(self) -> CurvedGaussian:
-        """Gaussian with the MAP as its mean and the Gauss-Newton covariance, bent as the posterior's ridges are."""
-        return CurvedGaussian.around(Gaussian.from_precision(self.point, self.precision), self.likelihood.residuals)
-
 
 def fit_map(
     tracks: Tracks,
@@ -96,7 +97,7 @@ def fit_map(
     progress: ProgressDisplay | None = None,
     *,
     noise: NoiseFamily | None = None,
-    climb: bool = True,
+    plan: FitPlan | None = None,
 ) -> MapFit:
     """Find the most probable values of a video.
 
@@ -112,8 +113,8 @@ def fit_map(
         Told how many windows are done.
     noise
         Distribution of the measurement errors; where None, Student-t if the tracks show gross outliers, else Gaussian.
-    climb
-        Whether L-BFGS on the exact log posterior follows the least squares.
+    plan
+        Stages and optimiser; `FitPlan()` where None.
 
     Raises
     ------
@@ -124,55 +125,87 @@ def fit_map(
     if not clues.moving and not clues.contacts:
         raise InputError(f"{tracks.video}: no object moves, so nothing can be inferred; give tracks with motion.")
     family = clues.noise_family if noise is None else noise
-    growing = _grow(clues, model, family, generator, progress)
-    pairs = _pairs(growing.likelihood, growing.point)
-    structure = Structure(moving=clues.moving, colliding=frozenset(body for pair in pairs for body in pair))
-    reduced = Likelihood(tracks, model, unknowns(tracks, model, structure, family), family)
-    final = GrowingFit(reduced, _carry(growing.likelihood, growing.point, reduced), clues.contacts, generator)
-    final.finish()
-    misfit = judge(reduced, final.point, clues.noise, int(clues.outliers.sum()))
-    evaluations = growing.evaluations + final.evaluations
+    stages = FitPlan() if plan is None else plan
+    task = _Task(clues, model, family, stages)
+    attempts = _attempts(task, generator, progress)
+    everything = attempts[0].likelihood
+    starts = [one.point for one in merged(everything, [one for fit in attempts for one in fit.hypotheses])]
+    structure = Structure(moving=clues.moving, colliding=colliding(everything, starts))
+    likelihood = Likelihood(tracks, model, unknowns(tracks, model, structure, family), family)
+    found = _refined(everything, starts, likelihood, stages)
+    misfit = judge(likelihood, found[0].point, clues.noise, int(clues.outliers.sum()))
+    evaluations = sum(one.evaluations for one in attempts) + sum(one.evaluations for one in found)
     for _ in range(MODEL_ERROR_ROUNDS):
-        error = fit_model_error(final.likelihood, final.point)
+        error = fit_model_error(likelihood, found[0].point)
         if error is None:
             break
-        coordinates = unknowns(tracks, model, structure)
-        widened = Likelihood(tracks, model, coordinates, NoiseFamily.GAUSSIAN, error)
-        final = GrowingFit(widened, _carry(final.likelihood, final.point, widened), clues.contacts, generator)
-        final.finish()
-        evaluations += final.evaluations
-        misfit = misfit.with_error(error, noise_sd(widened, final.point))
-    point, log_density, converged = _climb(final.likelihood, final.point, LBFGS_ITERATIONS if climb else 0)
-    _, derivative = jacobian(final.likelihood.residuals, point, final.likelihood.coordinates.scale, central=True)
-    precision = _with_noise(final.likelihood, point, derivative)
-    return MapFit(
-        final.likelihood,
-        (Mode(point, precision, log_density),),
-        final.converged or converged,
-        clues.contacts,
-        clues.noise,
-        misfit,
-        evaluations,
-    )
+        widened = Likelihood(tracks, model, unknowns(tracks, model, structure), NoiseFamily.GAUSSIAN, error)
+        found = _refined(likelihood, [one.point for one in found], widened, stages)
+        likelihood = widened
+        evaluations += sum(one.evaluations for one in found)
+        misfit = misfit.with_error(error, noise_sd(likelihood, found[0].point))
+    climbed = [climb(likelihood, mode, LBFGS_ITERATIONS) for mode in distinct_modes(likelihood, found)]
+    likelihood, modes = without_idle(likelihood, distinct_modes(likelihood, climbed), clues.moving)
+    converged = found[0].converged or max(climbed, key=lambda one: one.log_density).converged
+    search = ModeSearch(stages.alternatives, len(attempts), not _in_doubt(attempts))
+    return MapFit(likelihood, modes, converged, search, clues.contacts, clues.noise, misfit, evaluations)
 
 
-def _grow(
-    clues: Clues,
-    model: PhysicsModel,
-    noise: NoiseFamily,
-    generator: np.random.Generator,
-    progress: ProgressDisplay | None,
-) -> GrowingFit:
+def _refined(
+    source: Likelihood, starts: Sequence[Float[np.ndarray, "dimension"]], likelihood: Likelihood, plan: FitPlan
+) -> list[Refined]:
+    """What refinement makes of several starts, the best first; those without hope left out."""
+    descent = Descent(likelihood, plan.optimiser)
+    found = [refine(descent, carried(source, point, likelihood)) for point in starts]
+    found.sort(key=lambda one: -one.log_density)
+    return [one for one in found if one is found[0] or one.log_density > found[0].log_density - HOPELESS]
+
+
+@dataclass(frozen=True)
+class _Task:
+    """What is fitted, and how."""
+
+    clues: Clues
+    model: PhysicsModel
+    noise: NoiseFamily
+    plan: FitPlan
+
+
+def _attempts(task: _Task, generator: np.random.Generator, progress: ProgressDisplay | None) -> list[GrowingFit]:
+    """Fits that grow anew from other draws until no doubt is left."""
+    attempts = [_grow(task, generator, progress)]
+    while _in_doubt(attempts) and len(attempts) < (MOST_ATTEMPTS if _plausible(attempts) else MOST_IF_BAD):
+        attempts.append(_grow(task, generator, progress))
+    return attempts
+
+
+def _in_doubt(attempts: Sequence[GrowingFit]) -> bool:
+    """Whether a fit met what easily leads astray, and no two plausible fits agree on the best explanation."""
+    costs = sorted(one.hypotheses[0].cost for one in attempts)
+    agreed = len(costs) > 1 and costs[1] - costs[0] < AGREED and _plausible(attempts)
+    return any(one.doubtful for one in attempts) and not agreed
+
+
+def _plausible(attempts: Sequence[GrowingFit]) -> bool:
+    """Whether the best explanation is about as good as noise alone would make it."""
+    observations = attempts[0].likelihood.observations
+    expected = len(observations.frame) + len(observations.angle) / 2
+    return min(one.hypotheses[0].cost for one in attempts) < GOOD_COST * expected
+
+
+def _grow(task: _Task, generator: np.random.Generator, progress: ProgressDisplay | None) -> GrowingFit:
     """Fit windows that grow to the whole video, with everything that might matter among the unknowns."""
-    tracks = clues.tracks
+    clues, tracks, plan = task.clues, task.clues.tracks, task.plan
     everything = frozenset(body for body, one in enumerate(tracks.bodies) if one.radius is not None)
     structure = Structure(moving=clues.moving, colliding=everything)
-    likelihood = Likelihood(tracks, model, unknowns(tracks, model, structure, noise), noise)
-    growing = GrowingFit(likelihood, _start(likelihood, clues), clues.contacts, generator)
+    likelihood = Likelihood(tracks, task.model, unknowns(tracks, task.model, structure, task.noise), task.noise)
+    growing = GrowingFit(likelihood, _start(likelihood, clues), clues, generator, plan)
     growing.trust_release_fits(
         {body: (clues.noise, clues.release(body).velocity_sd) for body in range(len(tracks.bodies))}
     )
-    ends = _windows(tracks)
+    if plan.free_first:
+        growing.fit_free_flight()
+    ends = plan.ends(tracks)
     with (progress or SilentProgress()).stage("Fitting the motion (MAP)", total=len(ends)) as advance:
         previous = 0
         for end in ends:
@@ -180,14 +213,6 @@ def _grow(
             previous = end
             advance(1)
     return growing
-
-
-def _windows(tracks: Tracks) -> list[int]:
-    """Frame counts of the growing windows, the whole video last."""
-    count = len(tracks.times)
-    first = int(np.argmax(tracks.seen.any(axis=1)))
-    ends = list(range(first + WINDOW, count, WINDOW))
-    return [*ends, count]
 
 
 def _start(likelihood: Likelihood, clues: Clues) -> Float[np.ndarray, "dimension"]:
@@ -204,60 +229,3 @@ def _start(likelihood: Likelihood, clues: Clues) -> Float[np.ndarray, "dimension
                 start[place] = value
     start[coordinates.places[NOISE, None]] = np.log(clues.noise / likelihood.observations.position_reference)
     return start
-
-
-def _pairs(likelihood: Likelihood, point: Float[np.ndarray, "dimension"]) -> set[tuple[int, int]]:
-    """Pairs that collide at a point."""
-    with torch.no_grad():
-        return set(first_contacts(likelihood.rollout(torch.from_numpy(point[None])), 0))
-
-
-def _carry(
-    source: Likelihood, point: Float[np.ndarray, "dimension"], target: Likelihood
-) -> Float[np.ndarray, "target_dimension"]:
-    """The same values in the vector of another structure."""
-    places = source.coordinates.places
-    entries = target.coordinates.entries
-    return np.array([point[places[entry.field, entry.owner]] for entry in entries])
-
-
-def _climb(
-    likelihood: Likelihood, start: Float[np.ndarray, "dimension"], iterations: int
-) -> tuple[Float[np.ndarray, "dimension"], float, bool]:
-    """Climb the log posterior by L-BFGS in whitened coordinates; never ends lower than it began."""
-    if not iterations:
-        return start, float(evaluate(likelihood.log_density, start[None])[0]), False
-    _, derivative = jacobian(likelihood.residuals, start, likelihood.coordinates.scale)
-    gaussian = Gaussian.from_precision(start, _with_noise(likelihood, start, derivative))
-    mean, root = torch.from_numpy(gaussian.mean), torch.from_numpy(gaussian.root)
-
-    def descend(whitened: Float[np.ndarray, "dimension"]) -> tuple[float, Float[np.ndarray, "dimension"]]:
-        position = torch.from_numpy(whitened).requires_grad_()
-        value = -likelihood.log_density((mean + root @ position)[None])[0]
-        if not bool(torch.isfinite(value)):
-            return 1e30, np.zeros_like(whitened)
-        (gradient,) = torch.autograd.grad(value, position)
-        return float(value.detach()), np.nan_to_num(gradient.numpy())
-
-    before, _ = descend(np.zeros(len(start)))
-    result = scipy_minimize(
-        descend,
-        np.zeros(len(start)),
-        jac=True,
-        method="L-BFGS-B",
-        options={"maxiter": iterations, "maxcor": 20, "ftol": 1e-10},
-    )
-    if result.fun < before:
-        return gaussian.points(result.x), -float(result.fun), bool(result.success)
-    return start, -before, False
-
-
-def _with_noise(
-    likelihood: Likelihood, point: Float[np.ndarray, "dimension"], derivative: Float[np.ndarray, "residual dimension"]
-) -> Float[np.ndarray, "dimension dimension"]:
-    """Gauss-Newton curvature, with that of the noise scales in place of what the residuals say of them."""
-    precision = derivative.T @ derivative
-    places, curvature = noise_curvature(likelihood, point)
-    precision[places, :] = precision[:, places] = 0.0
-    precision[np.ix_(places, places)] = curvature
-    return precision

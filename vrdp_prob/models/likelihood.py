@@ -124,14 +124,19 @@ class Likelihood:
         Half their sum of squares is the negative log posterior, but for the terms of the noise scales.
         """
         with torch.no_grad():
-            vector = torch.from_numpy(np.ascontiguousarray(points))
-            quantities = self.coordinates.quantities(vector)
-            discrepancies, valid = self._discrepancies(quantities, frame_count)
-            data = self._independent(discrepancies, quantities)
-            prior = self.coordinates.prior_residuals(vector)
-            residuals = torch.cat([*(part.flatten(1) for part in data), prior], dim=1).numpy()
-        residuals[~valid] = np.nan
-        return residuals
+            residuals = self.differentiable_residuals(torch.from_numpy(np.ascontiguousarray(points)), frame_count)
+        return residuals.numpy()
+
+    def differentiable_residuals(
+        self, points: Float[Tensor, "point dimension"], frame_count: int | None = None
+    ) -> Float[Tensor, "point residual"]:
+        """The same residuals; gradients flow through the rows of worlds that do not fail."""
+        quantities = self.coordinates.quantities(points)
+        discrepancies, valid = self._discrepancies(quantities, frame_count)
+        data = self._independent(discrepancies, quantities)
+        prior = self.coordinates.prior_residuals(points)
+        residuals = torch.cat([*(part.flatten(1) for part in data), prior], dim=1)
+        return residuals.masked_fill(torch.from_numpy(~valid)[:, None], torch.nan)
 
     def log_density(self, points: Float[Tensor, "point dimension"]) -> Float[Tensor, "point"]:
         """Log posterior density (nats) in the vector's units; -inf where a world fails. Differentiable."""

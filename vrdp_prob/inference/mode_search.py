@@ -1,0 +1,34 @@
+"""What was done to find all modes of a posterior."""
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class ModeSearch:
+    """How far other modes than the best one were looked for.
+
+    Parameters
+    ----------
+    done
+        Whether alternatives were looked for at all.
+    attempts
+        Fits that were grown from scratch.
+    agreed
+        Whether there was no reason to doubt the best explanation, or two of the fits found it.
+    """
+
+    done: bool
+    attempts: int
+    agreed: bool
+
+    @property
+    def sentence(self) -> str:
+        """What the search does not cover, in plain words; empty where there is nothing to add."""
+        if not self.done:
+            return "Other explanations of the motion were not looked for."
+        if not self.agreed:
+            return (
+                f"Several contacts follow on each other so closely that {self.attempts} searches did not agree on the "
+                "most probable course of events; there may be a better explanation, or others as good."
+            )
+        return ""

@@ -1,0 +1,76 @@
+"""Which maxima of a posterior are modes of their own and count, in the unknowns that matter in at least one of them."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+import torch
+from jaxtyping import Float
+
+from vrdp_prob.inference.events import collision_sequences
+from vrdp_prob.inference.hypothesis import distances
+from vrdp_prob.inference.mode import Mode
+from vrdp_prob.inference.refinement import Refined, mode_at
+from vrdp_prob.inference.samples import evaluate
+from vrdp_prob.models.likelihood import Likelihood
+from vrdp_prob.models.noise import NoiseFamily
+from vrdp_prob.models.unknowns import Structure, unknowns
+
+LEAST_EVIDENCE = 7.0
+"""A mode whose Laplace evidence is more nats below the best one's is left out."""
+HOPELESS = LEAST_EVIDENCE + 8.0
+"""A maximum that is so many nats below the best one has no chance to get there by its volume."""
+APART = 2.0
+"""Maxima that are not further apart (standard deviations) are one mode."""
+
+
+def distinct_modes(likelihood: Likelihood, found: Sequence[Refined]) -> tuple[Mode, ...]:
+    """The modes among some maxima, best first."""
+    left = [mode_at(likelihood, one) for one in sorted(found, key=lambda one: -one.log_density)]
+    kept: list[Mode] = []
+    while left:
+        kept.append(left[0])
+        points = np.array([mode.point for mode in left])
+        apart = distances(likelihood, kept[-1].point, kept[-1].precision, points) > APART
+        left = [mode for mode, far in zip(left[1:], apart[1:].tolist(), strict=True) if far]
+    best = max(mode.log_evidence for mode in kept)
+    return tuple(mode for index, mode in enumerate(kept) if not index or mode.log_evidence > best - LEAST_EVIDENCE)
+
+
+def without_idle(
+    likelihood: Likelihood, modes: Sequence[Mode], moving: frozenset[int]
+) -> tuple[Likelihood, tuple[Mode, ...]]:
+    """The same modes without the unknowns of bodies that meet nobody in any of them."""
+    family = NoiseFamily.GAUSSIAN if likelihood.model_error is not None else likelihood.noise
+    structure = Structure(moving, colliding(likelihood, [mode.point for mode in modes]))
+    coordinates = unknowns(likelihood.tracks, likelihood.model, structure, family)
+    if len(coordinates) == len(likelihood.coordinates):
+        return likelihood, tuple(modes)
+    reduced = replace(likelihood, coordinates=coordinates)
+    places = [likelihood.coordinates.places[entry.field, entry.owner] for entry in coordinates.entries]
+    points = [mode.point[places] for mode in modes]
+    values = evaluate(reduced.log_density, np.array(points))
+    return reduced, tuple(
+        Mode(point, mode.precision[np.ix_(places, places)], float(value))
+        for mode, point, value in zip(modes, points, values, strict=True)
+    )
+
+
+def colliding(likelihood: Likelihood, points: Sequence[Float[np.ndarray, "dimension"]]) -> frozenset[int]:
+    """Bodies that meet another one at some of the points."""
+    with torch.no_grad():
+        sequences = collision_sequences(likelihood.rollout(torch.from_numpy(np.array(points))))
+    return frozenset(body for pairs in sequences for pair in pairs for body in pair)
+
+
+def carried(
+    source: Likelihood, point: Float[np.ndarray, "dimension"], target: Likelihood
+) -> Float[np.ndarray, "target_dimension"]:
+    """The same values in the vector of another structure; what it does not have stays at the mean of its prior."""
+    places = source.coordinates.places
+    return np.array(
+        [
+            point[places[entry.field, entry.owner]] if (entry.field, entry.owner) in places else entry.prior.mean
+            for entry in target.coordinates.entries
+        ]
+    )

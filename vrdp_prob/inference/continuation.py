@@ -29,7 +29,7 @@ PLACE_ERROR = 3.0
 
 
 def continued(
-    tracks: Tracks, model: PhysicsModel, worlds: Worlds, noise: float, generator: np.random.Generator
+    tracks: Tracks, model: PhysicsModel, worlds: Worlds, noise: float, generator: np.random.Generator | None
 ) -> Worlds:
     """The worlds released anew at the last frame of the video.
 
@@ -44,7 +44,7 @@ def continued(
     noise
         Standard deviation in m of the residuals.
     generator
-        Draws the error that remains.
+        Draws the error that remains; where None, worlds go on from the most probable states.
 
     Returns
     -------
@@ -74,7 +74,7 @@ def continued(
 
 
 def _corrections(
-    tracks: Tracks, rollout: Rollout, noise: float, generator: np.random.Generator
+    tracks: Tracks, rollout: Rollout, noise: float, generator: np.random.Generator | None
 ) -> tuple[Float[np.ndarray, "world body 2"], Float[np.ndarray, "world body 2"]]:
     """Draws of the errors of place (m) and velocity (m/s) at the last frame, by Bayesian straight lines."""
     times = tracks.times[-LAST_FRAMES:]
@@ -95,9 +95,9 @@ def _corrections(
     enough = (usable.sum(axis=1) >= FEWEST_FRAMES)[..., None]
     place_sd = np.sqrt(speed_precision / determinant)[..., None]
     slope = -(cross / speed_precision)[..., None]
-    place_noise = place_sd * generator.standard_normal(place.shape)
-    change_sd = np.sqrt(1 / speed_precision)[..., None]
-    change_noise = slope * place_noise + change_sd * generator.standard_normal(place.shape)
+    normal = np.zeros((2, *place.shape)) if generator is None else generator.standard_normal((2, *place.shape))
+    place_noise = place_sd * normal[0]
+    change_noise = slope * place_noise + np.sqrt(1 / speed_precision)[..., None] * normal[1]
     return np.where(enough, place + place_noise, 0.0), np.where(enough, change + change_noise, 0.0)
 
 

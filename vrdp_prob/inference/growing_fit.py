@@ -12,18 +12,17 @@ import numpy as np
 import torch
 from jaxtyping import Bool, Float
 
-from vrdp_prob.inference.alternatives import Encounter, alternatives, suggest
+from vrdp_prob.inference.alternatives import alternatives, suggest
 from vrdp_prob.inference.clues import Clues
 from vrdp_prob.inference.descent import Descent
+from vrdp_prob.inference.encounters import EncounterFinder
 from vrdp_prob.inference.events import first_contacts
-from vrdp_prob.inference.free_flight import Approach
 from vrdp_prob.inference.hypothesis import Hypothesis, distances, turned_least, yaw_places
 from vrdp_prob.inference.least_squares import Minimum, robust_cost
 from vrdp_prob.inference.noise_fit import NOISE_FIELDS
 from vrdp_prob.inference.plan import FitPlan
 from vrdp_prob.inference.samples import Gaussian
 from vrdp_prob.models.likelihood import Likelihood
-from vrdp_prob.models.simulator.events import RolloutEventKind
 
 CANDIDATES = 64
 """Worlds drawn where a window brings something new."""
@@ -49,14 +48,8 @@ NEARLY = 15.0
 """...as long as they are not so many nats worse than the best."""
 SAME = 3.0
 """Explanations that are no further apart (standard deviations) are the same."""
-SETTLED = 0.4
-"""Time (s) after a contact at which other explanations of it are tried."""
-SUSPICIOUS = 3.0
-"""The motion of a body needs another explanation if its squared residuals exceed their number by so many sd."""
 CONTACT_FIELDS = ("angle", "mass", "restitution")
 """What of a body only contacts tell."""
-MOST_TRIED = 2
-"""Times that an approach is looked at."""
 
 
 class GrowingFit:
@@ -94,8 +87,7 @@ class GrowingFit:
         self._noise_places = self._coordinates.mask(NOISE_FIELDS)
         self._yaws = yaw_places(likelihood)
         self._idle_sd = self._coordinates.prior_sd.copy()
-        self._tried: dict[Approach, int] = {}
-        self._turned: set[int] = set()
+        self._finder = EncounterFinder(likelihood, clues)
         self.hypotheses = [Hypothesis(start, np.inf, np.diag(self._idle_sd**-2))]
         self.doubtful = False
         self.evaluations = 0
@@ -137,7 +129,7 @@ class GrowingFit:
         if not self._plan.alternatives:
             return
         best = self.hypotheses[0]
-        for encounter in self._encounters(best, frame_count):
+        for encounter in self._finder.due(best, frame_count):
             self.doubtful |= encounter.odd or len(yaw_places(self.likelihood, encounter.bodies)) > 1
             active = self._active(frame_count, encounter.bodies)
             found = alternatives(
@@ -282,73 +274,6 @@ class GrowingFit:
             rollout = self.likelihood.rollout(torch.from_numpy(point[None]), frame_count)
         return first_contacts(rollout, 0)
 
-    def _encounters(self, hypothesis: Hypothesis, frame_count: int) -> list[Encounter]:
-        """Contacts that are old enough to be looked at, and that might be explained otherwise."""
-        times = self.likelihood.tracks.times
-        now = float(times[frame_count - 1])
-        due = now - SETTLED if frame_count < len(times) else now
-        ready = [one for one in self._clues.approaches if one.time <= due and self._tried.get(one, 0) < MOST_TRIED]
-        if not ready:
-            return []
-        contacts = self._contact_times(hypothesis, frame_count)
-        suspects = self._suspects(hypothesis, frame_count)
-        chosen = []
-        for one in ready:
-            pair = (one.first, one.second)
-            fresh = self._tried.get(one, 0) == 0
-            met = any(pair == (i, j) for _, i, j in contacts) or any(
-                pair == (seen.first, seen.second) for seen in self._clues.contacts
-            )
-            open_yaw = met and any(place not in self._turned for place in yaw_places(self.likelihood, pair))
-            odd = bool(suspects & set(pair)) and now - one.time < 3 * SETTLED
-            if (fresh and open_yaw) or odd:
-                chosen.append(one)
-            elif fresh and not suspects & set(pair) and now - one.time > 2 * SETTLED:
-                self._tried[one] = 1
-        for one in chosen:
-            self._tried[one] = self._tried.get(one, 0) + 1
-            self._turned.update(yaw_places(self.likelihood, (one.first, one.second)))
-        return [self._encounter(group, contacts, suspects) for group in _groups(chosen)]
-
-    def _encounter(
-        self, group: Sequence[Approach], contacts: Sequence[tuple[float, int, int]], suspects: set[int]
-    ) -> Encounter:
-        bodies = frozenset(body for one in group for body in (one.first, one.second))
-        begin = min(one.time for one in group)
-        seen = tuple(
-            contact
-            for contact in self._clues.contacts
-            if any((contact.first, contact.second) == (one.first, one.second) for one in group)
-            and contact.time >= begin - SETTLED / 2
-        )
-        first: dict[int, float] = {}
-        for time, i, j in contacts:
-            for body in {i, j} & bodies:
-                if time < begin - SETTLED / 2:
-                    first.setdefault(body, time)
-        return Encounter(bodies, begin, seen, first, odd=bool(suspects & bodies))
-
-    def _contact_times(self, hypothesis: Hypothesis, frame_count: int) -> list[tuple[float, int, int]]:
-        with torch.no_grad():
-            rollout = self.likelihood.rollout(torch.from_numpy(hypothesis.point[None]), frame_count)
-        events = rollout.events.of_kind(RolloutEventKind.COLLISION)
-        return sorted(zip(events.time.tolist(), events.first.tolist(), events.second.tolist(), strict=True))
-
-    def _suspects(self, hypothesis: Hypothesis, frame_count: int) -> set[int]:
-        """Bodies whose latest motion is not explained."""
-        residuals = self.likelihood.residuals(hypothesis.point[None], frame_count)[0]
-        self.evaluations += 1
-        observations = self.likelihood.observations.until(frame_count)
-        squares = (residuals[: 2 * len(observations.frame)].reshape(-1, 2) ** 2).sum(axis=1)
-        late = self.likelihood.tracks.times[observations.frame] > self._span(frame_count, frame_count)[1] - 2 * SETTLED
-        suspects = set()
-        for body in range(len(self.likelihood.tracks.bodies)):
-            chosen = squares[late & (observations.body == body)]
-            freedom = 2 * len(chosen)
-            if freedom and not chosen.sum() < freedom + SUSPICIOUS * np.sqrt(2 * freedom):
-                suspects.add(body)
-        return suspects
-
 
 def merged(
     likelihood: Likelihood, hypotheses: Sequence[Hypothesis], frame_count: int | None = None
@@ -364,13 +289,3 @@ def merged(
         kept += left[:1]
         left = left[1:]
     return kept
-
-
-def _groups(approaches: Sequence[Approach]) -> list[list[Approach]]:
-    """Approaches that share bodies together."""
-    groups: list[list[Approach]] = []
-    for one in approaches:
-        touching = [group for group in groups if any({one.first, one.second} & {o.first, o.second} for o in group)]
-        merged = [one, *(other for group in touching for other in group)]
-        groups = [*(group for group in groups if group not in touching), merged]
-    return groups

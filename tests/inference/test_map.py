@@ -1,5 +1,7 @@
 """The most probable values of random videos; the whole rate is in `benchmarks/map.py`."""
 
+from functools import cache
+
 import numpy as np
 import pytest
 
@@ -16,6 +18,7 @@ TOLERANCE = 3 * np.sqrt(GOAL * (1 - GOAL) / SCENES)
 """Three standard deviations of a rate of 99 % among 300: 1.7 points."""
 
 
+@cache
 def fitted(seed: int, plan: FitPlan | None = None) -> tuple[MapFit, Comparison]:
     truth = random_truth(seed)
     fit = fit_map(truth.tracks, default_model(), np.random.default_rng(0), plan=plan)
@@ -27,9 +30,6 @@ def fitted(seed: int, plan: FitPlan | None = None) -> tuple[MapFit, Comparison]:
     [
         pytest.param(4, id="one contact of spheres or cylinders"),
         pytest.param(13, id="two cubes, one hit"),
-        pytest.param(16, id="a contact that local fits miss"),
-        pytest.param(20, id="a cube hit right after the start"),
-        pytest.param(22, id="four contacts of three bodies"),
     ],
 )
 def test_the_map_is_as_probable_as_the_truth(seed: int) -> None:
@@ -40,10 +40,12 @@ def test_the_map_is_as_probable_as_the_truth(seed: int) -> None:
     assert list(fit.modes) == sorted(fit.modes, key=lambda mode: -mode.log_density)
 
 
-def test_one_start_takes_a_cube_for_turned_where_alternatives_find_its_yaw() -> None:
-    _, greedy = fitted(13, GROWING)
+def test_alternatives_find_a_contact_that_one_start_misses() -> None:
+    _, greedy = fitted(1, GROWING)
     assert not greedy.succeeded
-    assert "turned" in greedy.cause
+    assert greedy.cause == "collisions missed 0-1"
+    _, comparison = fitted(1)
+    assert comparison.succeeded
 
 
 def test_lbfgs_reaches_the_same_maximum_in_stages() -> None:

@@ -61,7 +61,7 @@ def grouped() -> xr.DataTree:
 
 @cache
 def posterior() -> Posterior:
-    return infer(tracks(), sampler="laplace", draws=300)
+    return infer(tracks(), sampler="laplace", draws=300, seed=1)
 
 
 def test_likelihood_and_prior_add_up_to_the_log_density() -> None:

@@ -13,7 +13,7 @@ from vrdp_prob.inference.samples import chain_statistics
 from vrdp_prob.inference.several_videos.arrow import ArrowGaussian, Expansion, Expansions, SharedExpansion
 from vrdp_prob.inference.several_videos.gibbs import sample_gibbs
 from vrdp_prob.inference.several_videos.importance import sample_by_importance
-from vrdp_prob.inference.several_videos.joint_fit import JointFit
+from vrdp_prob.inference.several_videos.joint_fit import JointFit, LocalMode
 from vrdp_prob.inference.several_videos.linking import LinkedVideo, SharedNumbers
 from vrdp_prob.inference.several_videos.slice_steps import Chains, slice_step
 from vrdp_prob.models.coordinates import Coordinate, Coordinates
@@ -64,7 +64,7 @@ def toy_fit(seen: np.ndarray) -> JointFit:
         locals_.append(local)
         expansions.append(expansion)
     prior = SharedExpansion(np.zeros(1), np.eye(1))
-    gaussian = Expansions(prior, tuple(expansions)).gaussian(shared, locals_)
+    gaussian = Expansions(prior, tuple(expansions)).gaussian(shared, locals_, numbers.logarithms)
     return JointFit(numbers, videos, gaussian, 0.0, converged=True)
 
 
@@ -106,7 +106,9 @@ def test_an_arrow_is_the_whole_matrix() -> None:
     own_step = expansions[1].local_step + expansions[1].slope @ arrow.shared_step
     assert own_step == pytest.approx(step[shared + 2 : shared + 6], rel=1e-6)
     assert arrow.expected_gain == pytest.approx(-gradient @ step / 2, rel=1e-6)
-    gaussian: ArrowGaussian = arrow.gaussian(np.zeros(shared), [np.zeros(own) for own in owns])
+    gaussian: ArrowGaussian = arrow.gaussian(
+        np.zeros(shared), [np.zeros(own) for own in owns], np.zeros(shared, dtype=bool)
+    )
     covariance = np.linalg.inv(whole)
     assert gaussian.root @ gaussian.root.T == pytest.approx(covariance[:shared, :shared], rel=1e-6)
     assert gaussian.log_volume == pytest.approx(-np.linalg.slogdet(whole)[1] / 2)
@@ -115,7 +117,7 @@ def test_an_arrow_is_the_whole_matrix() -> None:
 @pytest.mark.parametrize("count", [1, 5])
 def test_chains_have_the_marginal_of_the_product_of_all_videos(count: int) -> None:
     mean, sd, own, _ = by_quadrature(SEEN[:count])
-    draws = sample_gibbs(toy_fit(SEEN[:count]), generator=np.random.default_rng(1))
+    draws = sample_gibbs(toy_fit(SEEN[:count]), generator=np.random.default_rng(1), rounds=3)
     shared = draws.shared[..., 0]
     _, ess = chain_statistics(draws.shared)
     assert ess > 400
@@ -154,3 +156,61 @@ def test_slice_steps_leave_a_density_with_an_edge_as_it_is() -> None:
     later = np.concatenate(kept[10:])
     assert later.mean(axis=0) == pytest.approx([1.0, 0.0], abs=0.05)
     assert later.std(axis=0) == pytest.approx([1.0, 1.0], abs=0.05)
+
+
+def test_two_modes_of_a_video_are_visited_by_their_weight() -> None:
+    """The own number enters as a square, so that either sign will do; the prior tells them apart a little."""
+    seen, lean = np.array([2.0, 2.5]), 0.25
+    fit = square_fit(seen, lean)
+    shared, own = np.linspace(-4, 4, 801)[:, None], np.linspace(-6, 6, 2401)[None]
+    log_each = [-((own - lean) ** 2) / 2 - ((shared + own**2 - value) / SD) ** 2 / 2 for value in seen]
+    log_shared = -(shared[:, 0] ** 2) / 2 + sum(logsumexp(one, axis=1) for one in log_each)
+    weights = np.exp(log_shared - logsumexp(log_shared))
+    inner = np.exp(log_each[0] - logsumexp(log_each[0], axis=1, keepdims=True))
+    positive = float(weights @ inner[:, own[0] > 0].sum(axis=1))
+    mean = float(weights @ shared[:, 0])
+    assert 0.55 < positive < 0.85
+    draws = sample_gibbs(fit, generator=np.random.default_rng(2), rounds=3)
+    assert draws.locals[0].shape[1] > 500
+    sides = (draws.locals[0] > 0).astype(float)
+    assert sides.mean() == pytest.approx(positive, abs=4 * 0.5 / np.sqrt(chain_statistics(sides)[1]))
+    assert draws.shared.mean() == pytest.approx(mean, abs=4 * draws.shared.std() / np.sqrt(400))
+    weighted = sample_by_importance(fit, draws=2000, generator=np.random.default_rng(2))
+    assert (weighted.locals[0] > 0).mean() == pytest.approx(positive, abs=2 / np.sqrt(weighted.effective))
+
+
+@dataclass(frozen=True)
+class Square(Toy):
+    """A video that sees `shared + own^2`; the own number is expected at `lean`."""
+
+    lean: float = 0.0
+
+    def _residuals(self, points: np.ndarray) -> np.ndarray:
+        shared, own = points[:, 0], points[:, 1]
+        return np.stack([(shared + own**2 - self.seen) / SD, own - self.lean], axis=1)
+
+
+def square_fit(seen: np.ndarray, lean: float) -> JointFit:
+    fit = toy_fit(seen)
+    videos = tuple(
+        Square(one.likelihood, one.shared_columns, one.shared_places, one.offset, seen=float(value), lean=lean)
+        for one, value in zip(fit.videos, seen, strict=True)
+    )
+    expansions = {sign: [square_expansion(sign * np.sqrt(value)) for value in seen] for sign in (1, -1)}
+    prior, none = SharedExpansion(np.zeros(1), np.eye(1)), np.zeros(1, dtype=bool)
+    centres = [np.array([np.sqrt(value)]) for value in seen]
+    gaussian = Expansions(prior, tuple(expansions[1])).gaussian(np.zeros(1), centres, none)
+    modes = tuple(
+        (
+            LocalMode(expansions[1][k].around(centre, none), 0.0),
+            LocalMode(expansions[-1][k].around(-centre, none), -0.5),
+        )
+        for k, centre in enumerate(centres)
+    )
+    return JointFit(fit.numbers, videos, gaussian, 0.0, converged=True, alternatives=modes)
+
+
+def square_expansion(own: float) -> Expansion:
+    slope = 2 * own / SD
+    curvature = np.array([[slope**2 + 1]])
+    return Expansion(np.zeros(1), np.zeros(1), np.array([[SD**-2]]), np.array([[slope / SD]]), curvature)

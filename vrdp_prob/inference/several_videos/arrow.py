@@ -10,11 +10,12 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 from scipy.linalg import solve_triangular
 
 from vrdp_prob.inference.samples import Gaussian
 
+LARGEST_LOGARITHM = 5.0
 LOG_TWO_PI = float(np.log(2 * np.pi))
 
 
@@ -56,6 +57,10 @@ class Expansion:
         """How the best own numbers move with the shared ones."""
         return -self.local_root @ (self.local_root.T @ self.cross)
 
+    def around(self, local: Float[np.ndarray, "local"], logarithms: Bool[np.ndarray, "shared"]) -> "LocalGaussian":
+        """The Gaussian of the own numbers around a maximum at which they were expanded."""
+        return LocalGaussian(local, self.slope, self.local_root, logarithms)
+
     @cached_property
     def local_step(self) -> Float[np.ndarray, "local"]:
         """Newton step of the own numbers where the shared ones stay."""
@@ -81,6 +86,13 @@ class SharedExpansion:
     curvature: Float[np.ndarray, "shared shared"]
 
 
+def grown(
+    departure: Float[np.ndarray, "*batch shared"], logarithms: Bool[np.ndarray, "shared"]
+) -> Float[np.ndarray, "*batch shared"]:
+    """Departures as they act: that of a logarithm by its exponential, held finite far off."""
+    return np.where(logarithms, np.expm1(np.minimum(departure, LARGEST_LOGARITHM)), departure)
+
+
 @dataclass(frozen=True)
 class LocalGaussian:
     """A video's own numbers given the shared ones.
@@ -93,24 +105,28 @@ class LocalGaussian:
         How the mean moves with the shared numbers.
     root
         Lower-triangular Cholesky factor of the covariance.
+    logarithms
+        Which shared numbers are logarithms: what follows them does so in proportion to their exponential.
     """
 
     centre: Float[np.ndarray, "local"]
     slope: Float[np.ndarray, "local shared"]
     root: Float[np.ndarray, "local local"]
+    logarithms: Bool[np.ndarray, "shared"]
 
     def points(
         self, whitened: Float[np.ndarray, "*batch local"], departure: Float[np.ndarray, "*batch shared"]
     ) -> Float[np.ndarray, "*batch local"]:
         """Own numbers of standard normal coordinates, at a departure of the shared numbers from their mean."""
-        points: np.ndarray = self.centre + departure @ self.slope.T + whitened @ self.root.T
+        follows = grown(departure, self.logarithms) @ self.slope.T
+        points: np.ndarray = self.centre + follows + whitened @ self.root.T
         return points
 
     def whitened(
         self, points: Float[np.ndarray, "*batch local"], departure: Float[np.ndarray, "*batch shared"]
     ) -> Float[np.ndarray, "*batch local"]:
         """Standard normal coordinates of own numbers."""
-        away = points - self.centre - departure @ self.slope.T
+        away = points - self.centre - grown(departure, self.logarithms) @ self.slope.T
         flat = solve_triangular(self.root, away.reshape(-1, away.shape[-1]).T, lower=True).T
         return np.ascontiguousarray(flat).reshape(away.shape)
 
@@ -130,11 +146,14 @@ class ArrowGaussian:
         Mean of the shared numbers and Cholesky factor of their covariance.
     locals
         One Gaussian per video.
+    logarithms
+        Which shared numbers are logarithms.
     """
 
     mean: Float[np.ndarray, "shared"]
     root: Float[np.ndarray, "shared shared"]
     locals: tuple[LocalGaussian, ...]
+    logarithms: Bool[np.ndarray, "shared"]
 
     @property
     def sd(self) -> Float[np.ndarray, "shared"]:
@@ -212,13 +231,16 @@ class Expansions:
             pull = pull + one.reduced @ place - one.reduced_gradient
         return _solve(self.curvature, pull)
 
-    def gaussian(self, shared: Float[np.ndarray, "shared"], locals_: Sequence[Float[np.ndarray, "_"]]) -> ArrowGaussian:
+    def gaussian(
+        self,
+        shared: Float[np.ndarray, "shared"],
+        locals_: Sequence[Float[np.ndarray, "_"]],
+        logarithms: Bool[np.ndarray, "shared"],
+    ) -> ArrowGaussian:
         """The Gaussian around a maximum at which all were expanded."""
         root = Gaussian.from_precision(shared, self.curvature).root
-        blocks = (
-            LocalGaussian(local, one.slope, one.local_root) for local, one in zip(locals_, self.videos, strict=True)
-        )
-        return ArrowGaussian(shared, root, tuple(blocks))
+        blocks = (one.around(local, logarithms) for local, one in zip(locals_, self.videos, strict=True))
+        return ArrowGaussian(shared, root, tuple(blocks), logarithms)
 
 
 def _solve(

@@ -9,8 +9,9 @@ Bates and Watts (1980).
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
+from vrdp_prob.inference.least_squares import Residuals
 from vrdp_prob.inference.several_videos.arrow import ArrowGaussian, LocalGaussian
 from vrdp_prob.inference.several_videos.linking import LinkedVideo
 
@@ -23,6 +24,40 @@ STEP = 0.5
 BATCH = 200
 PROBES = 64
 """Places at which a bent map has to do better than a straight one."""
+
+
+@dataclass(frozen=True)
+class SecondDifferences:
+    """How residuals bend.
+
+    Parameters
+    ----------
+    first_derivative
+        Derivative along each coordinate.
+    second_derivative
+        Second derivative along each pair of coordinates.
+    first, second
+        The coordinates of each pair.
+    """
+
+    first_derivative: Float[np.ndarray, "coordinate residual"]
+    second_derivative: Float[np.ndarray, "pair residual"]
+    first: Int[np.ndarray, "pair"]
+    second: Int[np.ndarray, "pair"]
+
+    def displacement(
+        self, along: Float[np.ndarray, "moving residual"]
+    ) -> Float[np.ndarray, "coordinate coordinate moving"]:
+        """Displacement of some coordinates, per product of any two, that keeps the residuals small.
+
+        With J the derivative of the residuals along the moving coordinates, whitened so that J'J is the unit matrix,
+        and H their second derivative along the two, it is -J'H.
+        """
+        count = len(self.first_derivative)
+        tensor = np.zeros((count, count, len(along)))
+        values = np.nan_to_num(-(self.second_derivative @ along.T))
+        tensor[self.first, self.second] = tensor[self.second, self.first] = values
+        return tensor
 
 
 @dataclass(frozen=True)
@@ -73,21 +108,14 @@ class BentLocal:
         return displacement
 
 
-def bent_locals(
-    videos: tuple[LinkedVideo, ...], gaussian: ArrowGaussian, generator: np.random.Generator
-) -> tuple[BentLocal, ...]:
-    """The map of each video, bent along shared and own numbers, shared ones alone, or straight.
+def bent_local(
+    video: LinkedVideo, arrow: ArrowGaussian, local: LocalGaussian, generator: np.random.Generator
+) -> BentLocal:
+    """The map around a mode of a video, bent along shared and own numbers, shared ones alone, or straight.
 
     It is the one that is nearest to the density at random places.
     """
-    return tuple(
-        _best(video, gaussian, index, stream)
-        for index, (video, stream) in enumerate(zip(videos, generator.spawn(len(videos)), strict=True))
-    )
-
-
-def _best(video: LinkedVideo, arrow: ArrowGaussian, index: int, generator: np.random.Generator) -> BentLocal:
-    straight = BentLocal.straight(arrow.locals[index], arrow.root)
+    straight = BentLocal.straight(local, arrow.root)
     own, count = len(straight.axes), len(arrow.mean)
     tensor = _tensor(video, arrow, straight)
     directions, sizes, _ = np.linalg.svd(tensor[count:].reshape(own, -1), full_matrices=False)
@@ -95,14 +123,31 @@ def _best(video: LinkedVideo, arrow: ArrowGaussian, index: int, generator: np.ra
     shared, normal = generator.standard_normal((PROBES, count)), generator.standard_normal((PROBES, own))
     tried = [straight, *(_bent(straight, axes, tensor) for axes in (strongest[:, :0], strongest))]
     log_normal, points = (normal**2).sum(axis=1) / 2, arrow.shared_points(shared)
-    spreads = [_spread(video.log_density(points, one.points(normal, shared)) + log_normal) for one in tried]
+    spreads = [spread(video.log_density(points, one.points(normal, shared)) + log_normal) for one in tried]
     return tried[int(np.argmin(spreads))]
 
 
-def _spread(log_ratio: Float[np.ndarray, "place"]) -> float:
+def spread(log_ratio: Float[np.ndarray, "place"]) -> float:
     """How far the log of density over map differs from place to place; places without support count as far off."""
     low, high = np.quantile(np.maximum(log_ratio, log_ratio.max() - 1e6), [0.1, 0.9])
     return float(high - low)
+
+
+def second_differences(residuals: Residuals, count: int) -> SecondDifferences:
+    """First and second derivatives of residuals along whitened coordinates, at their origin."""
+    unit = np.eye(count)
+    first, second = np.triu_indices(count)
+    steps = np.concatenate([np.zeros((1, count)), STEP * unit, STEP * (unit[first] + unit[second])])
+    batches = [steps[begin : begin + BATCH] for begin in range(0, len(steps), BATCH)]
+    ahead, behind = (np.concatenate([residuals(sign * batch) for batch in batches]) for sign in (1.0, -1.0))
+    even = (ahead + behind) / 2
+    single, double = even[1 : count + 1], even[count + 1 :]
+    return SecondDifferences(
+        (ahead[1 : count + 1] - behind[1 : count + 1]) / (2 * STEP),
+        (double - single[first] - single[second] + even[0]) / STEP**2,
+        first,
+        second,
+    )
 
 
 def _bent(
@@ -118,29 +163,12 @@ def _bent(
 
 
 def _tensor(video: LinkedVideo, arrow: ArrowGaussian, straight: BentLocal) -> Float[np.ndarray, "all all local"]:
-    """Displacement, per product of two whitened coordinates (shared, then own), that keeps the residuals small.
-
-    With J the derivative of the residuals in own whitened coordinates, so that J'J is the unit matrix, and H their
-    second derivative along two directions, it is -J'H.
-    """
+    """Displacement, per product of two whitened coordinates (shared, then own), that keeps the residuals small."""
     shared, own = len(arrow.mean), len(straight.axes)
-    count = shared + own
-    unit = np.eye(count)
-    first, second = np.triu_indices(count)
-    steps = np.concatenate([np.zeros((1, count)), STEP * unit, STEP * (unit[first] + unit[second])])
 
     def residuals(places: Float[np.ndarray, "point all"]) -> Float[np.ndarray, "point residual"]:
-        points = video.points(
-            arrow.shared_points(places[:, :shared]), straight.points(places[:, shared:], places[:, :shared])
-        )
-        batches = (points[begin : begin + BATCH] for begin in range(0, len(points), BATCH))
-        return np.concatenate([video.data.residuals(batch) for batch in batches])
+        numbers = straight.points(places[:, shared:], places[:, :shared])
+        return video.data.residuals(video.points(arrow.shared_points(places[:, :shared]), numbers))
 
-    ahead, behind = residuals(steps), residuals(-steps)
-    derivative = (ahead[1 + shared : count + 1] - behind[1 + shared : count + 1]) / (2 * STEP)
-    even = (ahead + behind) / 2
-    single, double = even[1 : count + 1], even[count + 1 :]
-    mixed = (double - single[first] - single[second] + even[0]) / STEP**2
-    tensor = np.zeros((count, count, own))
-    tensor[first, second] = tensor[second, first] = np.nan_to_num(-(mixed @ derivative.T))
-    return tensor
+    found = second_differences(residuals, shared + own)
+    return found.displacement(found.first_derivative[shared:])

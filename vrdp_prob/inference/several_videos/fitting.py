@@ -17,7 +17,7 @@ from vrdp_prob.inference.misfit import judge
 from vrdp_prob.inference.mode import Mode
 from vrdp_prob.inference.model_error_fit import fit_model_error
 from vrdp_prob.inference.noise_fit import noise_sd
-from vrdp_prob.inference.several_videos.joint_fit import JointFit, climb, first_guess
+from vrdp_prob.inference.several_videos.joint_fit import JointFit, climb, first_guess, with_alternatives
 from vrdp_prob.inference.several_videos.linking import check_names, link
 from vrdp_prob.models.coordinates import Coordinates
 from vrdp_prob.models.likelihood import Likelihood
@@ -156,7 +156,19 @@ def fit_together(
     ]
     joint = climb(numbers, linked, *first_guess(numbers, linked, starts))
     names = None if shared is None else tuple(shared)
-    return _finished(joint, model, fits, structures, names, model_error=model_error)
+    found = _finished(joint, model, fits, structures, names, model_error=model_error)
+    return replace(found, joint=_with_modes(found.joint, fits))
+
+
+def _with_modes(joint: JointFit, fits: Sequence[MapFit]) -> JointFit:
+    """The joint fit with the further modes that the videos' own fits found."""
+    if all(len(fit.modes) == 1 for fit in fits):
+        return joint
+    starts = [
+        np.array([carried(fit.likelihood.coordinates, mode.point, video.likelihood.coordinates) for mode in fit.modes])
+        for fit, video in zip(fits, joint.videos, strict=True)
+    ]
+    return with_alternatives(joint, starts)
 
 
 def check_videos(videos: Sequence[Tracks]) -> None:

@@ -8,18 +8,20 @@ at a time (per thread).
 import os
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TypeVar
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
-from scipy.linalg import solve_triangular
+from scipy.special import logsumexp
 
 from vrdp_prob.inference.samples import ESS_GOAL, R_HAT_GOAL, chain_statistics
 from vrdp_prob.inference.several_videos.arrow import ArrowGaussian
-from vrdp_prob.inference.several_videos.bends import BentLocal, bent_locals
+from vrdp_prob.inference.several_videos.clouds import Clouds
 from vrdp_prob.inference.several_videos.joint_fit import JointFit
 from vrdp_prob.inference.several_videos.linking import LinkedVideo
+from vrdp_prob.inference.several_videos.shaping import Shape
+from vrdp_prob.inference.several_videos.shared_ridge import SharedRidge
 from vrdp_prob.inference.several_videos.slice_steps import Chains, reference_draws, slice_step
 from vrdp_prob.progress import ProgressDisplay, SilentProgress
 
@@ -38,10 +40,6 @@ MARGIN = 1.1
 """Effective draws asked of the chains per draw that is needed, since what is kept of them is thinned."""
 START_SPREADS = (1.0, 0.3, 0.1, 0.03, 0.01, 0.0)
 """Spreads of the starting places, in turn, until each chain has support."""
-FEWEST_PER_DIMENSION = 8.0
-"""A reference is shaped in equal parts by draws and as it was where there are so many effective draws per dimension."""
-DRAWS_PER_EFFECTIVE = 6.0
-"""Draws of a chain that are taken for one effective draw when references are shaped."""
 
 Result = TypeVar("Result")
 
@@ -99,68 +97,30 @@ def sample_gibbs(
     return sampler.draws()
 
 
-@dataclass(frozen=True)
-class _Shape:
-    """Affine map from a reference's coordinates to whitened ones, by which draws move and shape it.
+class _Video:
+    """Chains of one video's own numbers.
 
-    Parameters
-    ----------
-    shift, scale
-        Mean and Cholesky factor of the covariance.
-    along
-        Change of the mean with the whitened shared numbers (none for the shared numbers themselves).
+    Where there are several modes each chain carries the label of a cloud, and its target is the density times the share
+    that this cloud has in all clouds there: summed over labels that is the density.
     """
 
-    shift: Float[np.ndarray, "dimension"]
-    scale: Float[np.ndarray, "dimension dimension"]
-    along: Float[np.ndarray, "dimension shared"]
-
-    @classmethod
-    def unit(cls, dimension: int, shared: int) -> "_Shape":
-        return cls(np.zeros(dimension), np.eye(dimension), np.zeros((dimension, shared)))
-
-    @classmethod
-    def of(cls, draws: Float[np.ndarray, "draw dimension"], shared: Float[np.ndarray, "draw shared"]) -> "_Shape":
-        """Regression of draws on the whitened shared numbers, drawn towards the unit shape."""
-        columns = np.column_stack([np.ones(len(draws)), shared])
-        effective = len(draws) / DRAWS_PER_EFFECTIVE
-        share = effective / (effective + FEWEST_PER_DIMENSION * (draws.shape[1] + columns.shape[1] - 1))
-        coefficients = np.linalg.lstsq(columns, draws, rcond=None)[0]
-        rest = draws - columns @ coefficients
-        covariance = share * rest.T @ rest / len(rest) + (1 - share) * np.eye(draws.shape[1])
-        return cls(share * coefficients[0], np.linalg.cholesky(covariance), share * coefficients[1:].T)
-
-    def whitened(
-        self, places: Float[np.ndarray, "chain dimension"], shared: Float[np.ndarray, "chain shared"]
-    ) -> Float[np.ndarray, "chain dimension"]:
-        return self.shift + shared @ self.along.T + places @ self.scale.T
-
-    def places(
-        self, whitened: Float[np.ndarray, "chain dimension"], shared: Float[np.ndarray, "chain shared"]
-    ) -> Float[np.ndarray, "chain dimension"]:
-        away = whitened - self.shift - shared @ self.along.T
-        return np.ascontiguousarray(solve_triangular(self.scale, away.T, lower=True).T)
-
-
-class _Video:
-    """Chains of one video's own numbers."""
-
     def __init__(
-        self, video: LinkedVideo, bent: BentLocal, arrow: ArrowGaussian, generator: np.random.Generator
+        self, video: LinkedVideo, clouds: Clouds, arrow: ArrowGaussian, generator: np.random.Generator
     ) -> None:
-        self.video, self._bent, self._arrow, self._generator = video, bent, arrow, generator
-        dimension = len(bent.axes)
-        self._shape = _Shape.unit(dimension, len(arrow.mean))
-        self.chains = Chains(np.zeros((0, dimension)), np.zeros(0))
+        self.video, self._clouds, self._arrow, self._generator = video, clouds, arrow, generator
+        self._labels = np.zeros(0, dtype=np.int64)
+        self.chains = Chains(np.zeros((0, clouds.dimension)), np.zeros(0))
         self._pending = np.zeros(0)
-        self._kept: list[np.ndarray] = []
+        self._kept_labels: list[np.ndarray] = []
         self.points: list[np.ndarray] = []
         self.values: list[np.ndarray] = []
         self.looks = 0
 
     def start(self, shared: Float[np.ndarray, "chain shared"]) -> None:
-        """Places drawn around the mode, closer to it where there is no support."""
-        count, dimension = len(shared), len(self._bent.axes)
+        """Places drawn around the modes, closer to them where there is no support."""
+        count, dimension = len(shared), self._clouds.dimension
+        chances = np.exp(self._clouds.log_weights)
+        self._labels = self._generator.choice(len(chances), size=count, p=chances)
         draws = reference_draws(count, dimension, self._generator)
         places, values = np.zeros((count, dimension)), np.full(count, -np.inf)
         for spread in START_SPREADS:
@@ -168,46 +128,98 @@ class _Video:
             if not len(failed):
                 break
             places[failed] = spread * draws[failed]
-            values[failed] = self._log_density(places[failed], shared[failed])
+            values[failed] = self._target(failed, places[failed], shared[failed])
         self.chains, self._pending = Chains(places, values), values.copy()
 
     def carried(
         self, chosen: Int[np.ndarray, "chosen"], shared: Float[np.ndarray, "chosen shared"]
     ) -> Float[np.ndarray, "chosen"]:
-        """Log density where the shared numbers of some chains move and the own ones follow."""
-        self._pending[chosen] = self._log_density(self.chains.places[chosen], shared)
+        """Target where the shared numbers of some chains move and the own ones follow."""
+        self._pending[chosen] = self._target(chosen, self.chains.places[chosen], shared)
         return self._pending[chosen]
 
     def follow(self, moved: Bool[np.ndarray, "chain"]) -> None:
-        """The chains whose shared numbers have moved take over the density that was looked at last."""
+        """The chains whose shared numbers have moved take over the target that was looked at last."""
         self.chains.log_density = np.where(moved, self._pending, self.chains.log_density)
 
     def move(self, shared: Float[np.ndarray, "chain shared"]) -> None:
         """A few steps of the own numbers, then note where the chains are."""
         for _ in range(LOCAL_STEPS):
             slice_step(
-                self.chains,
-                lambda chosen, places: self._log_density(places, shared[chosen]),
-                self._generator,
+                self.chains, lambda chosen, places: self._target(chosen, places, shared[chosen]), self._generator
             )
-        self._kept.append(self._shape.whitened(self.chains.places, shared))
-        self.points.append(self._bent.points(self._kept[-1], shared))
-        self.values.append(self.chains.log_density.copy())
+        points = self._clouds.points(self.chains.places, shared, self._labels)
+        values = self.chains.log_density - self._log_share(points, shared, self._labels)
+        if len(self._clouds.clouds) > 1:
+            points, values = self._jumped(points, values, shared)
+            joint = self._clouds.log_joint(points, shared)
+            self._labels = np.argmax(joint + self._generator.gumbel(size=joint.shape), axis=0)
+            self._placed(points, values, shared)
+        self._kept_labels.append(self._labels)
+        self.points.append(points)
+        self.values.append(values)
 
     def reshape(self, shared: Float[np.ndarray, "draw shared"]) -> None:
-        """Shape the reference after the draws so far, which are then forgotten."""
-        latest = self._kept[-1]
-        self._shape = _Shape.of(np.concatenate(self._kept), shared)
-        self.chains.places = self._shape.places(latest, shared[-len(latest) :])
-        for series in (self._kept, self.points, self.values):
+        """Shape the clouds after the draws so far, which are then forgotten."""
+        points, labels = np.concatenate(self.points), np.concatenate(self._kept_labels)
+        clouds = []
+        for label, cloud in enumerate(self._clouds.clouds):
+            mine = labels == label
+            shape = Shape.of(cloud.bent.whitened(points[mine], shared[mine]), shared[mine])
+            clouds.append(replace(cloud, shape=shape))
+        self._clouds = replace(self._clouds, clouds=tuple(clouds))
+        latest = self.points[-1]
+        self._placed(latest, self.values[-1], shared[-len(latest) :])
+        for series in (self._kept_labels, self.points, self.values):
             series.clear()
 
-    def _log_density(
-        self, places: Float[np.ndarray, "chosen local"], shared: Float[np.ndarray, "chosen shared"]
+    def _jumped(
+        self,
+        points: Float[np.ndarray, "chain local"],
+        values: Float[np.ndarray, "chain"],
+        shared: Float[np.ndarray, "chain shared"],
+    ) -> tuple[Float[np.ndarray, "chain local"], Float[np.ndarray, "chain"]]:
+        """Proposals from all clouds that forget the place, where they are accepted."""
+        proposed, _ = self._clouds.draws(shared, self._generator)
+        self.looks += len(proposed)
+        ahead = self.video.log_density(self._arrow.shared_points(shared), proposed)
+        gain = ahead - values + self._clouds.log_density(points, shared) - self._clouds.log_density(proposed, shared)
+        accepted = np.log(self._generator.random(len(gain))) < gain
+        return np.where(accepted[:, None], proposed, points), np.where(accepted, ahead, values)
+
+    def _placed(
+        self,
+        points: Float[np.ndarray, "chain local"],
+        values: Float[np.ndarray, "chain"],
+        shared: Float[np.ndarray, "chain shared"],
+    ) -> None:
+        """Take over own numbers with their log density, in the clouds of the present labels."""
+        self.chains.places = self._clouds.places(points, shared, self._labels)
+        self.chains.log_density = values + self._log_share(points, shared, self._labels)
+
+    def _target(
+        self,
+        chosen: Int[np.ndarray, "chosen"],
+        places: Float[np.ndarray, "chosen local"],
+        shared: Float[np.ndarray, "chosen shared"],
     ) -> Float[np.ndarray, "chosen"]:
         self.looks += len(places)
-        own = self._bent.points(self._shape.whitened(places, shared), shared)
-        return self.video.log_density(self._arrow.shared_points(shared), own)
+        own = self._clouds.points(places, shared, self._labels[chosen])
+        value = self.video.log_density(self._arrow.shared_points(shared), own)
+        return value + self._log_share(own, shared, self._labels[chosen])
+
+    def _log_share(
+        self,
+        points: Float[np.ndarray, "chosen local"],
+        shared: Float[np.ndarray, "chosen shared"],
+        labels: Int[np.ndarray, "chosen"],
+    ) -> Float[np.ndarray, "chosen"]:
+        """Log of the share that the labelled cloud has in all clouds at some points."""
+        if len(self._clouds.clouds) == 1:
+            return np.zeros(len(points))
+        joint = self._clouds.log_joint(points, shared)
+        shares: np.ndarray = joint[labels, np.arange(len(points))] - logsumexp(joint, axis=0)
+        return shares
 
 
 class _Sampler:
@@ -216,20 +228,25 @@ class _Sampler:
     def __init__(self, fit: JointFit, generator: np.random.Generator) -> None:
         self._fit, self._arrow, self._generator = fit, fit.gaussian, generator
         streams = generator.spawn(len(fit.videos))
-        bent = bent_locals(fit.videos, fit.gaussian, generator)
+        clouds = [Clouds.of_fit(fit, index, stream) for index, stream in enumerate(streams)]
+        self._ridge = SharedRidge.of(fit, clouds, generator)
         self._videos = [
             _Video(video, one, fit.gaussian, stream)
-            for video, one, stream in zip(fit.videos, bent, streams, strict=True)
+            for video, one, stream in zip(fit.videos, clouds, streams, strict=True)
         ]
         self.workers = ThreadPoolExecutor(max_workers=min(len(fit.videos), os.cpu_count() or 1))
         count = GROUPS * CHAINS_PER_GROUP
-        self._shape = _Shape.unit(len(fit.numbers), 0)
-        self._chains = Chains(reference_draws(count, len(fit.numbers), generator), np.zeros(count))
+        self._shape = Shape.unit(len(fit.numbers), 0)
+        places = reference_draws(count, len(fit.numbers), generator)
+        outside = ~np.isfinite(self._ridge.whitened(places)[1])
+        places[outside] *= START_SPREADS[-2]
+        self._chains = Chains(places, np.zeros(count))
         self._nothing = np.zeros((count, 0))
         self._kept: list[np.ndarray] = []
+        self._straight: list[np.ndarray] = []
         shared = self._whitened(self._chains.places)
         self._each(lambda video: video.start(shared))
-        self._add_up(shared)
+        self._add_up()
 
     def sweep(self) -> None:
         """Move the shared numbers, then each video's own."""
@@ -240,16 +257,19 @@ class _Sampler:
         for video in self._videos:
             video.follow(moved)
         self._each(lambda video: video.move(shared))
-        self._add_up(shared)
+        self._add_up()
         self._kept.append(shared)
+        self._straight.append(self._shape.whitened(self._chains.places, self._nothing))
 
     def reshape(self) -> None:
         """Shape the references after the draws so far, which are then forgotten."""
-        draws, latest = np.concatenate(self._kept), self._kept[-1]
-        self._shape = _Shape.of(draws, draws[:, :0])
-        self._chains.places = self._shape.places(latest, self._nothing)
+        straight, draws = np.concatenate(self._straight), np.concatenate(self._kept)
+        self._shape = Shape.of(straight, straight[:, :0])
+        self._chains.places = self._shape.places(self._straight[-1], self._nothing)
         self._each(lambda video: video.reshape(draws))
+        self._add_up()
         self._kept.clear()
+        self._straight.clear()
 
     def converged(self) -> bool:
         """Whether all draws since the last reshaping meet the goals."""
@@ -274,19 +294,20 @@ class _Sampler:
         return [series for series in (self._kept, *(video.points for video in self._videos)) if series[0].shape[1]]
 
     def _whitened(self, places: Float[np.ndarray, "chain shared"]) -> Float[np.ndarray, "chain shared"]:
-        return self._shape.whitened(places, np.zeros((len(places), 0)))
+        return self._ridge.whitened(self._shape.whitened(places, np.zeros((len(places), 0))))[0]
 
     def _log_density(
         self, chosen: Int[np.ndarray, "chosen"], places: Float[np.ndarray, "chosen shared"]
     ) -> Float[np.ndarray, "chosen"]:
-        shared = self._whitened(places)
+        shared, log_volume = self._ridge.whitened(self._shape.whitened(places, self._nothing[chosen]))
         values = self._each(lambda video: video.carried(chosen, shared))
-        return self._log_prior(shared) + np.sum(values, axis=0)
+        return self._log_prior(shared) + log_volume + np.sum(values, axis=0)
 
-    def _add_up(self, shared: Float[np.ndarray, "chain shared"]) -> None:
+    def _add_up(self) -> None:
         """Log density of the whole at the present places."""
+        shared, log_volume = self._ridge.whitened(self._shape.whitened(self._chains.places, self._nothing))
         values = [video.chains.log_density for video in self._videos]
-        self._chains.log_density = self._log_prior(shared) + np.sum(values, axis=0)
+        self._chains.log_density = self._log_prior(shared) + log_volume + np.sum(values, axis=0)
 
     def _log_prior(self, shared: Float[np.ndarray, "chain shared"]) -> Float[np.ndarray, "chain"]:
         return self._fit.numbers.log_prior(self._arrow.shared_points(shared))

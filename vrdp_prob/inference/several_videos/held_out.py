@@ -9,11 +9,11 @@ from scipy.special import logsumexp
 from vrdp_prob.inference.laplace import effective_count, smoothed_weights
 from vrdp_prob.inference.map_fit import fit_map
 from vrdp_prob.inference.samples import PARETO_K_GOAL
-from vrdp_prob.inference.several_videos.arrow import ArrowGaussian, LocalGaussian
-from vrdp_prob.inference.several_videos.bends import bent_locals
+from vrdp_prob.inference.several_videos.arrow import ArrowGaussian
+from vrdp_prob.inference.several_videos.clouds import Clouds
 from vrdp_prob.inference.several_videos.fitting import carried, plain_likelihood, stream, structure_of
 from vrdp_prob.inference.several_videos.importance import resampled, weighted_locals
-from vrdp_prob.inference.several_videos.joint_fit import expand, settle
+from vrdp_prob.inference.several_videos.joint_fit import local_modes
 from vrdp_prob.inference.several_videos.linking import linked
 from vrdp_prob.inference.several_videos.posterior import SharedPosterior
 from vrdp_prob.progress import ProgressDisplay
@@ -82,13 +82,12 @@ def predictive_log_density(
     draws = posterior.points.reshape(-1, posterior.points.shape[-1])
     mean, root = draws.mean(axis=0), _root(draws)
     source, target = fit.likelihood.coordinates, video.likelihood.coordinates
-    own = settle(video, mean, [video.split(carried(source, one.point, target))[1] for one in fit.modes])
-    expansion = expand(video, mean, own, central=True)
-    local = LocalGaussian(own, expansion.slope, expansion.local_root)
-    arrow = ArrowGaussian(mean, root, (local,))
-    (bent,) = bent_locals((video,), arrow, generator)
+    starts = np.array([video.split(carried(source, one.point, target))[1] for one in fit.modes])
+    modes = local_modes(video, posterior.numbers, mean, starts)
+    arrow = ArrowGaussian(mean, root, (modes[0].gaussian,), posterior.numbers.logarithms)
+    clouds = Clouds.of(video, arrow, modes, generator)
     whitened = arrow.shared_whitened(draws)
-    centres = bent.points(np.zeros((len(draws), len(own))), whitened)
+    centres = clouds.centres(whitened)
     guesses = np.concatenate(
         [
             video.log_density(draws[begin : begin + BATCH], centres[begin : begin + BATCH])
@@ -98,7 +97,7 @@ def predictive_log_density(
     log_chance = FLATTENED * np.where(np.isfinite(guesses), guesses - guesses.max(), -1e3)
     log_chance -= logsumexp(log_chance)
     chosen = resampled(np.exp(log_chance), DRAWS, generator)
-    found = weighted_locals(video, bent, arrow, whitened[chosen], generator, tries=TRIES)
+    found = weighted_locals(video, clouds, arrow, whitened[chosen], generator, tries=TRIES)
     log_weight = found.log_evidence - log_chance[chosen] - np.log(len(draws))
     weights, pareto_k = smoothed_weights(log_weight)
     among_draws = np.exp(2 * log_chance / FLATTENED - 2 * logsumexp(log_chance / FLATTENED)).sum() * len(draws) - 1

@@ -14,10 +14,11 @@ from scipy.special import gammaln, logsumexp
 
 from vrdp_prob.inference.laplace import effective_count, smoothed_weights
 from vrdp_prob.inference.several_videos.arrow import ArrowGaussian
-from vrdp_prob.inference.several_videos.bends import BentLocal, bent_locals
+from vrdp_prob.inference.several_videos.clouds import Clouds
 from vrdp_prob.inference.several_videos.joint_fit import JointFit
 from vrdp_prob.inference.several_videos.linking import LinkedVideo
 from vrdp_prob.inference.several_videos.prior_mass import log_prior_constant
+from vrdp_prob.inference.several_videos.shared_ridge import SharedRidge
 from vrdp_prob.inference.several_videos.slice_steps import (
     DEGREES_OF_FREEDOM,
     reference_draws,
@@ -87,14 +88,15 @@ def sample_by_importance(
 ) -> WeightedDraws:
     """Draw shared numbers from the Gaussian of a fit and weigh them by what every video says."""
     count, dimension = OVERSAMPLING * draws, len(fit.numbers)
-    whitened = reference_draws(count, dimension, generator)
+    places = reference_draws(count, dimension, generator)
+    clouds = [Clouds.of_fit(fit, index, generator) for index in range(len(fit.videos))]
+    whitened, log_volume = SharedRidge.of(fit, clouds, generator).whitened(places)
     shared = fit.gaussian.shared_points(whitened)
-    log_ratio = fit.numbers.log_prior(shared) - reference_log_density(whitened)
-    maps = bent_locals(fit.videos, fit.gaussian, generator)
+    log_ratio = fit.numbers.log_prior(shared) + log_volume - reference_log_density(places)
     found = []
     with (progress or SilentProgress()).stage("Importance sampling", total=len(fit.videos)) as advance:
-        for video, bent in zip(fit.videos, maps, strict=True):
-            found.append(weighted_locals(video, bent, fit.gaussian, whitened, generator))
+        for video, around in zip(fit.videos, clouds, strict=True):
+            found.append(weighted_locals(video, around, fit.gaussian, whitened, generator))
             log_ratio = log_ratio + found[-1].log_evidence
             advance(1)
     weights, pareto_k = smoothed_weights(log_ratio)
@@ -114,7 +116,7 @@ def sample_by_importance(
 
 def weighted_locals(
     video: LinkedVideo,
-    bent: BentLocal,
+    clouds: Clouds,
     arrow: ArrowGaussian,
     shared: Float[np.ndarray, "draw shared"],
     generator: np.random.Generator,
@@ -122,18 +124,16 @@ def weighted_locals(
     tries: int = TRIES,
 ) -> WeightedLocals:
     """Own numbers of a video for draws of the whitened shared numbers, with the evidence that they estimate."""
-    count, dimension = len(shared), len(bent.axes)
-    places = reference_draws(count * tries, dimension, generator)
+    count = len(shared)
     repeated = np.repeat(shared, tries, axis=0)
-    points = bent.points(places, repeated)
+    points, _ = clouds.draws(repeated, generator)
     log_density = np.concatenate(
         [
             video.log_density(arrow.shared_points(repeated[begin : begin + BATCH]), points[begin : begin + BATCH])
             for begin in range(0, len(points), BATCH)
         ]
     )
-    constant = _log_constant(dimension) - bent.gaussian.log_volume
-    log_weight = (log_density - reference_log_density(places) - constant).reshape(count, tries)
+    log_weight = (log_density - clouds.log_density(points, repeated)).reshape(count, tries)
     entries = video.likelihood.coordinates.entries
     own_prior = log_prior_constant(entries[place] for place in video.local_places)
     noise = generator.gumbel(size=log_weight.shape)

@@ -6,7 +6,7 @@ whose events change their order under a step does not stop the others.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -21,6 +21,7 @@ from vrdp_prob.inference.several_videos.arrow import (
     ArrowGaussian,
     Expansion,
     Expansions,
+    LocalGaussian,
     SharedExpansion,
 )
 from vrdp_prob.inference.several_videos.linking import LinkedVideo, SharedNumbers
@@ -35,6 +36,26 @@ ROUNDS = 30
 TOLERANCE = 0.01
 """Gain (nats) of a step, expected or real, below which the search has converged."""
 LOCAL_ITERATIONS = 8
+SAME_MODE = 1.5
+"""Searches that end within so many standard deviations of each other have found the same mode."""
+HOPELESS = 12.0
+"""Modes whose weight (nats) is so much lower than the best one's are left out."""
+
+
+@dataclass(frozen=True)
+class LocalMode:
+    """A mode of a video's own numbers.
+
+    Parameters
+    ----------
+    gaussian
+        The Gaussian around it.
+    log_weight
+        Log of its weight by Laplace's approximation, where the heaviest mode has 0.
+    """
+
+    gaussian: LocalGaussian
+    log_weight: float
 
 
 @dataclass(frozen=True)
@@ -53,6 +74,8 @@ class JointFit:
         Log posterior (nats, up to the constants of the priors and of the data) there.
     converged
         Whether the last step gained next to nothing.
+    alternatives
+        Further modes of each video's own numbers, where the shared ones are at their mean.
     """
 
     numbers: SharedNumbers
@@ -60,6 +83,7 @@ class JointFit:
     gaussian: ArrowGaussian
     log_density: float
     converged: bool
+    alternatives: tuple[tuple[LocalMode, ...], ...] = ()
 
     @cached_property
     def log_evidence(self) -> float:
@@ -74,6 +98,10 @@ class JointFit:
             constants += log_prior_constant(entries[place] for place in video.local_places)
         gaussian = self.gaussian
         return self.log_density + constants + gaussian.dimension * LOG_TWO_PI / 2 + gaussian.log_volume
+
+    def modes(self, index: int) -> tuple[LocalMode, ...]:
+        """Modes of one video's own numbers, that of the fit first."""
+        return self.alternatives[index] if self.alternatives else (LocalMode(self.gaussian.locals[index], 0.0),)
 
     def precision(self, index: int) -> Float[np.ndarray, "dimension dimension"]:
         """Curvature of the negative log posterior of one video's vector, the other videos integrated out."""
@@ -152,7 +180,7 @@ def climb(
             break
     prior = expand_prior(numbers, state.shared)
     expansions = [expand(v, state.shared, x, central=True) for v, x in zip(videos, state.locals, strict=True)]
-    gaussian = Expansions(prior, tuple(expansions)).gaussian(state.shared, state.locals)
+    gaussian = Expansions(prior, tuple(expansions)).gaussian(state.shared, state.locals, numbers.logarithms)
     return JointFit(numbers, tuple(videos), gaussian, state.total(numbers), converged)
 
 
@@ -247,3 +275,32 @@ def settle(
         )
         found.append(video.split(minimum.point)[1])
     return found[int(np.argmax(video.log_density(np.tile(shared, (len(found), 1)), np.array(found))))]
+
+
+def with_alternatives(fit: JointFit, starts: Sequence[Float[np.ndarray, "start _"]]) -> JointFit:
+    """A fit with the further modes of each video's own numbers that are reached from some vectors of it."""
+    found = (
+        local_modes(video, fit.numbers, fit.gaussian.mean, video.split(points)[1], fit.gaussian.locals[index])
+        for index, (video, points) in enumerate(zip(fit.videos, starts, strict=True))
+    )
+    return replace(fit, alternatives=tuple(found))
+
+
+def local_modes(
+    video: LinkedVideo,
+    numbers: SharedNumbers,
+    shared: Float[np.ndarray, "shared"],
+    starts: Float[np.ndarray, "start local"],
+    first: LocalGaussian | None = None,
+) -> tuple[LocalMode, ...]:
+    """Modes of a video's own numbers for given shared ones: one that is known, and those reached from some starts."""
+    found = [] if first is None else [(first, video.value(shared, first.centre) + first.log_volume)]
+    nothing = np.zeros(len(shared))
+    for start in starts:
+        own = settle(video, shared, [start])
+        if any(np.abs(one.whitened(own, nothing)).max() < SAME_MODE for one, _ in found):
+            continue
+        gaussian = expand(video, shared, own, central=True).around(own, numbers.logarithms)
+        found.append((gaussian, video.value(shared, own) + gaussian.log_volume))
+    best = max(weight for _, weight in found)
+    return tuple(LocalMode(one, weight - best) for one, weight in found if weight > best - HOPELESS or one is first)

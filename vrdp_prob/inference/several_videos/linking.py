@@ -11,13 +11,13 @@ from functools import cached_property
 
 import numpy as np
 import torch
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 
 from vrdp_prob.errors import InputError
 from vrdp_prob.inference.samples import evaluate
 from vrdp_prob.models.coordinates import Coordinate, Coordinates
 from vrdp_prob.models.likelihood import Likelihood
-from vrdp_prob.models.parameters import WALL_RESTITUTION, Prior, Scope
+from vrdp_prob.models.parameters import WALL_RESTITUTION, Prior, Scope, Transform
 from vrdp_prob.models.physics import PhysicsModel
 from vrdp_prob.models.unknowns import ANGLE_NOISE, NOISE
 from vrdp_prob.scene import Tracks
@@ -57,6 +57,11 @@ class SharedNumbers:
     def names(self) -> tuple[str, ...]:
         """A name for each number."""
         return tuple(field + (f"({', '.join(f'{x:g}' for x in place)})" if place else "") for field, place in self.keys)
+
+    @cached_property
+    def logarithms(self) -> Bool[np.ndarray, "shared"]:
+        """Which of them are inferred as logarithms."""
+        return np.array([entry.transform is Transform.LOG for entry in self.entries], dtype=bool)
 
     @cached_property
     def _prior(self) -> Coordinates:

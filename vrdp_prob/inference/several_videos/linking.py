@@ -14,6 +14,7 @@ import torch
 from jaxtyping import Bool, Float, Int
 
 from vrdp_prob.errors import InputError
+from vrdp_prob.inference.noise_fit import NOISE_FIELDS
 from vrdp_prob.inference.samples import evaluate
 from vrdp_prob.models.coordinates import Coordinate, Coordinates
 from vrdp_prob.models.likelihood import Likelihood
@@ -97,7 +98,7 @@ class LinkedVideo:
     likelihood
         Its posterior density, priors as stated.
     shared_columns
-        Which of the shared numbers have a place in it; all but the restitutions of other videos' walls.
+        Which of the shared numbers have a place in it.
     shared_places
         Their places in its vector.
     offset
@@ -193,13 +194,16 @@ def link(
 
 
 def linked(likelihood: Likelihood, numbers: SharedNumbers) -> LinkedVideo:
-    """A video in terms of given shared numbers; parameters that do nothing in it are added to its vector."""
+    """A video in terms of given shared numbers; parameters that do nothing in it are added to its vector.
+
+    Walls of other videos are not, nor the noise where it was found together with a model error.
+    """
     coordinates = likelihood.coordinates
     places = {_key(entry, likelihood.tracks): place for place, entry in enumerate(coordinates.entries)}
     entries, columns, shared_places = list(coordinates.entries), [], []
     for column, (key, entry) in enumerate(zip(numbers.keys, numbers.entries, strict=True)):
         place = places.get(key)
-        if place is None and (key[1] or key[0] not in coordinates.defaults):
+        if place is None and (key[1] or key[0] in NOISE_FIELDS):
             continue
         if place is None:
             place = len(entries)

@@ -125,7 +125,7 @@ def test_files_that_are_no_posterior_are_refused(tmp_path: Path) -> None:
 
 def test_the_same_seed_gives_the_same_posterior() -> None:
     tracks = observe(chain(), noise=0.01, frames=30, seed=4)
-    first, second = (infer(tracks, sampler="laplace", draws=50, seed=7) for _ in range(2))
+    first, second = (infer(tracks, sampler="laplace", draws=50, seed=7, hand_on=False) for _ in range(2))
     np.testing.assert_array_equal(first.data["posterior"]["mass"], second.data["posterior"]["mass"])
 
 
@@ -135,7 +135,7 @@ def test_a_model_that_cannot_fit_is_told_first() -> None:
     swerved = tracks.positions.copy()
     swerved[:, 3, 1] += 0.4 * np.sin(4 * tracks.times)
     bent = Tracks.from_arrays("bent", tracks.bodies, tracks.times, swerved)
-    posterior = infer(bent, sampler="laplace", draws=50)
+    posterior = infer(bent, sampler="laplace", draws=50, hand_on=False)
     assert posterior.warnings[0].startswith("The model does not explain this motion")
     assert "object 3" in posterior.warnings[0]
     _, good = chain_posterior()
@@ -173,6 +173,6 @@ def test_a_body_that_drifts_less_than_its_stated_noise_is_at_rest_at_its_release
     stated = Tracks.from_arrays(
         "drift", tracks.bodies, tracks.times, positions, position_covariance=np.array(covariance)
     )
-    posterior = infer(stated, sampler="laplace", draws=50)
+    posterior = infer(stated, sampler="laplace", draws=50, hand_on=False)
     velocity = posterior.data["posterior"]["velocity"].values[..., resting, :]
     assert (velocity == 0).all()

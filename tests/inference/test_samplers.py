@@ -3,17 +3,19 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 import torch
-from scipy.stats import norm
 
+from tests.inference.densities import TwoModes
 from vrdp_prob.inference.curved_gaussian import CurvedGaussian
 from vrdp_prob.inference.emcee_sampler import sample_emcee
-from vrdp_prob.inference.laplace import sample_laplace, smoothed_weights
+from vrdp_prob.inference.laplace import sample_laplace
 from vrdp_prob.inference.mixture import Mixture
 from vrdp_prob.inference.nuts_sampler import sample_nuts
-from vrdp_prob.inference.samples import Gaussian, Samples, assess, chain_statistics
+from vrdp_prob.inference.samples import Gaussian, Samples, assess
 
 SAMPLERS = {"emcee": sample_emcee, "nuts": sample_nuts, "laplace": sample_laplace}
 DIMENSION = 6
+FEW = {"emcee": {"most_steps": 4}, "nuts": {"warm_up": 5, "most_gradients": 1, "processes": 1}, "laplace": {}}
+"""Options that make a sampler stop soon."""
 
 
 class SkewedRidge:
@@ -60,8 +62,7 @@ def test_the_same_seed_gives_the_same_draws(name: str) -> None:
     target = SkewedRidge()
 
     def draw(sampler: Callable[..., Samples]) -> np.ndarray:
-        options = {"rounds": 1} if name == "emcee" else {"warm_up": 20} if name == "nuts" else {}
-        return sampler(target, target.start, draws=40, generator=np.random.default_rng(3), **options).points
+        return sampler(target, target.start, draws=40, generator=np.random.default_rng(3), **FEW[name]).points
 
     assert (draw(SAMPLERS[name]) == draw(SAMPLERS[name])).all()
 
@@ -74,26 +75,24 @@ def test_chains_at_different_places_are_not_called_converged() -> None:
     assert "has not converged" in convergence.sentence
 
 
-def test_effective_size_of_an_autoregressive_chain_is_the_known_one() -> None:
-    generator = np.random.default_rng(0)
-    memory, draws = 0.9, 20000
-    noise = generator.standard_normal((4, draws))
-    chain = np.zeros((4, draws))
-    for step in range(1, draws):
-        chain[:, step] = memory * chain[:, step - 1] + noise[:, step]
-    _, ess = chain_statistics(chain[..., None])
-    assert ess == pytest.approx(4 * draws * (1 - memory) / (1 + memory), rel=0.15)
+def test_chains_in_processes_of_their_own_are_those_made_here() -> None:
+    target = TwoModes(0.5, dimension=2)
+    options = {"warm_up": 5, "most_gradients": 1, "draws": 40}
+    here, there = (
+        sample_nuts(target, target.start, generator=np.random.default_rng(3), processes=count, **options)
+        for count in (1, 2)
+    )
+    assert (here.points == there.points).all()
+    assert here.gradients == there.gradients
 
 
-def test_importance_weights_tell_a_good_proposal_from_a_bad_one() -> None:
-    draws = np.random.default_rng(0).standard_normal(4000)
-    weights, k_hat = smoothed_weights(norm.logpdf(draws, 0.1, 0.9) - norm.logpdf(draws))
-    assert k_hat < 0.5
-    assert float((weights * draws).sum()) == pytest.approx(0.1, abs=0.05)
-    _, k_hat = smoothed_weights(norm.logpdf(draws, 0, 3) - norm.logpdf(draws))
-    assert k_hat > 0.7
+def test_a_density_that_cannot_be_sent_is_sampled_here() -> None:
+    target = TwoModes(1.0, dimension=2)
+    start = Mixture.of(target.start.components[0])
+    options = {"warm_up": 5, "most_gradients": 1, "draws": 40, "processes": 2}
 
+    def within(points: torch.Tensor) -> torch.Tensor:
+        return target(points)
 
-def test_importance_weights_survive_worlds_without_support() -> None:
-    weights, _ = smoothed_weights(np.array([-np.inf, -np.inf, 0.0]))
-    assert weights.tolist() == [0, 0, 1]
+    samples = sample_nuts(within, start, generator=np.random.default_rng(3), **options)
+    assert samples.points.shape == (4, 50, 2)

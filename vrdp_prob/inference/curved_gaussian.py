@@ -9,6 +9,7 @@ Statistical Society B 42 (1980).
 """
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 import torch
@@ -85,6 +86,14 @@ class CurvedGaussian:
         bent, unbent = (robust_cost(residuals(one.points(ends)), None) for one in (self, straight))
         return bool((bent < unbent).all())
 
+    @cached_property
+    def _mean(self) -> Float[Tensor, "dimension"]:
+        return torch.from_numpy(self.gaussian.mean)
+
+    @cached_property
+    def _root(self) -> Float[Tensor, "dimension dimension"]:
+        return torch.from_numpy(self.gaussian.root.T.copy())
+
     @property
     def dimension(self) -> int:
         """Number of coordinates."""
@@ -98,9 +107,12 @@ class CurvedGaussian:
     def mapped(self, whitened: Float[Tensor, "*batch dimension"]) -> Float[Tensor, "*batch dimension"]:
         """Points of some standard normal coordinates; differentiable."""
         places = self.shift + whitened @ self.scale.T
-        along = places @ self.axes
-        bent = places + torch.einsum("...a,...b,abk->...k", along, along, self.bend) / 2
-        return torch.from_numpy(self.gaussian.mean) + bent @ torch.from_numpy(self.gaussian.root.T.copy())
+        if self.axes.shape[1]:
+            along = places @ self.axes
+            # einsum would take longer to think about the order of three factors than all the rest.
+            products = (along[..., :, None] * along[..., None, :]).flatten(-2)
+            places = places + products @ self.bend.flatten(0, 1) / 2
+        return self._mean + places @ self._root
 
     def points(self, whitened: Float[np.ndarray, "*batch dimension"]) -> Float[np.ndarray, "*batch dimension"]:
         """The same for arrays."""

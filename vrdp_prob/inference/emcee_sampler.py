@@ -10,39 +10,36 @@ Monte Carlo version of the genetic algorithm differential evolution, Statistics 
 """
 
 import os
+from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
 
-import emcee
 import numpy as np
 from jaxtyping import Float
-from numpy.random import RandomState
 
-from vrdp_prob.inference.curved_gaussian import CurvedGaussian
-from vrdp_prob.inference.hamiltonian_move import HamiltonianMove
-from vrdp_prob.inference.laplace import DEGREES_OF_FREEDOM, adapted, starting_places, tail_log_density
+from vrdp_prob.inference.checkpoint import Checkpoint, kept
+from vrdp_prob.inference.diagnostics import Reported, chain_statistics
+from vrdp_prob.inference.emcee_ensemble import Ensemble
 from vrdp_prob.inference.mixture import Mixture
-from vrdp_prob.inference.samples import (
-    ESS_GOAL,
-    R_HAT_GOAL,
-    LogDensity,
-    Samples,
-    chain_statistics,
-    evaluate,
-    evaluate_with_gradient,
-)
-from vrdp_prob.progress import ProgressDisplay, SilentProgress
+from vrdp_prob.inference.mode_weights import doubts, weights_from_chains
+from vrdp_prob.inference.samples import ESS_GOAL, R_HAT_GOAL, LogDensity, Samples
+from vrdp_prob.inference.shaping import Shaped, shaped, starting_places
+from vrdp_prob.models.simulator.work import metered, work_sentence
+from vrdp_prob.progress import Advance, ProgressDisplay, SilentProgress
 
 ENSEMBLES = 4
+FEWEST_WALKERS = 40
 WARM_UP = 16
 """Steps that tune the Hamiltonian move and are thrown away."""
-STEPS_PER_ROUND = 24
+ROUND = 16
+"""Steps after which the draws are judged and kept on disk."""
 STEPS_TOGETHER = 2
 """Steps after which the ensembles, one thread each, wait for one another, so that an interruption is soon noticed."""
-ROUNDS = 5
-"""Rounds after which sampling stops even if it has not converged; a number of steps and not a time, so that the same
-seed gives the same draws on every machine."""
-START_POOL = 16
-"""Importance-sampled candidates per walker from which the starting places are taken."""
+MOST_STEPS = 240
+WORK_LIMIT = 40_000_000
+"""Work (see `work.py` of the simulator) after which sampling stops; a minute on two cores of 2020. It is no time,
+so that the same seed gives the same draws on every machine."""
+MARGIN = 1.15
+"""Effective draws beyond the goal at which it stops, so that thinning does not fall short of it."""
 
 
 def sample_emcee(
@@ -52,7 +49,11 @@ def sample_emcee(
     draws: int,
     generator: np.random.Generator,
     progress: ProgressDisplay | None = None,
-    rounds: int = ROUNDS,
+    checkpoint: Checkpoint | None = None,
+    reported: Reported | None = None,
+    form: Shaped | None = None,
+    most_steps: int = MOST_STEPS,
+    work_limit: int = WORK_LIMIT,
 ) -> Samples:
     """Draw with several independent ensembles.
 
@@ -61,7 +62,7 @@ def sample_emcee(
     density
         The log posterior, differentiable.
     start
-        What is known of the posterior, from which the walkers set out.
+        A cloud per mode.
     draws
         Number of draws that are wanted over all ensembles; ensembles are run until they have converged, which gives
         more.
@@ -69,8 +70,14 @@ def sample_emcee(
         Source of randomness.
     progress
         Told how many steps are done.
-    rounds
-        At most so many rounds of 24 steps.
+    checkpoint
+        Where to keep what is done, and to go on from.
+    reported
+        Quantities that have to be known well enough; the coordinates where None.
+    form
+        The clouds in the posterior's shape, where that is known already.
+    most_steps, work_limit
+        Steps of every ensemble and work of all after which sampling stops even if it has not converged.
 
     Returns
     -------
@@ -78,86 +85,90 @@ def sample_emcee(
     The R-hat that goes with it compares the ensembles' earlier with their later steps.
     """
     del draws
-    cloud, adapting = adapted(density, start.components[0], generator, lambda _steps: None)
-    walkers = 2 * (cloud.dimension + 1)
-    ensembles = [_Ensemble(density, cloud, walkers, generator) for _ in range(ENSEMBLES)]
-    workers = ThreadPoolExecutor(max_workers=min(ENSEMBLES, os.cpu_count() or 1))
-    display = (progress or SilentProgress()).stage("Sampling (emcee)", total=WARM_UP + rounds * STEPS_PER_ROUND)
-    with workers, display as advance:
-
-        def run(steps: int, *, tune: bool) -> None:
-            for _ in range(steps // STEPS_TOGETHER):
-                list(workers.map(lambda ensemble: ensemble.run(STEPS_TOGETHER, tune=tune), ensembles))
-                advance(STEPS_TOGETHER)
-
-        run(WARM_UP, tune=True)
-        for _round in range(rounds):
-            run(STEPS_PER_ROUND, tune=False)
-            points = cloud.points(np.stack([ensemble.chain() for ensemble in ensembles]))
-            drift = _drift(points)
-            r_hat, ess = chain_statistics(_by_walker(points))
-            if max(r_hat, drift) <= R_HAT_GOAL and ess >= 1.25 * ESS_GOAL:
-                break
-    log_density = np.stack([ensemble.log_density() for ensemble in ensembles])
+    with metered() as meter:
+        form = form or _kept_form(density, start, generator, checkpoint)
+        walkers = max(2 * (start.dimension + 1), FEWEST_WALKERS)
+        ensembles = [
+            Ensemble(
+                density,
+                form.mixture,
+                starting_places(density, form, walkers, generator),
+                int(generator.integers(2**31)),
+                checkpoint.path(f"ensemble_{index}.h5") if checkpoint is not None else None,
+            )
+            for index in range(ENSEMBLES)
+        ]
+    with (progress or SilentProgress()).stage("Sampling (emcee)", total=WARM_UP + most_steps) as advance:
+        stopped = _run(ensembles, form.mixture, reported, advance, most_steps=most_steps, work_limit=work_limit)
+    points = _points(form.mixture, ensembles)
+    by_walker = _by_walker(points)
+    log_density = np.stack([ensemble.log_density(WARM_UP) for ensemble in ensembles])
     acceptance = [np.full(log_density[0].size, ensemble.acceptance) for ensemble in ensembles]
+    modes = weights_from_chains(form.mixture, by_walker)
     return Samples(
-        _by_walker(points),
+        by_walker,
         _by_walker(log_density[..., None])[..., 0],
         {"acceptance_rate": np.stack(acceptance)},
-        r_hat=drift,
-        evaluations=adapting + sum(ensemble.evaluations for ensemble in ensembles),
-        gradients=sum(ensemble.gradients for ensemble in ensembles),
+        r_hat=_drift(points, reported),
+        evaluations=form.evaluations + sum(ensemble.evaluations for ensemble in ensembles),
+        gradients=form.gradients + sum(ensemble.gradients for ensemble in ensembles),
+        work=meter.rows + sum(ensemble.work for ensemble in ensembles),
+        modes=modes,
+        notes=(*stopped, *doubts(modes)),
     )
 
 
-class _Ensemble:
-    """One emcee ensemble in whitened coordinates."""
+def _run(
+    ensembles: list[Ensemble],
+    mixture: Mixture,
+    reported: Reported | None,
+    advance: Advance,
+    *,
+    most_steps: int,
+    work_limit: int,
+) -> tuple[str, ...]:
+    """Run ensembles until they have converged, or say at which limit they have stopped."""
+    with ThreadPoolExecutor(max_workers=min(ENSEMBLES, os.cpu_count() or 1)) as workers:
 
-    def __init__(
-        self, density: LogDensity, start: CurvedGaussian, walkers: int, generator: np.random.Generator
-    ) -> None:
-        self._density, self._gaussian = density, start
-        self.evaluations, self.gradients = START_POOL * walkers, 0
-        moves = [
-            (HamiltonianMove(self._with_gradient), 0.4),
-            (emcee.moves.MHMove(_independent), 0.2),
-            (emcee.moves.DEMove(), 0.3),
-            (emcee.moves.DEMove(gamma0=1.0), 0.1),
-        ]
-        self._sampler = emcee.EnsembleSampler(
-            walkers, start.dimension, self._log_probability, moves=moves, vectorize=True
-        )
-        state = RandomState(int(generator.integers(2**31))).get_state()
-        places = starting_places(density, start, walkers, START_POOL * walkers, generator)
-        self._state = emcee.State(places, random_state=state)
+        def run_to(end: int, *, tune: bool) -> None:
+            while any(ensemble.steps < end for ensemble in ensembles):
+                behind = [ensemble for ensemble in ensembles if ensemble.steps < end]
+                list(workers.map(lambda one: one.run(min(STEPS_TOGETHER, end - one.steps), tune=tune), behind))
+                advance(STEPS_TOGETHER)
+            for ensemble in ensembles:
+                ensemble.keep()
 
-    def _log_probability(self, whitened: Float[np.ndarray, "walker dimension"]) -> Float[np.ndarray, "walker"]:
-        self.evaluations += len(whitened)
-        return evaluate(self._density, self._gaussian.points(whitened))
+        # Ensembles that were killed while they were kept may be a round apart.
+        done = max(ensemble.steps for ensemble in ensembles)
+        advance(done)
+        run_to(WARM_UP, tune=True)
+        end = max(WARM_UP + min(ROUND, most_steps), done)
+        while True:
+            run_to(end, tune=False)
+            points = _points(mixture, ensembles)
+            found = chain_statistics(_by_walker(points), reported)
+            r_hat = max(found.r_hat, _drift(points, reported))
+            if r_hat <= R_HAT_GOAL and min(found.ess_bulk, found.ess_tail) >= MARGIN * ESS_GOAL:
+                return ()
+            work = sum(ensemble.work for ensemble in ensembles)
+            if work >= work_limit:
+                return (work_sentence(work_limit),)
+            if end >= WARM_UP + most_steps:
+                return (f"It stopped after {most_steps} steps.",)
+            end = min(end + ROUND, WARM_UP + most_steps)
 
-    def _with_gradient(
-        self, whitened: Float[np.ndarray, "walker dimension"]
-    ) -> tuple[Float[np.ndarray, "walker"], Float[np.ndarray, "walker dimension"]]:
-        self.evaluations += len(whitened)
-        self.gradients += len(whitened)
-        return evaluate_with_gradient(lambda places: self._density(self._gaussian.mapped(places)), whitened)
 
-    def run(self, steps: int, *, tune: bool) -> None:
-        self._state = self._sampler.run_mcmc(
-            self._state, steps, tune=tune, skip_initial_state_check=True, progress=False
-        )
+def _kept_form(
+    density: LogDensity, start: Mixture, generator: np.random.Generator, checkpoint: Checkpoint | None
+) -> Shaped:
+    def compute() -> Mapping[str, np.ndarray]:
+        return shaped(density, start, generator, lambda _worlds: None).arrays()
 
-    @property
-    def acceptance(self) -> float:
-        return float(np.mean(self._sampler.acceptance_fraction))
+    return Shaped.of_arrays(kept(checkpoint, "form", generator, compute), start)
 
-    def chain(self) -> Float[np.ndarray, "step walker dimension"]:
-        steps: np.ndarray = self._sampler.get_chain(discard=WARM_UP)
-        return steps
 
-    def log_density(self) -> Float[np.ndarray, "step walker"]:
-        values: np.ndarray = self._sampler.get_log_prob(discard=WARM_UP)
-        return values
+def _points(mixture: Mixture, ensembles: list[Ensemble]) -> Float[np.ndarray, "chain step walker dimension"]:
+    return mixture.components[0].points(np.stack([ensemble.chain(WARM_UP) for ensemble in ensembles]))
 
 
 def _by_walker(values: Float[np.ndarray, "chain step walker axis"]) -> Float[np.ndarray, "chain draw axis"]:
@@ -165,19 +176,6 @@ def _by_walker(values: Float[np.ndarray, "chain step walker axis"]) -> Float[np.
     return np.swapaxes(values, 1, 2).reshape(len(values), -1, values.shape[-1])
 
 
-def _drift(points: Float[np.ndarray, "chain step walker dimension"]) -> float:
+def _drift(points: Float[np.ndarray, "chain step walker dimension"], reported: Reported | None) -> float:
     """Largest R-hat of the ensembles, each split into its earlier and its later steps."""
-    return chain_statistics(points.reshape(len(points), -1, points.shape[-1]))[0]
-
-
-def _independent(
-    places: Float[np.ndarray, "walker dimension"], random: RandomState
-) -> tuple[Float[np.ndarray, "walker dimension"], Float[np.ndarray, "walker"]]:
-    """Proposals that forget the place, from the Student-t around the MAP, with the log ratio of their densities.
-
-    Where the posterior is nearly Gaussian an accepted proposal is an independent draw; other moves serve the rest.
-    """
-    count, dimension = places.shape
-    chi_square = random.chisquare(DEGREES_OF_FREEDOM, size=count) / DEGREES_OF_FREEDOM
-    proposed = random.standard_normal((count, dimension)) / np.sqrt(chi_square)[:, None]
-    return proposed, tail_log_density(places) - tail_log_density(proposed)
+    return chain_statistics(points.reshape(len(points), -1, points.shape[-1]), reported).r_hat

@@ -37,22 +37,26 @@ class HamiltonianMove(emcee.moves.Move):  # type: ignore[misc]  # emcee has no t
     ----------
     density_and_gradient
         Log density of whitened coordinates with its gradient.
+    steps
+        Fewest and most leapfrog steps of a trajectory.
     """
 
-    def __init__(self, density_and_gradient: DensityAndGradient) -> None:
-        self._density_and_gradient = density_and_gradient
-        self._log_step = float(np.log(FIRST_STEP))
+    def __init__(
+        self, density_and_gradient: DensityAndGradient, steps: tuple[int, int] = (FEWEST_STEPS, MOST_STEPS)
+    ) -> None:
+        self._density_and_gradient, self._steps = density_and_gradient, steps
+        self.log_step = float(np.log(FIRST_STEP))
 
     @property
     def step(self) -> float:
         """Mean length of a leapfrog step."""
-        return float(np.exp(self._log_step))
+        return float(np.exp(self.log_step))
 
     def propose(self, model: Any, state: emcee.State) -> tuple[emcee.State, Bool[np.ndarray, "walker"]]:
         """Move every walker along a trajectory and accept or reject it by its error in energy."""
         walkers, dimension = state.coords.shape
         random = model.random
-        steps = random.randint(FEWEST_STEPS, MOST_STEPS + 1)
+        steps = random.randint(self._steps[0], self._steps[1] + 1)
         length = self.step * (1 + STEP_SPREAD * random.uniform(-1, 1, size=(walkers, 1)))
         place, momentum = state.coords.copy(), random.standard_normal((walkers, dimension))
         energy = (momentum**2).sum(axis=1) / 2 - state.log_prob
@@ -75,4 +79,4 @@ class HamiltonianMove(emcee.moves.Move):  # type: ignore[misc]  # emcee has no t
     def tune(self, state: emcee.State, accepted: Bool[np.ndarray, "walker"]) -> None:
         """Lengthen or shorten the steps towards the acceptance that is aimed at; called while warming up only."""
         del state
-        self._log_step += TUNING_RATE * (float(np.mean(accepted)) - ACCEPTANCE)
+        self.log_step += TUNING_RATE * (float(np.mean(accepted)) - ACCEPTANCE)

@@ -2,12 +2,15 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import torch
 from jaxtyping import Float
 
 from vrdp_prob.errors import InputError
+from vrdp_prob.inference.checkpoint import Checkpoint, fingerprint
+from vrdp_prob.inference.diagnostics import Reported
 from vrdp_prob.inference.emcee_sampler import sample_emcee
 from vrdp_prob.inference.events import collision_sequences, first_contacts, wall_contacts
 from vrdp_prob.inference.identifiability import BodyStatus, Status, identifiability
@@ -46,6 +49,8 @@ def infer(
     seed: int = 0,
     draws: int = 1000,
     progress: ProgressDisplay | None = None,
+    checkpoint: Path | str | None = None,
+    hand_on: bool = True,
 ) -> Posterior:
     """Infer masses, restitutions and motion from the tracks of one video.
 
@@ -54,8 +59,8 @@ def infer(
     tracks
         What was seen.
     sampler
-        `emcee` (ensembles of walkers), `nuts` (Hamiltonian, with gradients) or `laplace` (fast: a Gaussian around the
-        MAP, corrected by importance sampling).
+        `emcee` (ensembles of walkers), `nuts` (Hamiltonian, with gradients) or `laplace` (fast: clouds around the
+        modes, corrected by importance sampling).
     model
         The physics; `default_model()` where None.
     seed
@@ -64,6 +69,11 @@ def infer(
         Number of draws to keep.
     progress
         Told how far the work is.
+    checkpoint
+        Folder that keeps what the sampler has done. A run that was killed and is started again with the same
+        arguments goes on from there and ends with the same numbers.
+    hand_on
+        Whether emcee goes on where `laplace` finds that it cannot be trusted.
 
     Returns
     -------
@@ -72,7 +82,8 @@ def infer(
     Raises
     ------
     InputError
-        If the sampler is unknown, fewer than 4 draws are asked for, the seed is negative or no object moves.
+        If the sampler is unknown, fewer than 4 draws are asked for, the seed is negative, no object moves, or the
+        checkpoint belongs to another run.
     """
     check_sampler(sampler)
     if draws < 4:
@@ -80,16 +91,32 @@ def infer(
     if seed < 0:
         raise InputError(f"seed is {seed}; give a number that is not negative.")
     physics = default_model() if model is None else model
+    kept = None
+    if checkpoint is not None:
+        facts = fingerprint(tracks, physics, seed=seed, sampler=sampler, draws=draws, hand_on=hand_on)
+        kept = Checkpoint(checkpoint, facts)
     generator = np.random.default_rng(seed)
     fit = fit_map(tracks, physics, generator, progress)
+    reported = _reported(fit)
     samples = SAMPLERS[sampler](
         fit.likelihood.log_density,
         proposals(fit.modes, fit.likelihood.residuals),
         draws=draws,
         generator=generator,
         progress=progress,
+        checkpoint=kept,
+        reported=reported,
+        **({"hand_on": hand_on} if sampler == "laplace" else {}),
     )
-    return posterior_from(fit, samples.thinned(draws), assess(sampler, samples), seed=seed, generator=generator)
+    convergence = assess(sampler, samples, reported)
+    return posterior_from(fit, samples.thinned(draws), convergence, seed=seed, generator=generator)
+
+
+def _reported(fit: MapFit) -> Reported:
+    """What is read off the draws of a fit: all unknowns, and the ratios and products of pairs that collide."""
+    with torch.no_grad():
+        rollout = fit.likelihood.rollout(torch.from_numpy(fit.point[None]))
+    return Reported.of(fit.likelihood.coordinates, first_contacts(rollout, 0))
 
 
 def check_sampler(name: str) -> None:
@@ -171,6 +198,8 @@ def _warnings(
         )
     if not convergence.converged:
         sentences.append(convergence.sentence)
+    else:
+        sentences += convergence.notes
     default = [name for name, one in status.items() if one.mass.status is Status.DEFAULT]
     if default:
         subject = (

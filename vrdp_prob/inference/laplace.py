@@ -1,35 +1,31 @@
-"""The fast way: draws from a Gaussian or Student-t around the MAP, corrected by Pareto-smoothed importance sampling.
+"""The fast way: draws from curved clouds around the modes, corrected by Pareto-smoothed importance sampling.
 
-Source: Vehtari, Simpson, Gelman, Yao and Gabry, Pareto smoothed importance sampling, JMLR 25 (2024).
+Where the weights cannot be trusted it says so and hands on to emcee, which sets out from what it has learned.
 """
 
+from dataclasses import replace
+
 import numpy as np
-from arviz_stats.base.array import array_stats
-from jaxtyping import Float
-from scipy.special import gammaln
 
-from vrdp_prob.inference.curved_gaussian import CurvedGaussian
+from vrdp_prob.inference.checkpoint import Checkpoint
+from vrdp_prob.inference.diagnostics import Reported, weighted_statistics
+from vrdp_prob.inference.emcee_sampler import sample_emcee
+from vrdp_prob.inference.importance import Weighted, effective_count, flattened, resampled, smoothed_weights
 from vrdp_prob.inference.mixture import Mixture
-from vrdp_prob.inference.samples import LogDensity, Samples, evaluate
-from vrdp_prob.progress import Advance, ProgressDisplay, SilentProgress
+from vrdp_prob.inference.mode_weights import doubts, weights_from_importance
+from vrdp_prob.inference.samples import ESS_GOAL, PARETO_K_GOAL, LogDensity, Samples
+from vrdp_prob.inference.shaping import shaped
+from vrdp_prob.models.simulator.work import metered
+from vrdp_prob.progress import ProgressDisplay, SilentProgress
 
-DEGREES_OF_FREEDOM = 30.0
-"""The proposal's tails: heavier than Gaussian, light enough to lose little in 40 dimensions."""
-OVERSAMPLING = 4
-"""Proposals per draw that is handed back."""
-ROUNDS = 2
-"""At most so many times the proposal is moved and shaped towards what its weighted draws show."""
-ROUND_DRAWS = 1500
-EFFECTIVE_PER_DIMENSION = 6.0
-"""Weights are flattened until so many effective draws per dimension shape the next proposal."""
-GOOD_ENOUGH = 0.1
-"""Effective share of the draws from which on the proposal is left as it is."""
+ROUND = 4000
+"""Proposals after which it is seen whether there are enough."""
+MOST_ROUNDS = 6
 FEWEST = 100.0
-"""Where the weights leave fewer effective draws than this they are flattened, so that the draws at least spread; Pareto
-k then says that they are not to be trusted."""
-BATCH = 500
-NEAR_THE_MEAN = 0.01
-"""Scale of the starting places where hardly any has support."""
+"""Where the weights leave fewer effective draws than this and nobody goes on they are flattened, so that the draws at
+least spread."""
+MARGIN = 1.1
+"""Effective draws beyond the goal at which it stops, so that resampling does not fall short of it."""
 
 
 def sample_laplace(
@@ -39,159 +35,85 @@ def sample_laplace(
     draws: int,
     generator: np.random.Generator,
     progress: ProgressDisplay | None = None,
+    checkpoint: Checkpoint | None = None,
+    reported: Reported | None = None,
+    hand_on: bool = True,
 ) -> Samples:
-    """Draw by importance sampling around the MAP.
+    """Draw by importance sampling around the modes.
 
     Parameters
     ----------
     density
-        The log posterior.
+        The log posterior, differentiable.
     start
-        What is known of the posterior.
+        A cloud per mode.
     draws
         Number of draws to hand back, resampled by their smoothed weights.
     generator
         Source of randomness.
     progress
-        Told how many proposals were evaluated.
+        Told how many worlds were simulated.
+    checkpoint
+        Where emcee keeps what it has done, if it comes to that; the fast way itself is done in seconds.
+    reported
+        Quantities that have to be known well enough; the coordinates where None.
+    hand_on
+        Whether emcee goes on where the weights cannot be trusted. If not, the draws are handed back as they are, and
+        their Pareto k says that they are not to be trusted.
 
     Returns
     -------
-    One chain of draws, with Pareto k-hat and the effective number of proposals.
+    One chain of draws, with Pareto k-hat and what they are worth; or those of emcee, with the reason in `notes`.
     """
-    count = OVERSAMPLING * draws
-    with (progress or SilentProgress()).stage("Importance sampling", total=count + ROUNDS * ROUND_DRAWS) as advance:
-        proposal, evaluations = adapted(density, start.components[0], generator, advance)
-        whitened, log_density, log_ratio = _weighted(density, proposal, count, generator, advance)
-    weights, pareto_k = smoothed_weights(log_ratio)
-    effective = effective_count(weights)
-    if effective < FEWEST:
-        weights = _flattened(log_ratio, FEWEST)
-    chosen_draws = _resample(weights, draws, generator)
-    statistics = {"log_weight": np.log(np.maximum(weights[chosen_draws], 1e-300))[None]}
+    with metered() as meter, (progress or SilentProgress()).stage("Importance sampling") as advance:
+        form = shaped(density, start, generator, advance)
+        drawn = Weighted.drawn(density, form.mixture, ROUND, generator, advance)
+        weights, pareto_k = smoothed_weights(drawn.log_ratio)
+        known = weighted_statistics(drawn.points, weights, reported)
+        for _ in range(1, MOST_ROUNDS):
+            if min(known.ess_bulk, known.ess_tail) * MOST_ROUNDS * ROUND < ESS_GOAL * len(weights):
+                break  # more of the same would not do
+            if pareto_k <= PARETO_K_GOAL and min(known.ess_bulk, known.ess_tail) >= MARGIN * ESS_GOAL:
+                break
+            drawn = drawn.joined(Weighted.drawn(density, form.mixture, ROUND, generator, advance))
+            weights, pareto_k = smoothed_weights(drawn.log_ratio)
+            known = weighted_statistics(drawn.points, weights, reported)
+    enough = min(known.ess_bulk, known.ess_tail) >= ESS_GOAL
+    if hand_on and not (pareto_k <= PARETO_K_GOAL and enough):
+        reason = (
+            f"The fast way could not be trusted (Pareto k {pareto_k:.2f}, {min(known.ess_bulk, known.ess_tail):.0f} "
+            f"effective of {len(weights)} draws for {known.worst}), so emcee went on from what it had learned."
+        )
+        samples = sample_emcee(
+            density,
+            start,
+            draws=draws,
+            generator=generator,
+            progress=progress,
+            checkpoint=checkpoint,
+            reported=reported,
+            form=form,
+        )
+        return replace(
+            samples,
+            evaluations=samples.evaluations + len(weights),
+            work=samples.work + meter.rows,
+            notes=(reason, *samples.notes),
+            sampler="emcee",
+        )
+    modes = weights_from_importance(form.mixture, drawn.points, weights)
+    if effective_count(weights) < FEWEST:
+        weights = flattened(drawn.log_ratio, FEWEST)
+    chosen = resampled(weights, draws, generator)
     return Samples(
-        proposal.points(whitened[chosen_draws])[None],
-        log_density[chosen_draws][None],
-        statistics,
+        drawn.points[chosen][None],
+        drawn.log_density[chosen][None],
+        {"log_weight": np.log(np.maximum(weights[chosen], 1e-300))[None]},
         pareto_k=pareto_k,
-        effective=effective,
-        evaluations=count + evaluations,
+        known=known,
+        evaluations=len(drawn.log_ratio) + form.evaluations,
+        gradients=form.gradients,
+        work=meter.rows,
+        modes=modes,
+        notes=doubts(modes),
     )
-
-
-def adapted(
-    density: LogDensity, start: CurvedGaussian, generator: np.random.Generator, advance: Advance
-) -> tuple[CurvedGaussian, int]:
-    """Move and shape a Gaussian towards the density by weighted draws (population Monte Carlo).
-
-    Source: Cappe, Douc, Guillin, Marin and Robert, Adaptive importance sampling in general mixture classes,
-    Statistics and Computing 18 (2008).
-    """
-    gaussian, evaluations = start, 0
-    dimension = start.dimension
-    for _ in range(ROUNDS):
-        whitened, _, log_ratio = _weighted(density, gaussian, ROUND_DRAWS, generator, advance)
-        evaluations += ROUND_DRAWS
-        weights, _ = smoothed_weights(log_ratio)
-        if effective_count(weights) > GOOD_ENOUGH * ROUND_DRAWS:
-            break
-        weights = _flattened(log_ratio, EFFECTIVE_PER_DIMENSION * dimension)
-        mean = weights @ whitened
-        centred = whitened - mean
-        covariance = (centred * weights[:, None]).T @ centred
-        share = min(1.0, effective_count(weights) / (2 * EFFECTIVE_PER_DIMENSION * dimension))
-        gaussian = gaussian.moved(mean, share * covariance + (1 - share) * np.eye(dimension))
-    return gaussian, evaluations
-
-
-def starting_places(
-    density: LogDensity, start: CurvedGaussian, count: int, pool_size: int, generator: np.random.Generator
-) -> Float[np.ndarray, "count dimension"]:
-    """Different whitened points with support for chains to set out from, drawn by importance from a pool.
-
-    Near the mean where the pool has too few with support.
-    """
-    pool = generator.standard_normal((pool_size, start.dimension))
-    values = evaluate(density, start.points(pool))
-    supported = np.flatnonzero(np.isfinite(values))
-    if len(supported) < count:
-        return NEAR_THE_MEAN * pool[:count]
-    weights, _ = smoothed_weights(values + (pool**2).sum(axis=1) / 2)
-    flattened = weights[supported] ** 0.5 + 1e-12
-    return pool[generator.choice(supported, size=count, replace=False, p=flattened / flattened.sum())]
-
-
-def tail_log_density(whitened: Float[np.ndarray, "draw dimension"]) -> Float[np.ndarray, "draw"]:
-    """Log density of the multivariate Student-t of the proposals, up to a constant."""
-    power = (DEGREES_OF_FREEDOM + whitened.shape[1]) / 2
-    return np.asarray(-power * np.log1p((whitened**2).sum(axis=1) / DEGREES_OF_FREEDOM))
-
-
-def effective_count(weights: Float[np.ndarray, "draw"]) -> float:
-    """Number of equally weighted draws that are worth as much."""
-    return float(1 / np.sum(weights**2))
-
-
-def _weighted(
-    density: LogDensity, proposal: CurvedGaussian, count: int, generator: np.random.Generator, advance: Advance
-) -> tuple[Float[np.ndarray, "draw dimension"], Float[np.ndarray, "draw"], Float[np.ndarray, "draw"]]:
-    """Whitened points of a proposal, their log density and the log of density over proposal."""
-    whitened, log_proposal = _proposals(proposal, count, generator)
-    points = proposal.points(whitened)
-    log_density = np.empty(count)
-    for begin in range(0, count, BATCH):
-        chosen = slice(begin, min(begin + BATCH, count))
-        log_density[chosen] = evaluate(density, points[chosen])
-        advance(chosen.stop - chosen.start)
-    return whitened, log_density, log_density - log_proposal
-
-
-def _flattened(log_ratio: Float[np.ndarray, "draw"], effective: float) -> Float[np.ndarray, "draw"]:
-    """Weights to the largest power up to 1 that leaves so many effective draws."""
-    shifted = np.where(np.isfinite(log_ratio), log_ratio, -np.inf) - log_ratio.max()
-
-    def weights(power: float) -> Float[np.ndarray, "draw"]:
-        values = np.where(np.isfinite(shifted), np.exp(power * np.maximum(shifted, -1e6)), 0.0)
-        return values / values.sum()
-
-    if effective_count(weights(1.0)) >= effective:
-        return weights(1.0)
-    low, high = 0.0, 1.0
-    for _ in range(30):
-        middle = (low + high) / 2
-        low, high = (middle, high) if effective_count(weights(middle)) >= effective else (low, middle)
-    return weights(low)
-
-
-def smoothed_weights(log_ratio: Float[np.ndarray, "draw"]) -> tuple[Float[np.ndarray, "draw"], float]:
-    """Normalised importance weights with a generalised-Pareto tail, and k-hat (infinite where nothing was hit)."""
-    finite = np.isfinite(log_ratio)
-    weights = np.zeros(len(log_ratio))
-    if finite.sum() < 2:
-        weights[int(np.argmax(np.where(finite, log_ratio, -np.inf)))] = 1.0
-        return weights, float("inf")
-    with np.errstate(all="ignore"):
-        smoothed, k_hat = array_stats.psislw(log_ratio[finite].max() - log_ratio[finite])  # it takes negative ratios
-    smoothed = np.exp(smoothed - smoothed.max())
-    weights[finite] = smoothed / smoothed.sum()
-    return weights, float(np.nan_to_num(k_hat, nan=np.inf))
-
-
-def _proposals(
-    start: CurvedGaussian, count: int, generator: np.random.Generator
-) -> tuple[Float[np.ndarray, "draw dimension"], Float[np.ndarray, "draw"]]:
-    """Multivariate Student-t points in whitened coordinates with their log density up to a constant."""
-    dimension = start.dimension
-    normal = generator.standard_normal((count, dimension))
-    chi_square = generator.chisquare(DEGREES_OF_FREEDOM, size=count) / DEGREES_OF_FREEDOM
-    whitened = normal / np.sqrt(chi_square)[:, None]
-    constant = gammaln((DEGREES_OF_FREEDOM + dimension) / 2) - gammaln(DEGREES_OF_FREEDOM / 2)
-    constant -= dimension / 2 * np.log(DEGREES_OF_FREEDOM * np.pi) + start.log_volume
-    return whitened, constant + tail_log_density(whitened)
-
-
-def _resample(weights: Float[np.ndarray, "draw"], count: int, generator: np.random.Generator) -> np.ndarray:
-    """Systematic resampling, shuffled."""
-    places = (generator.random() + np.arange(count)) / count
-    chosen = np.searchsorted(np.cumsum(weights), places).clip(max=len(weights) - 1)
-    return generator.permutation(chosen)

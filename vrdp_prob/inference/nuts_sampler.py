@@ -1,31 +1,55 @@
-"""Sampling with Pyro's NUTS on the log posterior, whitened, several independent chains.
+"""Sampling with Pyro's NUTS on the log posterior, whitened: several chains in every mode, weighted by its evidence.
 
-Source: Hoffman and Gelman, The No-U-Turn Sampler, JMLR 15 (2014); Bingham et al., Pyro, JMLR 20 (2019).
+A chain that follows gradients hardly ever finds its way from one mode to another. So each mode has chains of its own,
+and importance sampling says what it weighs.
 """
 
-import warnings
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
-import pyro
-import torch
 from jaxtyping import Float
-from pyro.infer.mcmc import MCMC, NUTS
-from torch import Tensor
 
+from vrdp_prob.inference.checkpoint import Checkpoint, kept
 from vrdp_prob.inference.curved_gaussian import CurvedGaussian
-from vrdp_prob.inference.laplace import adapted, starting_places
+from vrdp_prob.inference.diagnostics import Reported, Statistics, chain_statistics
+from vrdp_prob.inference.importance import Weighted, smoothed_weights
 from vrdp_prob.inference.mixture import Mixture
-from vrdp_prob.inference.samples import LogDensity, Samples, evaluate
+from vrdp_prob.inference.mode_weights import doubts, weights_from_importance
+from vrdp_prob.inference.nuts_chain import Piece, Task
+from vrdp_prob.inference.nuts_worker import Workers, workers
+from vrdp_prob.inference.samples import (
+    ESS_GOAL,
+    PARETO_K_GOAL,
+    R_HAT_GOAL,
+    LogDensity,
+    ModeWeight,
+    Samples,
+    evaluate,
+)
+from vrdp_prob.inference.shaping import Shaped, shaped, starting_places
+from vrdp_prob.models.simulator.work import metered
 from vrdp_prob.progress import Advance, ProgressDisplay, SilentProgress
 
 CHAINS = 4
+"""Chains per mode."""
 WARM_UP = 60
-"""Steps that only adapt the step size: the mass matrix is the whitening, which weighted draws have already shaped."""
-TREE_DEPTH = 6
-ACCEPTANCE = 0.85
-START_POOL = 200
-OUT_OF_SUPPORT = 1e10
-"""Potential where a world has no support; finite, because Pyro compares energies."""
+"""Transitions that only adapt the step size: the mass matrix is the whitening, which other draws have shaped."""
+CHUNK = 50
+"""Transitions per chain after which the draws are judged and kept on disk."""
+MOST_GRADIENTS = 150_000
+"""Gradients of all chains after which sampling stops; a minute on two cores of 2020."""
+WORK_LIMIT = 40_000_000
+"""Simulated work after which sampling stops, for worlds of which one gradient costs as much as a hundred of others."""
+MARGIN = 1.1
+"""Effective draws beyond the goal at which it stops."""
+EVIDENCE_DRAWS = 4000
+FEWEST_IN_MODE = 4
+"""Draws of every chain that must be in a mode for it to count among the modes."""
+HARDLY_ANY = 0.01
+"""Weight below which a mode gets no chains."""
+MOST_PROCESSES = 4
 
 
 def sample_nuts(
@@ -35,94 +59,225 @@ def sample_nuts(
     draws: int,
     generator: np.random.Generator,
     progress: ProgressDisplay | None = None,
+    checkpoint: Checkpoint | None = None,
+    reported: Reported | None = None,
     warm_up: int = WARM_UP,
+    most_gradients: int = MOST_GRADIENTS,
+    work_limit: int = WORK_LIMIT,
+    processes: int | None = None,
 ) -> Samples:
-    """Draw with several NUTS chains, one after another.
+    """Draw with several NUTS chains in every mode.
 
     Parameters
     ----------
     density
-        The log posterior, differentiable.
+        The log posterior, differentiable. Chains run in processes of their own if it can be pickled.
     start
-        What is known of the posterior; chains set out from points drawn near it.
+        A cloud per mode.
     draws
-        Number of draws over all chains.
+        Number of draws over all chains that there are to be at least; chains are run until they have converged.
     generator
         Source of randomness.
     progress
-        Told how many transitions are done.
+        Told how many gradients are done.
+    checkpoint
+        Where to keep what is done, and to go on from.
+    reported
+        Quantities that have to be known well enough; the coordinates where None.
     warm_up
         Adaptation steps per chain.
+    most_gradients, work_limit
+        Gradients and work of all chains after which sampling stops even if it has not converged.
+    processes
+        How many processes to use; as many as there are cores, at most 4, where None. The draws do not depend on it.
 
     Returns
     -------
-    The chains, with the number of divergences.
+    Four chains, of the chains of all modes in proportion to the modes' weights, with the number of divergences.
     """
-    per_chain = -(-draws // CHAINS)
-    cloud, adapting = adapted(density, start.components[0], generator, lambda _steps: None)
-    potential = _Potential(density, cloud)
-    starts = starting_places(density, cloud, CHAINS, START_POOL, generator)
-    chains: list[np.ndarray] = []
-    divergences = 0
-    with (progress or SilentProgress()).stage("Sampling (NUTS)", total=CHAINS * (warm_up + per_chain)) as advance:
-        for place in starts:
-            seed = int(generator.integers(2**31))
-            whitened, divergent = _chain(potential, place, warm_up=warm_up, draws=per_chain, seed=seed, advance=advance)
-            chains.append(whitened)
-            divergences += divergent
-    whitened_chains = np.stack(chains)
-    points = cloud.points(whitened_chains)
-    log_density = np.stack([evaluate(density, chain) for chain in points])
-    return Samples(points, log_density, divergences=divergences, evaluations=adapting, gradients=potential.gradients)
-
-
-class _Potential:
-    """Negative log density in whitened coordinates, as Pyro wants it; counts its calls."""
-
-    def __init__(self, density: LogDensity, start: CurvedGaussian) -> None:
-        self._density = density
-        self._start = start
-        self.gradients = 0
-
-    def __call__(self, parameters: dict[str, Tensor]) -> Tensor:
-        self.gradients += 1
-        value = -self._density(self._start.mapped(parameters["whitened"][None]))[0]
-        if bool(torch.isfinite(value)):
-            return value
-        return OUT_OF_SUPPORT + 0.0 * parameters["whitened"].sum()
-
-
-def _chain(
-    potential: _Potential,
-    place: Float[np.ndarray, "dimension"],
-    *,
-    warm_up: int,
-    draws: int,
-    seed: int,
-    advance: Advance,
-) -> tuple[Float[np.ndarray, "draw dimension"], int]:
-    kernel = NUTS(
-        potential_fn=potential,
-        adapt_mass_matrix=False,
-        full_mass=False,
-        max_tree_depth=TREE_DEPTH,
-        target_accept_prob=ACCEPTANCE,
+    with metered() as meter:
+        form, places = _kept_start(density, start, generator, checkpoint)
+        modes, doubtful = _kept_weights(density, form.mixture, generator, checkpoint)
+    seed = int(generator.integers(2**31))
+    inhabited = [index for index in range(len(places)) if len(places) == 1 or modes[index].weight >= HARDLY_ANY]
+    chains = [
+        _Chain(form.mixture.components[mode], mode, places[mode, number], (seed, mode, number))
+        for mode in inhabited
+        for number in range(CHAINS)
+    ]
+    count = min(os.cpu_count() or 1, MOST_PROCESSES) if processes is None else processes
+    stage = (progress or SilentProgress()).stage("Sampling (NUTS)", total=most_gradients)
+    with stage as advance, workers(count) as pool:
+        run = _Run(density, form.mixture, chains, checkpoint, pool, advance)
+        run.further(warm_up, adapt=True)
+        while True:
+            run.further(CHUNK, adapt=False)
+            whitened = _joined(run, inhabited, modes, np.random.default_rng(seed))
+            found = chain_statistics(whitened, reported)
+            if whitened.shape[0] * whitened.shape[1] >= draws and _good(found):
+                stopped: tuple[str, ...] = ()
+                break
+            if run.gradients >= most_gradients:
+                stopped = (f"It stopped at its budget of {most_gradients} gradients.",)
+                break
+            if run.work >= work_limit:
+                stopped = (
+                    f"It stopped at its budget of simulated work ({work_limit:.3g} pieces of motion and events).",
+                )
+                break
+    evaluations = form.evaluations + (EVIDENCE_DRAWS if len(places) > 1 else 0)
+    return Samples(
+        whitened,
+        np.stack([evaluate(density, chain) for chain in whitened]),
+        divergences=run.divergences,
+        evaluations=evaluations + run.gradients,
+        gradients=form.gradients + run.gradients,
+        work=meter.rows + run.work,
+        modes=modes,
+        notes=(*stopped, *doubtful),
     )
-    state = torch.get_rng_state()
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            pyro.set_rng_seed(seed)
-            sampler = MCMC(
-                kernel,
-                num_samples=draws,
-                warmup_steps=warm_up,
-                initial_params={"whitened": torch.from_numpy(place)},
-                disable_progbar=True,
-                hook_fn=lambda *_: advance(1),
-            )
-            sampler.run()
-    finally:
-        torch.set_rng_state(state)
-    diverging = sampler.diagnostics()["divergences"]
-    return sampler.get_samples()["whitened"].detach().numpy(), sum(len(places) for places in diverging.values())
+
+
+def _good(found: Statistics) -> bool:
+    return found.r_hat <= R_HAT_GOAL and min(found.ess_bulk, found.ess_tail) >= MARGIN * ESS_GOAL
+
+
+@dataclass
+class _Chain:
+    """A chain in one mode, in the coordinates of its cloud."""
+
+    cloud: CurvedGaussian
+    mode: int
+    place: Float[np.ndarray, "dimension"]
+    seed: tuple[int, int, int]
+    pieces: list[Piece] = field(default_factory=list)
+
+    @property
+    def name(self) -> str:
+        """Name of the piece that comes next."""
+        return f"chain_{self.seed[1]}_{self.seed[2]}_piece_{len(self.pieces)}"
+
+    def task(self, density: LogDensity, transitions: int, *, adapt: bool) -> Task:
+        """The piece that comes next."""
+        place = self.pieces[-1].whitened[-1] if self.pieces else self.cloud.whitened(self.place)
+        seed = int(np.random.SeedSequence([*self.seed, len(self.pieces)]).generate_state(1)[0])
+        step_size = None if adapt else self.pieces[-1].step_size
+        return Task(density, self.cloud, place, step_size, transitions, seed)
+
+    @property
+    def points(self) -> Float[np.ndarray, "draw dimension"]:
+        """All draws after adaptation."""
+        return self.cloud.points(np.concatenate([piece.whitened for piece in self.pieces[1:]]))
+
+
+@dataclass
+class _Run:
+    """All chains, and what they have cost."""
+
+    density: LogDensity
+    mixture: Mixture
+    chains: list[_Chain]
+    checkpoint: Checkpoint | None
+    pool: Workers
+    advance: Advance
+
+    def further(self, transitions: int, *, adapt: bool) -> None:
+        """One more piece of every chain: those that were kept, and the others made now, a few at a time."""
+        wanting = []
+        for chain in self.chains:
+            found = self.checkpoint.arrays(chain.name) if self.checkpoint is not None else None
+            if found is None:
+                wanting.append(chain)
+            else:
+                chain.pieces.append(Piece.of_arrays(found))
+        for begin in range(0, len(wanting), CHAINS):
+            several = wanting[begin : begin + CHAINS]
+            made = self.pool.make([chain.task(self.density, transitions, adapt=adapt) for chain in several])
+            for chain, piece in zip(several, made, strict=True):
+                if self.checkpoint is not None:
+                    self.checkpoint.keep(chain.name, piece.arrays())
+                chain.pieces.append(piece)
+                self.advance(piece.gradients)
+
+    @property
+    def gradients(self) -> int:
+        """Gradients of all chains."""
+        return sum(piece.gradients for chain in self.chains for piece in chain.pieces)
+
+    @property
+    def work(self) -> int:
+        """Work of all chains."""
+        return sum(piece.work for chain in self.chains for piece in chain.pieces)
+
+    @property
+    def divergences(self) -> int:
+        """Divergent transitions of all chains."""
+        return sum(piece.divergences for chain in self.chains for piece in chain.pieces)
+
+
+def _joined(
+    run: _Run, inhabited: list[int], modes: tuple[ModeWeight, ...], generator: np.random.Generator
+) -> Float[np.ndarray, "chain draw dimension"]:
+    """As many chains as a mode has, each of one chain from every mode, in proportion to the modes' weights.
+
+    A draw counts for the mode that it is in, whichever its chain set out from: chains are restricted, not trusted to
+    stay. A mode in which hardly any chain stays is left to what the others find of it.
+    """
+    if len(inhabited) == 1:
+        return np.stack([chain.points for chain in run.chains])
+    own: list[list[np.ndarray]] = []
+    for number in range(CHAINS):
+        points = np.concatenate([chain.points for chain in run.chains if chain.seed[2] == number])
+        member = run.mixture.memberships(points).argmax(axis=1)
+        own.append([points[member == mode] for mode in inhabited])
+    counts = np.array([[len(points) for points in several] for several in own]).min(axis=0)
+    shares = np.where(counts >= FEWEST_IN_MODE, [modes[mode].weight for mode in inhabited], 0.0)
+    if not shares.any():
+        return np.stack([np.concatenate(several)[: counts.sum()] for several in own])
+    wanted = np.floor(shares * (counts[shares > 0] / shares[shares > 0]).min()).astype(int)
+    joined = []
+    for several in own:
+        labels = generator.permutation(np.repeat(np.arange(len(inhabited)), wanted))
+        chain = np.empty((len(labels), run.mixture.dimension))
+        for index, count in enumerate(wanted):
+            points = several[index]
+            chain[labels == index] = points[np.linspace(0, len(points) - 1, count).round().astype(int)]
+        joined.append(chain)
+    return np.stack(joined)
+
+
+def _kept_start(
+    density: LogDensity, start: Mixture, generator: np.random.Generator, checkpoint: Checkpoint | None
+) -> tuple[Shaped, Float[np.ndarray, "mode chain dimension"]]:
+    """The clouds in the posterior's shape, and places of every mode for its chains to set out from."""
+
+    def compute() -> Mapping[str, np.ndarray]:
+        form = shaped(density, start, generator, lambda _worlds: None)
+        places = [starting_places(density, form, CHAINS, generator, mode=mode) for mode in range(len(start.components))]
+        return {**form.arrays(), "starts": np.stack(places)}
+
+    arrays = kept(checkpoint, "form", generator, compute)
+    return Shaped.of_arrays(arrays, start), arrays["starts"]
+
+
+def _kept_weights(
+    density: LogDensity, mixture: Mixture, generator: np.random.Generator, checkpoint: Checkpoint | None
+) -> tuple[tuple[ModeWeight, ...], tuple[str, ...]]:
+    """What the modes weigh, and a sentence if that is not known well enough."""
+    if len(mixture.components) == 1:
+        return (), ()
+
+    def compute() -> Mapping[str, np.ndarray]:
+        drawn = Weighted.drawn(density, mixture, EVIDENCE_DRAWS, generator, lambda _worlds: None)
+        weights, pareto_k = smoothed_weights(drawn.log_ratio)
+        modes = weights_from_importance(mixture, drawn.points, weights)
+        return {"modes": np.array([[mode.weight, mode.error] for mode in modes]), "pareto_k": np.array(pareto_k)}
+
+    found = kept(checkpoint, "evidence", generator, compute)
+    modes = tuple(ModeWeight(float(weight), float(error)) for weight, error in found["modes"])
+    if float(found["pareto_k"]) <= PARETO_K_GOAL:
+        return modes, doubts(modes)
+    return modes, (
+        f"The {len(modes)} modes could not be weighted well: the importance weights behind their weights have Pareto k "
+        f"{float(found['pareto_k']):.2f}.",
+    )

@@ -10,8 +10,10 @@ from vrdp_prob.inference.mixture import Mixture
 from vrdp_prob.inference.mode import Mode
 from vrdp_prob.inference.samples import Gaussian
 
-HOPELESS = 20.0
+HOPELESS = 12.0
 """A mode whose evidence (nats) is so much lower than the best one's is left out."""
+MOST_MODES = 6
+"""So many of the best modes at most, since each has to be explored."""
 LEAST_WEIGHT = 0.02
 """Weight that every other mode is proposed with at least, since the evidence of a Gaussian is a guess."""
 
@@ -19,7 +21,8 @@ LEAST_WEIGHT = 0.02
 def proposals(modes: Sequence[Mode], residuals: Residuals) -> Mixture:
     """A curved Gaussian around every mode, weighted by Laplace evidence."""
     best = max(mode.log_evidence for mode in modes)
-    kept = [mode for mode in modes if mode.log_evidence > best - HOPELESS]
+    ranked = sorted(modes, key=lambda mode: -mode.log_evidence)[:MOST_MODES]
+    kept = [mode for mode in ranked if mode.log_evidence > best - HOPELESS]
     clouds = [CurvedGaussian.around(Gaussian.from_precision(mode.point, mode.precision), residuals) for mode in kept]
     evidence = np.exp([mode.log_evidence - best for mode in kept])
     weights = np.maximum(evidence / evidence.sum(), LEAST_WEIGHT)

@@ -2,12 +2,14 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 import torch
-from arviz_stats.base.array import array_stats
 from jaxtyping import Float
 from torch import Tensor
+
+from vrdp_prob.inference.diagnostics import Reported, Statistics, chain_statistics
 
 R_HAT_GOAL = 1.01
 ESS_GOAL = 400.0
@@ -56,8 +58,24 @@ class Gaussian:
 
 
 @dataclass(frozen=True)
+class ModeWeight:
+    """Share of the posterior's mass in one mode.
+
+    Parameters
+    ----------
+    weight
+        The share.
+    error
+        Its Monte Carlo standard error.
+    """
+
+    weight: float
+    error: float
+
+
+@dataclass(frozen=True)
 class Samples:
-    """Draws of one sampler.
+    """Draws of one sampler, all of equal weight.
 
     Parameters
     ----------
@@ -71,12 +89,20 @@ class Samples:
         Number of divergent transitions (NUTS), else None.
     pareto_k
         Pareto k-hat of the importance weights, else None.
-    effective
-        Effective number of draws where the sampler knows it better than the chains tell, else None.
+    known
+        What the draws are worth where the sampler knows it better than the chains tell, else None.
     r_hat
         Largest R-hat where the sampler knows it better than the chains tell, else None.
     evaluations, gradients
         Log densities computed, and how many of them with their gradient.
+    work
+        What the simulations had to do (see `work.py` of the simulator).
+    modes
+        Weights of the modes that the sampler set out from, in their order.
+    notes
+        Plain sentences: handed on to another sampler, stopped at a budget, modes that could not be weighted.
+    sampler
+        Name of the sampler that made the draws, where another one was asked for.
     """
 
     points: Float[np.ndarray, "chain draw dimension"]
@@ -84,10 +110,14 @@ class Samples:
     statistics: Mapping[str, Float[np.ndarray, "chain draw"]] = field(default_factory=dict)
     divergences: int | None = None
     pareto_k: float | None = None
-    effective: float | None = None
+    known: Statistics | None = None
     r_hat: float | None = None
     evaluations: int = 0
     gradients: int = 0
+    work: int = 0
+    modes: tuple[ModeWeight, ...] = ()
+    notes: tuple[str, ...] = ()
+    sampler: str | None = None
 
     def thinned(self, draws: int) -> "Samples":
         """About `draws` draws, evenly spaced within the chains."""
@@ -109,19 +139,27 @@ class Convergence:
     Parameters
     ----------
     sampler
-        `nuts`, `emcee` or `laplace`.
+        `nuts`, `emcee` or `laplace`: the one that made the draws.
     converged
         Whether every criterion that applies is met.
     r_hat
-        Largest split R-hat over the sampled coordinates; None for importance sampling.
+        Largest split R-hat over the reported quantities; None for importance sampling.
     ess_bulk
-        Smallest bulk effective sample size; for importance sampling that of the weights.
+        Smallest bulk effective sample size over the reported quantities.
     divergences
         Divergent transitions (NUTS), else None.
     pareto_k
         k-hat of the importance weights (laplace), else None.
     collision_order_changes
         Share of the draws whose sequence of collisions differs from the MAP's.
+    ess_tail
+        Smallest effective sample size of the 5 % and 95 % quantiles over the reported quantities.
+    worst
+        Name of the reported quantity that the draws tell least of.
+    modes
+        Weights of the modes, with their errors; empty where the sampler set out from one.
+    notes
+        Plain sentences on how the draws came about.
     """
 
     sampler: str
@@ -131,42 +169,70 @@ class Convergence:
     divergences: int | None
     pareto_k: float | None
     collision_order_changes: float | None = None
+    ess_tail: float | None = None
+    worst: str | None = None
+    modes: tuple[ModeWeight, ...] = ()
+    notes: tuple[str, ...] = ()
+
+    @classmethod
+    def of_document(cls, document: Mapping[str, Any]) -> "Convergence":
+        """What `dataclasses.asdict` made a document of."""
+        modes = tuple(ModeWeight(**mode) for mode in document.get("modes", ()))
+        return cls(**{**document, "modes": modes, "notes": tuple(document.get("notes", ()))})
 
     @property
     def sentence(self) -> str:
-        """The verdict in plain words."""
+        """The verdict in plain words, and how it came about."""
         facts = []
         if self.r_hat is not None:
             facts.append(f"R-hat {self.r_hat:.3f} (goal {R_HAT_GOAL:g} or less)")
         if self.ess_bulk is not None:
-            facts.append(f"effective sample size {self.ess_bulk:.0f}")
+            tail = "" if self.ess_tail is None else f" and {self.ess_tail:.0f} in the tails"
+            facts.append(f"effective sample size {self.ess_bulk:.0f}{tail} (goal {ESS_GOAL:g})")
         if self.divergences is not None:
             facts.append(f"{self.divergences} divergences")
         if self.pareto_k is not None:
             facts.append(f"Pareto k {self.pareto_k:.2f} (goal {PARETO_K_GOAL:g} or less)")
         verdict = "has converged" if self.converged else "has not converged, so take its intervals with care"
-        return f"The {self.sampler} sampler {verdict}: {', '.join(facts)}."
+        weakest = "" if self.converged or self.worst is None else f" The weakest is {self.worst}."
+        story = "".join(f" {note}" for note in self.notes)
+        return f"The {self.sampler} sampler {verdict}: {', '.join(facts)}.{weakest}{story}"
 
 
-def assess(sampler: str, samples: Samples, *, order_changes: float | None = None) -> Convergence:
-    """Judge the draws of a sampler by R-hat, bulk effective sample size, divergences and Pareto k."""
-    if samples.pareto_k is not None:
-        ess = samples.effective
-        converged = samples.pareto_k <= PARETO_K_GOAL and (ess or 0) >= min(ESS_GOAL, samples.points.shape[1] / 10)
-        return Convergence(sampler, converged, None, ess, None, samples.pareto_k, order_changes)
-    r_hat, ess_bulk = chain_statistics(samples.points)
-    r_hat = max(r_hat, samples.r_hat or 0.0)
-    converged = r_hat <= R_HAT_GOAL and ess_bulk >= ESS_GOAL and not samples.divergences
-    return Convergence(sampler, converged, r_hat, ess_bulk, samples.divergences, None, order_changes)
+def assess(
+    sampler: str, samples: Samples, reported: Reported | None = None, *, order_changes: float | None = None
+) -> Convergence:
+    """Judge the draws of a sampler by R-hat, effective sample sizes, divergences and Pareto k.
 
-
-def chain_statistics(points: Float[np.ndarray, "chain draw dimension"]) -> tuple[float, float]:
-    """Largest R-hat and smallest bulk effective sample size over the coordinates (infinite and 0 where undefined)."""
-    by_coordinate = np.moveaxis(points, -1, 0)
-    with np.errstate(all="ignore"):
-        r_hat = np.asarray(array_stats.rhat(by_coordinate), dtype=float)
-        ess = np.asarray(array_stats.ess(by_coordinate, method="bulk"), dtype=float)
-    return float(np.nan_to_num(r_hat, nan=np.inf).max()), float(np.nan_to_num(ess, nan=0.0).min())
+    Parameters
+    ----------
+    sampler
+        Name of the sampler that was asked for.
+    samples
+        What it handed back.
+    reported
+        The quantities to look at; the coordinates where None.
+    order_changes
+        Share of the draws whose sequence of collisions differs from the MAP's.
+    """
+    found = samples.known or chain_statistics(samples.points, reported)
+    weighted = samples.pareto_k is not None
+    r_hat = max(found.r_hat, samples.r_hat or 0.0)
+    enough = min(found.ess_bulk, found.ess_tail) >= ESS_GOAL
+    trusted = samples.pareto_k <= PARETO_K_GOAL if samples.pareto_k is not None else r_hat <= R_HAT_GOAL
+    return Convergence(
+        sampler=samples.sampler or sampler,
+        converged=bool(trusted and enough and not samples.divergences),
+        r_hat=None if weighted else r_hat,
+        ess_bulk=found.ess_bulk,
+        divergences=samples.divergences,
+        pareto_k=samples.pareto_k,
+        collision_order_changes=order_changes,
+        ess_tail=found.ess_tail,
+        worst=found.worst,
+        modes=samples.modes,
+        notes=samples.notes,
+    )
 
 
 def evaluate(density: LogDensity, points: Float[np.ndarray, "point dimension"]) -> Float[np.ndarray, "point"]:

@@ -135,7 +135,7 @@ def _posterior(document: dict[str, Any], tree: xr.DataTree, tracks: Tracks | Non
         seed=document["seed"],
         data=tree,
         status=status,
-        convergence=Convergence(**document["convergence"]),
+        convergence=Convergence.of_document(document["convergence"]),
         warnings=tuple(document["warnings"]),
         pairs=tuple((first, second) for first, second in document["pairs"]),
     )

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 from types import ModuleType
+from typing import Any
 
 from vrdp_prob.errors import InputError
 from vrdp_prob.files import write_atomically
@@ -52,6 +53,10 @@ class PhysicsModel:
         strange = sorted(set(self.beliefs) - {parameter.name for parameter in self._stated_parameters()})
         if strange:
             raise InputError(f"model {self.name}: no effect has a parameter '{strange[0]}'; leave it out.")
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Everything but the compiled kernel, which another process loads for itself."""
+        return {name: value for name, value in self.__dict__.items() if name != "kernel"}
 
     def _check_effect(self, effect: Effect) -> None:
         where = f"model {self.name}, effect '{effect.name}'"

@@ -12,7 +12,7 @@ import torch
 
 from tests.inference.several_videos.videos import DRAG, FRICTION, NOISE, colliding, sliding
 from vrdp_prob.errors import InputError
-from vrdp_prob.inference.samples import chain_statistics
+from vrdp_prob.inference.diagnostics import chain_statistics
 from vrdp_prob.inference.several_videos import (
     SharedFit,
     SharedPosterior,
@@ -36,7 +36,7 @@ def two() -> SharedFit:
 
 @cache
 def posterior_of_two(sampler: str) -> SharedPosterior:
-    return sample_together(two(), sampler=sampler, draws=600)
+    return sample_together(two(), sampler=sampler, draws=800)
 
 
 def test_the_joint_fit_is_a_maximum_of_the_joint_density() -> None:
@@ -96,7 +96,7 @@ def test_both_samplers_agree_with_plain_emcee_on_the_whole_vector() -> None:
 
 
 def standard_error(draws: np.ndarray) -> float:
-    return float(draws.std() / np.sqrt(chain_statistics(draws.reshape(4, -1, 1))[1]))
+    return float(draws.std() / np.sqrt(chain_statistics(draws.reshape(4, -1, 1)).ess_bulk))
 
 
 @pytest.mark.parametrize("sampler", ["gibbs", "laplace"])
@@ -181,7 +181,7 @@ def test_walls_at_the_same_place_share_their_restitution() -> None:
 
 
 def test_the_same_seed_gives_the_same_numbers_whatever_the_order() -> None:
-    again = sample_together(fit_together([colliding(1), sliding(2)], model=BASE), sampler="laplace", draws=600)
+    again = sample_together(fit_together([colliding(1), sliding(2)], model=BASE), sampler="laplace", draws=800)
     first = posterior_of_two("laplace")
     np.testing.assert_array_equal(again.points, first.points)
     assert again.video("hit 1").data.equals(first.video("hit 1").data)

@@ -9,7 +9,7 @@ import pytest
 from scipy.special import logsumexp
 
 from tests.inference.several_videos.videos import sliding
-from vrdp_prob.inference.samples import chain_statistics
+from vrdp_prob.inference.diagnostics import chain_statistics
 from vrdp_prob.inference.several_videos.arrow import ArrowGaussian, Expansion, Expansions, SharedExpansion
 from vrdp_prob.inference.several_videos.gibbs import sample_gibbs
 from vrdp_prob.inference.several_videos.importance import sample_by_importance
@@ -119,11 +119,11 @@ def test_chains_have_the_marginal_of_the_product_of_all_videos(count: int) -> No
     mean, sd, own, _ = by_quadrature(SEEN[:count])
     draws = sample_gibbs(toy_fit(SEEN[:count]), generator=np.random.default_rng(1), rounds=3)
     shared = draws.shared[..., 0]
-    _, ess = chain_statistics(draws.shared)
+    ess = chain_statistics(draws.shared).ess_bulk
     assert ess > 400
     assert abs(shared.mean() - mean) < 4 * sd / np.sqrt(ess)
     assert shared.std() == pytest.approx(sd, rel=4 / np.sqrt(ess))
-    _, ess = chain_statistics(draws.locals[0])
+    ess = chain_statistics(draws.locals[0]).ess_bulk
     assert abs(draws.locals[0].mean() - own) < 4 * draws.locals[0].std() / np.sqrt(ess)
     assert draws.drift < 1.03
 
@@ -173,7 +173,7 @@ def test_two_modes_of_a_video_are_visited_by_their_weight() -> None:
     draws = sample_gibbs(fit, generator=np.random.default_rng(2), rounds=3)
     assert draws.locals[0].shape[1] > 500
     sides = (draws.locals[0] > 0).astype(float)
-    assert sides.mean() == pytest.approx(positive, abs=4 * 0.5 / np.sqrt(chain_statistics(sides)[1]))
+    assert sides.mean() == pytest.approx(positive, abs=4 * 0.5 / np.sqrt(chain_statistics(sides).ess_bulk))
     assert draws.shared.mean() == pytest.approx(mean, abs=4 * draws.shared.std() / np.sqrt(400))
     weighted = sample_by_importance(fit, draws=2000, generator=np.random.default_rng(2))
     assert (weighted.locals[0] > 0).mean() == pytest.approx(positive, abs=2 / np.sqrt(weighted.effective))

@@ -15,7 +15,8 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 from scipy.special import logsumexp
 
-from vrdp_prob.inference.samples import ESS_GOAL, R_HAT_GOAL, chain_statistics
+from vrdp_prob.inference.diagnostics import chain_statistics
+from vrdp_prob.inference.samples import ESS_GOAL, R_HAT_GOAL
 from vrdp_prob.inference.several_videos.arrow import ArrowGaussian
 from vrdp_prob.inference.several_videos.clouds import Clouds
 from vrdp_prob.inference.several_videos.joint_fit import JointFit
@@ -274,7 +275,8 @@ class _Sampler:
     def converged(self) -> bool:
         """Whether all draws since the last reshaping meet the goals."""
         for series in self._series():
-            r_hat, ess = chain_statistics(_by_chain(series))
+            found = chain_statistics(_by_chain(series))
+            r_hat, ess = found.r_hat, min(found.ess_bulk, found.ess_tail)
             if max(r_hat, _drift(series)) > R_HAT_GOAL or ess < MARGIN * ESS_GOAL:
                 return False
         return True
@@ -325,4 +327,4 @@ def _by_chain(sweeps: Sequence[Float[np.ndarray, "chain dimension"]]) -> Float[n
 def _drift(sweeps: Sequence[Float[np.ndarray, "chain dimension"]]) -> float:
     steps = np.stack(sweeps)
     grouped = steps.reshape(len(steps), GROUPS, -1, steps.shape[-1]).swapaxes(0, 1)
-    return chain_statistics(grouped.reshape(GROUPS, -1, steps.shape[-1]))[0]
+    return chain_statistics(grouped.reshape(GROUPS, -1, steps.shape[-1])).r_hat

@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Float
 from scipy.special import logsumexp
 
-from vrdp_prob.inference.laplace import effective_count, smoothed_weights
+from vrdp_prob.inference.importance import effective_count, smoothed_weights
 from vrdp_prob.inference.map_fit import fit_map
 from vrdp_prob.inference.samples import PARETO_K_GOAL
 from vrdp_prob.inference.several_videos.arrow import ArrowGaussian

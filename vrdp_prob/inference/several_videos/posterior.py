@@ -164,7 +164,7 @@ class SharedPosterior:
                 points=shared["points"].values,
                 most_probable=shared["most_probable"].values,
                 log_evidence=document["log_evidence"],
-                convergence=Convergence(**document["convergence"]),
+                convergence=Convergence.of_document(document["convergence"]),
                 warnings=tuple(document["warnings"]),
                 videos=VideoPosteriors(
                     {name: _reader(file, f"video_{index}") for index, name in enumerate(document["videos"])}

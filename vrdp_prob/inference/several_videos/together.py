@@ -7,6 +7,7 @@ import numpy as np
 from jaxtyping import Float
 
 from vrdp_prob.errors import InputError
+from vrdp_prob.inference.diagnostics import Statistics
 from vrdp_prob.inference.infer import default_model, posterior_from
 from vrdp_prob.inference.map_fit import MapFit
 from vrdp_prob.inference.posterior import Posterior
@@ -137,7 +138,8 @@ def _by_importance(
     found = sample_by_importance(fit.joint, draws=draws, generator=generator, progress=progress)
 
     def samples(points: Float[np.ndarray, "draw dimension"], values: Float[np.ndarray, "draw"]) -> Samples:
-        return Samples(points[None], values[None], pareto_k=found.pareto_k, effective=found.effective)
+        known = Statistics(1.0, found.effective, found.effective, "every number alike")
+        return Samples(points[None], values[None], pareto_k=found.pareto_k, known=known)
 
     shared = samples(found.shared, fit.joint.numbers.log_prior(found.shared) + np.sum(found.log_density, axis=0))
     parts = zip(fit.joint.videos, found.locals, found.log_density, strict=True)

@@ -158,6 +158,7 @@ class _Run:
         shape = len(self.kinds), times.shape[1], self.shown, 3
         seen = [_contiguous(bars[0]) if bars[0] is not None else np.zeros(shape)]
         seen.append(_contiguous(bars[1]) if bars[1] is not None else np.zeros((1, 0, self.shown, 3)))
+        record_work(int(self.tapes.first_row[-1]))
         self.kernel.reverse_batch(self.kinds, bodies, shared, start, times, self.outcomes, *self.tapes, *seen, *results)
         gradients = [torch.from_numpy(array) for array in results]
         return (*gradients[:3], gradients[3] if of_times else None)

@@ -1,7 +1,8 @@
 """How much a simulation had to do, counted in something that is the same on every machine.
 
-The unit is one row of the kernel's record: a piece of motion of one body or one event. Time on one machine is about
-proportional to it; worlds in which bodies press on each other have a hundred times as many rows as others.
+The unit is one row of the kernel's record, a piece of motion of one body or one event; a derivative counts the rows
+once more. Time on one machine is about proportional to it; worlds in which bodies press on each other have a hundred
+times as many rows as others.
 """
 
 from collections.abc import Iterator
@@ -44,3 +45,8 @@ def record_work(rows: int) -> None:
     meter = _meter.get()
     if meter is not None:
         meter.rows += rows
+
+
+def work_sentence(limit: int) -> str:
+    """What to say where sampling stopped at a limit of work."""
+    return f"It stopped at its budget of simulated work ({limit:.3g} pieces of motion and events)."

@@ -1,0 +1,92 @@
+"""A run that is killed goes on where it was, and ends with the same numbers."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tests.inference.densities import TwoModes
+from vrdp_prob.errors import InputError
+from vrdp_prob.inference.checkpoint import Checkpoint, fingerprint
+from vrdp_prob.inference.emcee_sampler import sample_emcee
+from vrdp_prob.inference.infer import default_model
+from vrdp_prob.inference.nuts_sampler import sample_nuts
+from vrdp_prob.inference.samples import Samples
+from vrdp_prob.scene import Body, Shape, Tracks
+
+FACTS = {"seed": "3"}
+ROOT = Path(__file__).parents[2]
+PATIENCE = 120.0
+"""Seconds."""
+ENOUGH = {"emcee": "ensemble_3.h5", "nuts": "chain_0_1_piece_1.npz"}
+"""File that is there when a run is about half way."""
+
+
+def sampled(name: str, folder: Path | None) -> tuple[Samples, float]:
+    """Draws of a sampler, and the next number of its generator."""
+    checkpoint = None if folder is None else Checkpoint(folder, FACTS)
+    target, generator = TwoModes(0.3, dimension=3), np.random.default_rng(3)
+    if name == "emcee":
+        samples = sample_emcee(
+            target, target.start, draws=100, generator=generator, checkpoint=checkpoint, most_steps=48
+        )
+    else:
+        options = {"processes": 1, "warm_up": 5, "most_gradients": 1}
+        samples = sample_nuts(target, target.start, draws=100, generator=generator, checkpoint=checkpoint, **options)
+    return samples, float(generator.random())
+
+
+@pytest.mark.parametrize("name", ENOUGH)
+def test_a_run_that_was_killed_ends_with_the_same_numbers(name: str, tmp_path: Path) -> None:
+    folder = tmp_path / "checkpoint"
+    program = (
+        "import sys; from pathlib import Path; from tests.inference.test_checkpoint import sampled; "
+        "sampled(sys.argv[1], Path(sys.argv[2]))"
+    )
+    process = subprocess.Popen(
+        [sys.executable, "-c", program, name, str(folder)],
+        cwd=ROOT,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+    )
+    deadline = time.monotonic() + PATIENCE
+    while not (folder / ENOUGH[name]).exists() and process.poll() is None and time.monotonic() < deadline:
+        time.sleep(0.01)
+    process.send_signal(signal.SIGKILL)
+    assert process.wait() == -signal.SIGKILL, "it was done before it could be killed"
+    # As if it had been killed while it wrote: what cannot be read is made anew.
+    (folder / "form.npz").write_bytes((folder / "form.npz").read_bytes()[:100])
+    broken = folder / ENOUGH[name]
+    broken.write_bytes(broken.read_bytes()[:500])
+    (samples, number), (whole, other) = sampled(name, folder), sampled(name, None)
+    assert (samples.points == whole.points).all()
+    assert (samples.log_density == whole.log_density).all()
+    assert (samples.gradients, samples.evaluations, samples.modes) == (whole.gradients, whole.evaluations, whole.modes)
+    assert number == other
+    # And once more, with everything there.
+    again, number = sampled(name, folder)
+    assert (again.points == whole.points).all()
+    assert number == other
+
+
+def test_another_run_is_refused_by_name_of_what_differs(tmp_path: Path) -> None:
+    Checkpoint(tmp_path, {"seed": "1", "draws": "400"})
+    with pytest.raises(InputError, match=r"belongs to another run \(other draws, sampler\)"):
+        Checkpoint(tmp_path, {"seed": "1", "draws": "500", "sampler": "nuts"})
+
+
+def test_a_fingerprint_changes_with_one_measured_number() -> None:
+    bodies = (Body("a", Shape.SPHERE, 0.2), Body("b", Shape.CUBE, 0.2))
+    positions = np.random.default_rng(0).standard_normal((5, 2, 2))
+    tracks, again = (Tracks.from_arrays("seen", bodies, np.arange(5.0), positions) for _ in range(2))
+    positions = positions.copy()
+    positions[3, 1, 0] += 1e-12
+    other = Tracks.from_arrays("seen", bodies, np.arange(5.0), positions)
+    facts = fingerprint(tracks, default_model(), seed=1)
+    assert facts == fingerprint(again, default_model(), seed=1)
+    changed = fingerprint(other, default_model(), seed=1)
+    assert [name for name in facts if facts[name] != changed[name]] == ["tracks"]

@@ -1,0 +1,82 @@
+import numpy as np
+import pytest
+
+from vrdp_prob.inference.diagnostics import Reported, chain_statistics, share_with_error, weighted_statistics
+from vrdp_prob.inference.infer import default_model
+from vrdp_prob.inference.samples import Samples, assess
+from vrdp_prob.models.unknowns import Structure, unknowns
+from vrdp_prob.scene import Body, Shape, Tracks
+
+DRAWS = 20_000
+MEMORY = 0.9
+
+
+@pytest.fixture(scope="module")
+def autoregressive() -> np.ndarray:
+    """Four chains of a process with known memory."""
+    noise = np.random.default_rng(0).standard_normal((4, DRAWS))
+    chain = np.zeros((4, DRAWS))
+    for step in range(1, DRAWS):
+        chain[:, step] = MEMORY * chain[:, step - 1] + noise[:, step]
+    return chain
+
+
+def test_effective_size_of_an_autoregressive_chain_is_the_known_one(autoregressive: np.ndarray) -> None:
+    found = chain_statistics(autoregressive[..., None])
+    known = 4 * DRAWS * (1 - MEMORY) / (1 + MEMORY)
+    assert found.ess_bulk == pytest.approx(known, rel=0.15)
+    assert 0.5 * known < found.ess_tail < 4 * known
+    assert found.r_hat < 1.01
+
+
+def test_error_of_a_share_grows_with_memory(autoregressive: np.ndarray) -> None:
+    share, error = share_with_error((autoregressive > 0).astype(float))
+    assert share == pytest.approx(0.5, abs=4 * error)
+    independent = 0.5 / np.sqrt(4 * DRAWS)
+    assert 2 * independent < error < 6 * independent
+    assert share_with_error(np.ones((2, 10))) == (1.0, 0.0)
+
+
+def test_a_difference_that_moves_slowly_is_named_although_both_numbers_mix_well() -> None:
+    generator = np.random.default_rng(1)
+    noise = generator.standard_normal((4, 1000))
+    drift = 0.05 * np.cumsum(generator.standard_normal((4, 1000)), axis=1)
+    draws = np.stack([noise, noise - 0.1 * drift], axis=-1)
+    plain = Reported(("first", "second"), np.eye(2))
+    both = Reported((*plain.names, "difference"), np.vstack([np.eye(2), [1.0, -1.0]]))
+    samples = Samples(draws, np.zeros((4, 1000)))
+    assert assess("emcee", samples, plain).converged
+    convergence = assess("emcee", samples, both)
+    assert not convergence.converged
+    assert convergence.worst == "difference"
+    assert "The weakest is difference." in convergence.sentence
+
+
+def test_weights_tell_what_draws_are_worth() -> None:
+    draws = np.random.default_rng(2).standard_normal((4000, 1))
+    equal = weighted_statistics(draws, np.full(4000, 1 / 4000))
+    assert equal.ess_bulk == pytest.approx(4000)
+    # Twenty draws that weigh a hundred times as much as the others: (sum of w) squared over sum of w squared is 175.
+    weights = np.where(np.arange(4000) < 20, 100.0, 1.0)
+    spoiled = weighted_statistics(draws, weights / weights.sum())
+    assert spoiled.ess_bulk == pytest.approx(175, rel=0.4)
+    assert spoiled.ess_tail < 300
+
+
+def test_what_is_reported_of_a_video_holds_its_ratios_and_products() -> None:
+    bodies = tuple(Body(str(body), Shape.SPHERE, 0.2, mass=1.5 if body == 2 else None) for body in range(3))
+    positions = np.random.default_rng(0).standard_normal((5, 3, 2))
+    tracks = Tracks.from_arrays("seen", bodies, np.arange(5.0), positions)
+    everything = frozenset(range(3))
+    coordinates = unknowns(tracks, default_model(), Structure(moving=everything, colliding=everything))
+    reported = Reported.of(coordinates, [(0, 1), (1, 2), (0, 1)])
+    # The third body was weighed, so its ratio to another is that one's mass, which is there already.
+    assert reported.names[len(coordinates) :] == (
+        "mass ratio of pair 0, 1",
+        "restitution of pair 0, 1",
+        "restitution of pair 1, 2",
+    )
+    point = np.random.default_rng(1).standard_normal(len(coordinates))
+    mass, restitution = ([point[coordinates.places[name, body]] for body in (0, 1)] for name in ("mass", "restitution"))
+    values = reported.values(point)[len(coordinates) :]
+    assert values[:2] == pytest.approx([mass[0] - mass[1], restitution[0] + restitution[1]])

@@ -1,0 +1,123 @@
+"""A folder that keeps what a long run has done, so that a run that was killed goes on where it was.
+
+A run that is taken up gives the same numbers, bit for bit, as one that was never broken off: every piece of work begins
+with a seed or a state of its own, and is kept when it is whole. A file that cannot be read is made anew.
+"""
+
+import json
+import zipfile
+from collections.abc import Callable, Mapping
+from hashlib import sha256
+from importlib.metadata import version
+from pathlib import Path
+
+import numpy as np
+
+from vrdp_prob.errors import InputError
+from vrdp_prob.files import check_writable, write_atomically
+from vrdp_prob.models import model_file
+from vrdp_prob.models.physics import PhysicsModel
+from vrdp_prob.scene import Tracks
+
+Arrays = Mapping[str, np.ndarray]
+
+
+def fingerprint(tracks: Tracks, model: PhysicsModel, **settings: object) -> dict[str, str]:
+    """What a run depends on, in short texts by name: the tracks, the model, this version, and the settings given."""
+    seen = sha256()
+    for name, values in sorted(tracks.data.variables.items()):
+        seen.update(str(name).encode())
+        array = np.ascontiguousarray(values.values)
+        seen.update(repr(array.tolist()).encode() if array.dtype == object else array.tobytes())
+    seen.update(repr((tracks.bodies, tracks.walls)).encode())
+    text = model_file.text(model.name, model.effects, model.parameters)
+    return {
+        "tracks": seen.hexdigest(),
+        "model": sha256(text.encode()).hexdigest(),
+        "version": version("vrdp-prob"),
+        **{name: str(value) for name, value in settings.items()},
+    }
+
+
+class Checkpoint:
+    """What one run has done so far.
+
+    Parameters
+    ----------
+    folder
+        Where to keep it; made if it is not there.
+    facts
+        What the run depends on, by name (see `fingerprint`).
+
+    Raises
+    ------
+    InputError
+        If the folder cannot be written, or holds what another run has done: what belongs to other tracks, another
+        seed or other settings is neither mixed with this run nor thrown away.
+    """
+
+    def __init__(self, folder: Path | str, facts: Mapping[str, str]) -> None:
+        self.folder = Path(folder)
+        check_writable(self.folder)
+        file = self.folder / "fingerprint.json"
+        try:
+            found = json.loads(file.read_text(encoding="utf-8"))
+        except (OSError, ValueError):
+            found = None
+        if found is None:
+            with write_atomically(file) as temporary:
+                temporary.write_text(json.dumps(dict(facts), indent=1), encoding="utf-8")
+        elif found != dict(facts):
+            names = sorted(set(found) | set(facts))
+            other = ", ".join(name for name in names if found.get(name) != facts.get(name))
+            raise InputError(
+                f"{self.folder}: the checkpoint belongs to another run (other {other}); choose another folder, or "
+                "delete this one to start anew."
+            )
+
+    def path(self, name: str) -> Path:
+        """Place of a file."""
+        return self.folder / name
+
+    def arrays(self, name: str) -> dict[str, np.ndarray] | None:
+        """Arrays that were kept under a name; None where there are none or they cannot be read."""
+        try:
+            with np.load(self.path(f"{name}.npz"), allow_pickle=False) as kept:
+                return {key: kept[key] for key in kept.files}
+        except (OSError, ValueError, EOFError, KeyError, zipfile.BadZipFile):
+            return None
+
+    def keep(self, name: str, arrays: Arrays) -> None:
+        """Keep arrays under a name, whole or not at all."""
+        with write_atomically(self.path(f"{name}.npz")) as temporary, temporary.open("wb") as stream:
+            # numpy's stubs take every keyword for allow_pickle
+            np.savez(stream, **arrays)  # type: ignore[arg-type]
+
+
+def kept(
+    checkpoint: Checkpoint | None,
+    name: str,
+    generator: np.random.Generator,
+    compute: Callable[[], Arrays],
+) -> Arrays:
+    """What `compute` gives, computed once: a run that is taken up reads it, and its generator goes on from there.
+
+    Parameters
+    ----------
+    checkpoint
+        Where it is kept; nowhere if None.
+    name
+        The name it is kept under.
+    generator
+        Source of the randomness that `compute` uses.
+    compute
+        The work.
+    """
+    found = checkpoint.arrays(name) if checkpoint is not None else None
+    if found is not None and "generator" in found:
+        generator.bit_generator.state = json.loads(str(found.pop("generator")))
+        return found
+    arrays = compute()
+    if checkpoint is not None:
+        checkpoint.keep(name, {**arrays, "generator": np.array(json.dumps(generator.bit_generator.state))})
+    return arrays

@@ -1,0 +1,139 @@
+"""How far draws can be trusted, for every quantity that is reported from them.
+
+Source: Vehtari, Gelman, Simpson, Carpenter and Buerkner, Rank-normalization, folding, and localization: an improved
+R-hat, Bayesian Analysis 16 (2021); Elvira, Martino and Robert, Rethinking the effective sample size, International
+Statistical Review 90 (2022).
+"""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+from arviz_stats.base.array import array_stats
+from jaxtyping import Float
+
+from vrdp_prob.models.coordinates import Coordinates
+from vrdp_prob.models.parameters import MASS, RESTITUTION
+
+TAILS = (0.05, 0.95)
+"""Quantiles whose effective sample size is that of the tails."""
+
+
+@dataclass(frozen=True)
+class Reported:
+    """Quantities that are read off the draws: linear combinations of the coordinates.
+
+    Parameters
+    ----------
+    names
+        Their names, for sentences.
+    combinations
+        One row per quantity.
+    """
+
+    names: tuple[str, ...]
+    combinations: Float[np.ndarray, "quantity dimension"]
+
+    @classmethod
+    def of(cls, coordinates: Coordinates, pairs: Iterable[tuple[int, int]]) -> "Reported":
+        """All coordinates; log mass ratio and log restitution product of pairs, as far as they are sampled."""
+        names, rows = list(coordinates.names), list(np.eye(len(coordinates)))
+        for first, second in dict.fromkeys(pairs):
+            for field, sign, name in ((MASS.name, -1.0, "mass ratio"), (RESTITUTION.name, 1.0, "restitution")):
+                row = np.zeros(len(coordinates))
+                for body, share in ((first, 1.0), (second, sign)):
+                    place = coordinates.places.get((field, body))
+                    if place is not None:
+                        row[place] += share
+                if np.count_nonzero(row) == 2:
+                    names.append(f"{name} of pair {first}, {second}")
+                    rows.append(row)
+        return cls(tuple(names), np.array(rows))
+
+    @classmethod
+    def coordinates(cls, dimension: int) -> "Reported":
+        """The coordinates themselves, by number."""
+        return cls(tuple(f"coordinate {place}" for place in range(dimension)), np.eye(dimension))
+
+    def values(self, points: Float[np.ndarray, "*batch dimension"]) -> Float[np.ndarray, "*batch quantity"]:
+        """The quantities of some points."""
+        return points @ self.combinations.T
+
+
+@dataclass(frozen=True)
+class Statistics:
+    """What draws are worth for the quantity for which they are worth least.
+
+    Parameters
+    ----------
+    r_hat
+        Largest split R-hat; 1 for importance sampling.
+    ess_bulk, ess_tail
+        Smallest effective sample sizes, of the mean and of the 5 % and 95 % quantiles.
+    worst
+        Name of the quantity that falls shortest of the goals.
+    each
+        Bulk effective sample size of every quantity; None where only the worst is known.
+    """
+
+    r_hat: float
+    ess_bulk: float
+    ess_tail: float
+    worst: str
+    each: Float[np.ndarray, "quantity"] | None = None
+
+
+def chain_statistics(draws: Float[np.ndarray, "chain draw dimension"], reported: Reported | None = None) -> Statistics:
+    """Statistics of chains; R-hat is infinite and effective sizes are 0 where they are not defined."""
+    shown = reported or Reported.coordinates(draws.shape[-1])
+    values = np.moveaxis(shown.values(draws), -1, 0)
+    with np.errstate(all="ignore"):
+        r_hat = np.nan_to_num(np.asarray(array_stats.rhat(values), dtype=float), nan=np.inf)
+        bulk = np.nan_to_num(np.asarray(array_stats.ess(values, method="bulk"), dtype=float))
+        tail = np.nan_to_num(np.asarray(array_stats.ess(values, method="tail", prob=TAILS), dtype=float))
+    return _worst(shown.names, r_hat, bulk, tail)
+
+
+def weighted_statistics(
+    points: Float[np.ndarray, "draw dimension"], weights: Float[np.ndarray, "draw"], reported: Reported | None = None
+) -> Statistics:
+    """Statistics of independent draws with normalised importance weights."""
+    shown = reported or Reported.coordinates(points.shape[-1])
+    values = shown.values(points)
+    order = np.argsort(values, axis=0)
+    share = np.cumsum(weights[order], axis=0)
+    bulk = _effective(values, weights)
+    below = np.stack([np.take_along_axis(values, np.argmax(share >= tail, axis=0)[None], 0) for tail in TAILS])
+    tail = np.min([_effective((values <= edge).astype(float), weights) for edge in below], axis=0)
+    return _worst(shown.names, np.ones(len(bulk)), bulk, tail)
+
+
+def _effective(
+    values: Float[np.ndarray, "draw quantity"], weights: Float[np.ndarray, "draw"]
+) -> Float[np.ndarray, "quantity"]:
+    """Number of independent draws of equal weight whose mean has the same variance."""
+    squares = (values - weights @ values) ** 2
+    variance, error = weights @ squares, weights**2 @ squares
+    return np.divide(variance, error, out=np.zeros_like(error), where=error > 0)
+
+
+def _worst(
+    names: tuple[str, ...],
+    r_hat: Float[np.ndarray, "quantity"],
+    bulk: Float[np.ndarray, "quantity"],
+    tail: Float[np.ndarray, "quantity"],
+) -> Statistics:
+    shortage = np.log(np.maximum(r_hat - 1, 1e-12) / 0.01), -np.log(np.maximum(np.minimum(bulk, tail), 1e-12) / 400)
+    worst = int(np.argmax(np.maximum(*shortage)))
+    return Statistics(float(r_hat.max()), float(bulk.min()), float(tail.min()), names[worst], bulk)
+
+
+def share_with_error(inside: Float[np.ndarray, "chain draw"]) -> tuple[float, float]:
+    """Share of the draws with some property, and its Monte Carlo standard error with what chains differ by."""
+    share = float(inside.mean())
+    if share in (0.0, 1.0):
+        return share, 0.0
+    with np.errstate(all="ignore"):
+        within = float(np.nan_to_num(array_stats.mcse(inside[None], method="mean")[0]))
+    between = float(inside.mean(axis=1).std(ddof=1)) / len(inside) ** 0.5 if len(inside) > 1 else 0.0
+    return share, max(within, between)

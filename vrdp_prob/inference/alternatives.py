@@ -48,15 +48,12 @@ class Encounter:
         What local fits say about contacts among them.
     first_contact
         Time (s) of the first contact that each body is known to have had, where it has met something before.
-    odd
-        Whether what followed is not explained yet.
     """
 
     bodies: frozenset[int]
     begin: float
     contacts: tuple[SeenContact, ...]
     first_contact: dict[int, float]
-    odd: bool
 
 
 def alternatives(

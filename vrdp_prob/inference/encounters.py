@@ -66,9 +66,9 @@ class EncounterFinder:
         for one in chosen:
             self._tried[one] = self._tried.get(one, 0) + 1
             self._turned.update(yaw_places(self._likelihood, (one.first, one.second)))
-        return [self._encounter(group, contacts, suspects) for group in _groups(chosen)]
+        return [self._encounter(group, contacts) for group in _groups(chosen)]
 
-    def _encounter(self, group: Sequence[Approach], contacts: Sequence[Contact], suspects: set[int]) -> Encounter:
+    def _encounter(self, group: Sequence[Approach], contacts: Sequence[Contact]) -> Encounter:
         bodies = frozenset(body for one in group for body in (one.first, one.second))
         pairs = {(one.first, one.second) for one in group}
         begin = min(one.time for one in group)
@@ -82,7 +82,7 @@ class EncounterFinder:
             for body in {i, j} & bodies:
                 if time < begin - SETTLED / 2:
                     first.setdefault(body, time)
-        return Encounter(bodies, begin, seen, first, odd=bool(suspects & bodies))
+        return Encounter(bodies, begin, seen, first)
 
 
 def _contacts(likelihood: Likelihood, hypothesis: Hypothesis, frame_count: int) -> list[Contact]:

@@ -55,8 +55,7 @@ CONTACT_FIELDS = ("angle", "mass", "restitution")
 class GrowingFit:
     """Explanations of the first frames, the best one first.
 
-    `doubtful` says whether it met a situation in which the search may well have gone astray: a motion that nothing
-    explained at first, or several open yaws at once.
+    `doubtful` says whether several cubes with open yaws met, where the search may well have gone astray.
 
     Parameters
     ----------
@@ -130,7 +129,7 @@ class GrowingFit:
             return
         best = self.hypotheses[0]
         for encounter in self._finder.due(best, frame_count):
-            self.doubtful |= encounter.odd or len(yaw_places(self.likelihood, encounter.bodies)) > 1
+            self.doubtful |= len(yaw_places(self.likelihood, encounter.bodies)) > 1
             active = self._active(frame_count, encounter.bodies)
             found = alternatives(
                 self._descent,

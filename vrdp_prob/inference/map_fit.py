@@ -32,10 +32,10 @@ from vrdp_prob.scene import Tracks
 
 AGREED = 1.0
 """Fits are grown anew until the two best agree to so many nats..."""
-MOST_ATTEMPTS, MOST_IF_BAD = 3, 5
-"""...but at most so many, or so many where none is as good as noise alone would make it..."""
+MOST_ATTEMPTS = 3
+"""...but at most so many, where the first met several open yaws at once or is not plausible..."""
 GOOD_COST = 1.15
-"""...give or take this factor."""
+"""...which it is up to this factor on the cost that noise alone would make."""
 MODEL_ERROR_ROUNDS = 2
 """Times that the model error and the fit are found in turn."""
 LBFGS_ITERATIONS = 30
@@ -174,16 +174,16 @@ class _Task:
 def _attempts(task: _Task, generator: np.random.Generator, progress: ProgressDisplay | None) -> list[GrowingFit]:
     """Fits that grow anew from other draws until no doubt is left."""
     attempts = [_grow(task, generator, progress)]
-    while _in_doubt(attempts) and len(attempts) < (MOST_ATTEMPTS if _plausible(attempts) else MOST_IF_BAD):
+    while _in_doubt(attempts) and len(attempts) < MOST_ATTEMPTS:
         attempts.append(_grow(task, generator, progress))
     return attempts
 
 
 def _in_doubt(attempts: Sequence[GrowingFit]) -> bool:
-    """Whether a fit met what easily leads astray, and no two plausible fits agree on the best explanation."""
+    """Whether a fit met what easily leads astray or explains too little, and no two agree on the best explanation."""
     costs = sorted(one.hypotheses[0].cost for one in attempts)
-    agreed = len(costs) > 1 and costs[1] - costs[0] < AGREED and _plausible(attempts)
-    return any(one.doubtful for one in attempts) and not agreed
+    agreed = len(costs) > 1 and costs[1] - costs[0] < AGREED
+    return not agreed and (any(one.doubtful for one in attempts) or not _plausible(attempts))
 
 
 def _plausible(attempts: Sequence[GrowingFit]) -> bool:

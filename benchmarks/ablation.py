@@ -66,9 +66,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--docs", type=Path, help="folder for ablation-table.md, the table as a page holds it")
     options = parser.parse_args(arguments)
     torch.set_num_threads(1)
-    rows = {title: row(PLANS[name], options.scenes, options.questions) for title, name in ROWS.items()}
+    rows: dict[str, Row] = {}
+    for title, name in ROWS.items():
+        rows[title] = row(PLANS[name], options.scenes, options.questions)
+        print(table(rows), flush=True)
     text = table(rows)
-    print(text)
     if options.docs is not None:
         (options.docs / "ablation-table.md").write_text(text, encoding="utf-8")
     if options.json is not None:
@@ -142,7 +144,8 @@ def table(rows: dict[str, Row]) -> str:
     for title, one in rows.items():
         errors = [f"{np.median(part):.4f} ({np.mean(part):.3f})" for part in (one.inside, one.later)]
         again = f"{np.median(one.later_reoptimised):.4f} ({np.mean(one.later_reoptimised):.3f})"
-        cells = [title, f"{np.mean(one.found):.0%}", *errors, again, f"{one.score.per_question:.1%}"]
+        answers = f"{one.score.per_question:.1%}" if one.score.questions else "not asked"
+        cells = [title, f"{np.mean(one.found):.0%}", *errors, again, answers]
         lines.append(f"| {' | '.join(cells)} |")
     return "\n".join(lines) + "\n"
 

@@ -1,6 +1,6 @@
 """What several videos say together: width and coverage of the shared friction, time and memory against their number.
 
-    python benchmarks/several_videos.py [--json FILE] [--videos 1,3,10] [--short 30,100] [--sets 12]
+    python benchmarks/several_videos.py [--json FILE] [--videos 1,3,10] [--short 30,100] [--sets 8]
 
 Videos are of the tests' own generator: three cylinders that hit one another (60 frames), and for many videos single
 cylinders that slide (30 frames). All have the same friction and drag. Coverage is over several sets of fresh videos,
@@ -58,8 +58,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--json", type=Path, help="file for the checks")
     parser.add_argument("--videos", default="1,3,10", help="numbers of videos with collisions")
     parser.add_argument("--short", default="30,100", help="numbers of short videos without")
-    parser.add_argument("--sets", type=int, default=12, help="sets of fresh videos for the coverage, for each number")
-    parser.add_argument("--gibbs", default="1,3,10,30", help="numbers of videos that chains are run for as well")
+    parser.add_argument("--sets", type=int, default=8, help="sets of fresh videos for the coverage, for each number")
+    parser.add_argument("--gibbs", default="1,3,10", help="numbers of videos that chains are run for as well")
     options = parser.parse_args(arguments)
     torch.set_num_threads(1)
     compile_model(PhysicsModel.base())

@@ -17,7 +17,7 @@ from vrdp_prob.inference.map_fit import MapFit, fit_map
 from vrdp_prob.inference.predictive import replicated
 from vrdp_prob.inference.samples import Samples
 from vrdp_prob.inference.tree import PREDICTIVE_DRAWS, posterior_tree
-from vrdp_prob.models.model_error import ModelError
+from vrdp_prob.models.model_error import ModelError, straying
 from vrdp_prob.models.noise import NoiseFamily
 from vrdp_prob.models.unknowns import DEGREES_OF_FREEDOM
 from vrdp_prob.models.unknowns import NOISE as NOISE_SCALE
@@ -104,12 +104,13 @@ def test_predicted_measurements_stray_as_the_model_error_and_have_the_tails_of_t
     exact, noise = likelihood.predicted(point[:1])[..., :2], likelihood.coordinates.quantities(point)[NOISE_SCALE][0, 0]
     unit = float(noise) * likelihood.observations.position_reference
     count, angles = len(likelihood.observations.frame), len(likelihood.observations.angle)
-    error = ModelError(3.0, 1.0, 0.5, np.ones(count), np.ones(angles))
-    strayed = replicated(likelihood.with_model_error(error), point, np.random.default_rng(0)) - exact
-    seen = strayed[:, :, 0] / unit
-    assert (seen**2).mean() == pytest.approx(1 + 9, rel=0.05)
-    correlation = (seen[:, 5] * seen[:, 10]).mean() / 9
-    assert correlation == pytest.approx(error.correlation(tracks().times)[5, 10], abs=0.05)
+    error = ModelError(float(noise), 1.0, 300.0, 0.0, 0.5, np.ones(count), np.ones(angles))
+    strayed = replicated(replace(likelihood, model_error=error), point, np.random.default_rng(0)) - exact
+    seen, times = strayed[:, :, 0] / unit, tracks().times
+    paths = 300.0**2 * straying(times, times[0], 0.5)
+    for frame in (0, 5, 10):
+        assert (seen[:, frame] ** 2).mean() == pytest.approx(1 + paths[frame, frame], rel=0.1)
+    assert (seen[:, 5] * seen[:, 10]).mean() == pytest.approx(paths[5, 10], rel=0.15)
     robust = replace(likelihood, noise=NoiseFamily.STUDENT_T)
     degrees = float(likelihood.coordinates.quantities(point)[DEGREES_OF_FREEDOM][0, 0])
     wide = replicated(robust, point, np.random.default_rng(0))[:, :, 0] - exact[:, :, 0]

@@ -11,6 +11,7 @@ from vrdp_prob.inference.free_flight import (
     LocalFit,
     SeenContact,
     approaches,
+    local_fit,
     noise_scale,
     release_fit,
     seen_contacts,
@@ -20,6 +21,8 @@ from vrdp_prob.models.noise import NoiseFamily
 from vrdp_prob.models.observation import prior_noise
 from vrdp_prob.scene import Tracks
 
+SIGNIFICANT = 5.0
+"""A body moves if its speed is so many standard deviations."""
 REST_TEST = 3.0
 """A body rests until its first contact if its scatter about one place exceeds the noise by less than so many sd."""
 REST_LOOK = 0.6
@@ -28,6 +31,9 @@ SHORTEST_REST_TEST = 6
 """Degrees of freedom (two per position) below which a scatter says nothing."""
 STILL_ANGLE_SD = 0.06
 """Scatter (rad) of measured angles up to which a body does not turn; shadows and occlusion let angles drift."""
+
+ACCELERATION_SPAN = 0.5
+"""Length in s of the stretches over which accelerations are looked at."""
 
 
 @dataclass(frozen=True)
@@ -85,6 +91,20 @@ class Clues:
             if not any(self._stays(body, times < end) for end in until):
                 moving.add(body)
         return frozenset(moving)
+
+    @cached_property
+    def acceleration(self) -> float:
+        """Typical acceleration (m/s^2) of what moves, over stretches in which hardly any contact falls."""
+        found = []
+        half = ACCELERATION_SPAN / 2
+        for body in range(len(self.clean.bodies)):
+            for middle in np.arange(self.clean.times[0] + half, self.clean.times[-1], half):
+                stretch = {"start": middle - half, "stop": middle + half, "noise": self.noise}
+                fit = local_fit(self.clean, body, middle, **stretch)
+                if fit is not None and np.linalg.norm(fit.velocity) > SIGNIFICANT * fit.velocity_sd:
+                    found.append(float(np.linalg.norm(fit.acceleration)))
+        least = self.noise / ACCELERATION_SPAN**2
+        return max(float(np.median(found)), least) if found else least
 
     def first_contact(self, body: int) -> float:
         """Time (s) shortly before the first contact of a body; after the video where there is none."""

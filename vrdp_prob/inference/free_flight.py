@@ -3,7 +3,7 @@
 Quadratic and not linear: friction bends a track enough within 0.2 s to bias a momentum balance.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import combinations
 
 import numpy as np
@@ -28,14 +28,16 @@ NORMAL_MAD = 0.6745
 
 @dataclass(frozen=True)
 class LocalFit:
-    """Position (m) and velocity (m/s) of a body at one time from a polynomial through a stretch of its track.
+    """Position (m), velocity (m/s) and acceleration (m/s^2) of a body at one time from a polynomial through its track.
 
-    `velocity_sd` is the velocity's standard deviation per axis for noise of the given scale.
+    `velocity_sd` is the velocity's standard deviation per axis for noise of the given scale. The acceleration is 0
+    where a straight line was fitted.
     """
 
     position: Float[np.ndarray, "2"]
     velocity: Float[np.ndarray, "2"]
     velocity_sd: float
+    acceleration: Float[np.ndarray, "2"] = field(default_factory=lambda: np.zeros(2))
 
 
 @dataclass(frozen=True)
@@ -96,7 +98,8 @@ def local_fit(
     inverse = np.linalg.pinv(design)
     coefficients = inverse @ positions[chosen]
     velocity_sd = noise * float(np.linalg.norm(inverse[1]))
-    return LocalFit(coefficients[0], coefficients[1], velocity_sd)
+    acceleration = 2 * coefficients[2] if len(coefficients) > 2 else np.zeros(2)
+    return LocalFit(coefficients[0], coefficients[1], velocity_sd, acceleration)
 
 
 def release_fit(tracks: Tracks, body: int, noise: float, until: float, start: float | None = None) -> LocalFit:

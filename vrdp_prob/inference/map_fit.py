@@ -18,9 +18,8 @@ from vrdp_prob.inference.growing_fit import GrowingFit, merged
 from vrdp_prob.inference.misfit import Misfit, judge
 from vrdp_prob.inference.mode import Mode
 from vrdp_prob.inference.mode_search import ModeSearch
-from vrdp_prob.inference.model_error_fit import fit_model_error
+from vrdp_prob.inference.model_error_fit import TURNS, next_model_error
 from vrdp_prob.inference.modes import HOPELESS, carried, colliding, distinct_modes, without_idle
-from vrdp_prob.inference.noise_fit import noise_sd
 from vrdp_prob.inference.plan import FitPlan
 from vrdp_prob.inference.refinement import Refined, climb, refine
 from vrdp_prob.models.likelihood import Likelihood
@@ -36,8 +35,6 @@ MOST_ATTEMPTS = 3
 """...but at most so many, where the first met several open yaws at once or is not plausible..."""
 GOOD_COST = 1.15
 """...which it is up to this factor on the cost that noise alone would make."""
-MODEL_ERROR_ROUNDS = 2
-"""Times that the model error and the fit are found in turn."""
 LBFGS_ITERATIONS = 30
 
 
@@ -135,15 +132,15 @@ def fit_map(
     found = _refined(everything, starts, likelihood, stages)
     misfit = judge(likelihood, found[0].point, clues.noise, int(clues.outliers.sum()))
     evaluations = sum(one.evaluations for one in attempts) + sum(one.evaluations for one in found)
-    for _ in range(MODEL_ERROR_ROUNDS):
-        error = fit_model_error(likelihood, found[0].point)
-        if error is None:
+    for _ in range(TURNS):
+        error = next_model_error(likelihood, found[0].point, clues, misfit)
+        if error is None or error is likelihood.model_error:
             break
-        widened = Likelihood(tracks, model, unknowns(tracks, model, structure), NoiseFamily.GAUSSIAN, error)
+        widened = Likelihood(tracks, model, unknowns(tracks, model, structure, model_error=error), model_error=error)
         found = _refined(likelihood, [one.point for one in found], widened, stages)
         likelihood = widened
         evaluations += sum(one.evaluations for one in found)
-        misfit = misfit.with_error(error, noise_sd(likelihood, found[0].point))
+        misfit = misfit.with_error(error, likelihood.observations.position_reference)
     climbed = [climb(likelihood, mode, LBFGS_ITERATIONS) for mode in distinct_modes(likelihood, found)]
     likelihood, modes = without_idle(likelihood, distinct_modes(likelihood, climbed), clues.moving)
     converged = found[0].converged or max(climbed, key=lambda one: one.log_density).converged

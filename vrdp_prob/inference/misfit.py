@@ -32,8 +32,9 @@ class Misfit:
         Id of the body with the largest residuals, and `worst_sd` their standard deviation in m.
     outliers
         Number of positions that lie far off those before and after.
-    error_sd, error_duration
-        Size (m) and duration (s) of the model error by which the intervals are widened; None where none is needed.
+    error_acceleration, error_duration
+        Size (m/s^2) and duration (s) of the unknown acceleration that the intervals allow for; None where none is
+        needed.
     """
 
     residual_sd: float
@@ -43,7 +44,7 @@ class Misfit:
     worst: str
     worst_sd: float
     outliers: int = 0
-    error_sd: float | None = None
+    error_acceleration: float | None = None
     error_duration: float | None = None
 
     @property
@@ -52,10 +53,14 @@ class Misfit:
         return (self.residual_sd / self.noise_sd) ** 2
 
     @property
+    def large(self) -> bool:
+        """Whether the residuals are much larger than noise."""
+        return self.residual_sd > LARGEST_RATIO * self.noise_sd
+
+    @property
     def fits(self) -> bool:
         """Whether nothing speaks against the model."""
-        small = self.residual_sd <= LARGEST_RATIO * self.noise_sd
-        return small and (self.noise_stated or self.error_sd is None)
+        return not self.large and (self.noise_stated or self.error_acceleration is None)
 
     @property
     def sentences(self) -> tuple[str, ...]:
@@ -68,9 +73,10 @@ class Misfit:
             )
         return found
 
-    def with_error(self, error: ModelError, noise_sd: float) -> "Misfit":
-        """The same with a model error, for noise (m) of a size."""
-        return replace(self, error_sd=error.position * noise_sd, error_duration=error.duration)
+    def with_error(self, error: ModelError, reference: float) -> "Misfit":
+        """The same with a model error, where noise scale 1 stands for a reference (m)."""
+        acceleration = error.acceleration * error.noise_scale * reference
+        return replace(self, error_acceleration=acceleration, error_duration=error.duration)
 
     def _misfit_sentence(self) -> str:
         text = (
@@ -78,10 +84,10 @@ class Misfit:
             f"where measurement noise is {self.noise_sd:.2g} m (most for object {self.worst}, {self.worst_sd:.2g} m), "
             f"and neighbouring errors are alike (correlation {self.correlation:.2f})."
         )
-        if self.error_sd is not None:
+        if self.error_acceleration is not None:
             text += (
-                f" The intervals contain a model error of {self.error_sd:.2g} m that lasts about "
-                f"{self.error_duration:.2g} s; masses, restitutions and predictions may still be biased."
+                f" The intervals allow for an unknown acceleration of {self.error_acceleration:.2g} m/s^2 that lasts "
+                f"about {self.error_duration:.2g} s; masses, restitutions and predictions may still be biased."
             )
         return text
 

@@ -5,27 +5,38 @@ not lost (restricted likelihood). Source: Rasmussen and Williams, Gaussian Proce
 section 2.7; Kennedy and O'Hagan, Journal of the Royal Statistical Society B 63 (2001), section 4.4.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import torch
 from jaxtyping import Float
 from scipy.linalg import solve_triangular
-from scipy.optimize import minimize
+from scipy.optimize import OptimizeResult, minimize
 
+from vrdp_prob.inference.clues import Clues
 from vrdp_prob.inference.least_squares import jacobian
+from vrdp_prob.inference.misfit import Misfit
 from vrdp_prob.inference.noise_fit import NOISE_FIELDS
 from vrdp_prob.models.likelihood import Likelihood
 from vrdp_prob.models.model_error import ModelError, Strand
+from vrdp_prob.models.unknowns import ANGLE_NOISE
 
+TURNS = 4
+"""Times that a model error and a fit are found in turn, the expected error being the first."""
 NEEDED = 6.0
 """Gain (nats) in the probability of the residuals from which on the model is said to have an error."""
-SIZES = (1e-3, 1e4)
-"""Range of the size of a model error in units of the noise."""
-FIRST_SIZE, FIRST_DURATION = 1.0, 0.3
-"""Where the search begins: in units of the noise, and s."""
-EVALUATIONS = 120
+LARGEST_SHARE = 3.0
+"""A model leaves out at most so many times the accelerations that its bodies show..."""
+EXPECTED_SHARE, SHARE_LOG_SD = 0.3, 1.0
+"""...and is expected to leave out this share of them, within a factor e."""
+EXPECTED_DURATION = 0.3
+"""Duration (s) of a model error before it is looked for."""
+NOISE_LOG_SD = 0.1
+"""How well the tracks' roughness tells the noise, in the logarithm."""
+STARTS = ((0.1, 0.2), (0.1, 2.0), (1.0, 0.2))
+"""Where the search begins: share of the accelerations, and duration in s."""
+EVALUATIONS = 100
 LARGEST_VARIANCE = 1e8
 """Variance factor of the worst outlier."""
 
@@ -53,7 +64,7 @@ class _Linear:
     prior_residuals: Float[np.ndarray, "prior"]
     prior_derivative: Float[np.ndarray, "prior dimension"]
 
-    def cost(self, scale: float, error: ModelError | None) -> float:
+    def cost(self, scale: float, size: float, duration: float) -> float:
         """Negative log probability (nats, up to a constant) of the residuals, the unknowns integrated out."""
         squares = float(self.prior_residuals @ self.prior_residuals)
         curvature = self.prior_derivative.T @ self.prior_derivative
@@ -61,12 +72,7 @@ class _Linear:
         log_volume = 0.0
         for strand in self.strands:
             places = strand.places
-            covariance = (
-                np.diag(self.variance[places])
-                if error is None
-                else strand.covariance(error, error.position, self.variance)
-            )
-            root = scale * np.linalg.cholesky(covariance)
+            root = scale * np.linalg.cholesky(strand.covariance(size, duration, self.variance))
             both = np.column_stack([self.residuals[places], self.derivative[places]])
             whitened = solve_triangular(root, both, lower=True)
             values, slopes = whitened[:, 0], whitened[:, 1:]
@@ -79,7 +85,49 @@ class _Linear:
         return log_volume + float(np.log(np.diag(factor)).sum()) + (squares - float(absorbed @ absorbed)) / 2
 
 
-def fit_model_error(likelihood: Likelihood, point: Float[np.ndarray, "dimension"]) -> ModelError | None:
+def next_model_error(
+    likelihood: Likelihood, point: Float[np.ndarray, "dimension"], clues: Clues, misfit: Misfit
+) -> ModelError | None:
+    """What a fit is to allow for next: nothing, or what one expects of a model error, or what the residuals show.
+
+    Parameters
+    ----------
+    likelihood
+        The density that was fitted.
+    point
+        The fit.
+    clues
+        Noise and accelerations that the tracks show by themselves.
+    misfit
+        How the residuals of the first fit, without a model error, compare with the noise.
+    """
+    if likelihood.model_error is not None:
+        return fit_model_error(likelihood, point, clues) or likelihood.model_error
+    if misfit.large or fit_model_error(likelihood, point, clues) is not None:
+        return expected_model_error(likelihood, point, clues)
+    return None
+
+
+def expected_model_error(likelihood: Likelihood, point: Float[np.ndarray, "dimension"], clues: Clues) -> ModelError:
+    """A model error as large as one expects beforehand.
+
+    A first fit that lacks it may have its contacts at wrong times, which would look like much larger accelerations.
+    """
+    share = EXPECTED_SHARE * clues.acceleration / clues.noise
+    position, angle = _variances(likelihood, point)
+    scales = likelihood.coordinates.quantities(torch.from_numpy(point[None]))
+    return ModelError(
+        noise_scale=clues.noise / likelihood.observations.position_reference,
+        angle_noise_scale=float(scales[ANGLE_NOISE][0, 0]),
+        acceleration=share,
+        angular_acceleration=share,
+        duration=EXPECTED_DURATION,
+        position_variance=position,
+        angle_variance=angle,
+    )
+
+
+def fit_model_error(likelihood: Likelihood, point: Float[np.ndarray, "dimension"], clues: Clues) -> ModelError | None:
     """The error of the model that the residuals of a fit show; None where noise explains them as well.
 
     Parameters
@@ -88,47 +136,96 @@ def fit_model_error(likelihood: Likelihood, point: Float[np.ndarray, "dimension"
         The density that was fitted.
     point
         The fit.
+    clues
+        Noise and accelerations that the tracks show by themselves.
     """
     positions, angles = _linear(likelihood, point)
-    step = float(np.median(np.diff(likelihood.tracks.times)))
-    span = float(likelihood.tracks.times[-1] - likelihood.tracks.times[0])
-    size, duration = _searched(positions, step, max(span, 3 * step), None)
-    if size is None or duration is None:
+    found = _search(likelihood, clues).run(positions)
+    if found is None:
         return None
-    angle_size = 0.0
+    scale, size, duration = found
+    angle_scale, angle_size = 1.0, 0.0
     if len(angles.residuals):
-        angle_size = _searched(angles, step, span, duration)[0] or 0.0
-    return ModelError(size, angle_size, duration, positions.variance[::2], angles.variance)
+        angle_scale, angle_size = _spread(angles), 0.0
+        turning = _Search(np.log(angle_scale), 10.0, np.log(clues.acceleration / clues.noise), (duration, duration))
+        angle_scale, angle_size, _ = turning.run(angles) or (angle_scale, angle_size, duration)
+    return ModelError(scale, angle_scale, size, angle_size, duration, positions.variance[::2], angles.variance)
 
 
-def _searched(
-    linear: _Linear, shortest: float, longest: float, duration: float | None
-) -> tuple[float | None, float | None]:
-    """Most probable size and duration (given one where it is not searched); None where none is needed."""
-    low, high = np.log([SIZES[0], shortest]), np.log([SIZES[1], longest])
+def _search(likelihood: Likelihood, clues: Clues) -> "_Search":
+    times = likelihood.tracks.times
+    step = float(np.median(np.diff(times)))
+    durations = (step, max(float(times[-1] - times[0]), 3 * step))
+    log_noise = np.log(clues.noise / likelihood.observations.position_reference)
+    if likelihood.tracks.position_covariance is None:
+        return _Search(log_noise, NOISE_LOG_SD, np.log(clues.acceleration / clues.noise), durations)
+    # stated noise may be alike in neighbouring frames: the noise proper is somewhere between roughness and statement
+    between = abs(log_noise) / 2
+    return _Search(log_noise / 2, NOISE_LOG_SD + between, np.log(clues.acceleration / clues.noise), durations)
 
-    def error(values: Float[np.ndarray, "value"]) -> ModelError:
-        size = float(np.exp(np.clip(values[1], low[0], high[0])))
-        lasting = duration if duration is not None else float(np.exp(np.clip(values[2], low[1], high[1])))
-        return ModelError(size, size, lasting, np.ones(0), np.ones(0))
 
-    def cost(values: Float[np.ndarray, "value"]) -> float:
-        return linear.cost(float(np.exp(values[0])), error(values))
+@dataclass(frozen=True)
+class _Search:
+    """Where the scale of the noise and the size and duration of a model error are looked for.
 
-    scale = np.log(np.sqrt(np.mean(linear.residuals**2 / linear.variance)))
-    plain = minimize(
-        lambda values: linear.cost(float(np.exp(values[0])), None),
-        [scale],
-        method="Nelder-Mead",
-        options={"maxfev": EVALUATIONS // 3, "xatol": 0.01, "fatol": 0.01},
-    )
-    first = [scale - 0.5, np.log(FIRST_SIZE), *([] if duration is not None else [np.log(FIRST_DURATION)])]
-    options = {"maxfev": EVALUATIONS, "xatol": 0.02, "fatol": 0.02}
-    found = minimize(cost, first, method="Nelder-Mead", options=options)
-    if plain.fun - found.fun < NEEDED:
-        return None, None
-    best = error(found.x)
-    return best.position, best.duration
+    Parameters
+    ----------
+    log_noise, noise_log_sd
+        Normal prior of the log noise scale.
+    log_acceleration
+        Logarithm of the accelerations that bodies show, in units of the noise per s^2.
+    durations
+        Shortest and longest duration (s).
+    """
+
+    log_noise: float
+    noise_log_sd: float
+    log_acceleration: float
+    durations: tuple[float, float]
+
+    def run(self, linear: _Linear) -> tuple[float, float, float] | None:
+        """Most probable scale of the noise, size and duration; None where noise explains the residuals as well."""
+        starts = self._starts
+        costs = [self._with_error(linear, np.array(start)) for start in starts]
+        best = self._minimum(lambda values: self._with_error(linear, values), starts[int(np.argmin(costs))])
+        if self._plain(linear) - best.fun < NEEDED:
+            return None
+        return float(np.exp(best.x[0])), self._size(best.x), self._duration(best.x)
+
+    @property
+    def _starts(self) -> list[list[float]]:
+        """First guesses: log noise scale, log size, log duration."""
+        return [[self.log_noise, np.log(share) + self.log_acceleration, np.log(lasting)] for share, lasting in STARTS]
+
+    def _plain(self, linear: _Linear) -> float:
+        """Cost without a model error, at the best scale of the noise."""
+        return float(self._minimum(lambda values: self._cost(linear, values[0]), [np.log(_spread(linear))]).fun)
+
+    def _minimum(self, cost: Callable[[np.ndarray], float], start: list[float]) -> OptimizeResult:
+        options = {"maxfev": EVALUATIONS, "xatol": 0.03, "fatol": 0.03}
+        return minimize(cost, start, method="Nelder-Mead", options=options)
+
+    def _with_error(self, linear: _Linear, values: Float[np.ndarray, "3"]) -> float:
+        size, duration = self._size(values), self._duration(values)
+        expected = np.log(EXPECTED_SHARE) + self.log_acceleration
+        prior = ((np.log(size) - expected) / SHARE_LOG_SD) ** 2 / 2
+        outside = (values[1:] - np.log([size, duration])) ** 2
+        return self._cost(linear, values[0], size, duration) + prior + float(outside.sum())
+
+    def _cost(self, linear: _Linear, log_scale: float, size: float = 0.0, duration: float = 1.0) -> float:
+        prior = ((log_scale - self.log_noise) / self.noise_log_sd) ** 2 / 2
+        return linear.cost(float(np.exp(log_scale)), size, duration) + float(prior)
+
+    def _size(self, values: Float[np.ndarray, "3"]) -> float:
+        return float(np.exp(min(values[1], np.log(LARGEST_SHARE) + self.log_acceleration)))
+
+    def _duration(self, values: Float[np.ndarray, "3"]) -> float:
+        return float(np.clip(np.exp(np.clip(values[2], -10, 10)), *self.durations))
+
+
+def _spread(linear: _Linear) -> float:
+    """Root mean square of the residuals, outliers discounted."""
+    return float(np.sqrt(np.mean(linear.residuals**2 / linear.variance)))
 
 
 def _linear(likelihood: Likelihood, point: Float[np.ndarray, "dimension"]) -> tuple[_Linear, _Linear]:

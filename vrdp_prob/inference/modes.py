@@ -13,7 +13,6 @@ from vrdp_prob.inference.mode import Mode
 from vrdp_prob.inference.refinement import Refined, mode_at
 from vrdp_prob.inference.samples import evaluate
 from vrdp_prob.models.likelihood import Likelihood
-from vrdp_prob.models.noise import NoiseFamily
 from vrdp_prob.models.unknowns import Structure, unknowns
 
 LEAST_EVIDENCE = 7.0
@@ -41,9 +40,10 @@ def without_idle(
     likelihood: Likelihood, modes: Sequence[Mode], moving: frozenset[int]
 ) -> tuple[Likelihood, tuple[Mode, ...]]:
     """The same modes without the unknowns of bodies that meet nobody in any of them."""
-    family = NoiseFamily.GAUSSIAN if likelihood.model_error is not None else likelihood.noise
     structure = Structure(moving, colliding(likelihood, [mode.point for mode in modes]))
-    coordinates = unknowns(likelihood.tracks, likelihood.model, structure, family)
+    coordinates = unknowns(
+        likelihood.tracks, likelihood.model, structure, likelihood.noise, model_error=likelihood.model_error
+    )
     if len(coordinates) == len(likelihood.coordinates):
         return likelihood, tuple(modes)
     reduced = replace(likelihood, coordinates=coordinates)

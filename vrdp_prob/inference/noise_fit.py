@@ -42,6 +42,8 @@ def noise_curvature(
 ) -> tuple[Int[np.ndarray, "noise"], Float[np.ndarray, "noise noise"]]:
     """Places of the noise coordinates, and the curvature of the negative log posterior along them."""
     places = _places(likelihood)
+    if not len(places):
+        return places, np.zeros((0, 0))
     discrepancies = likelihood.discrepancies(torch.from_numpy(point[None]))
     chosen = torch.from_numpy(places)
 
@@ -54,12 +56,6 @@ def noise_curvature(
     values, vectors = np.linalg.eigh((curvature + curvature.T) / 2)
     least = np.maximum(values, likelihood.coordinates.prior_sd[places].max() ** -2)
     return places, (vectors * least) @ vectors.T
-
-
-def noise_sd(likelihood: Likelihood, point: Float[np.ndarray, "dimension"]) -> float:
-    """Standard deviation in m that the noise scale of a point stands for."""
-    place = likelihood.coordinates.places[NOISE, None]
-    return float(np.exp(point[place])) * likelihood.observations.position_reference
 
 
 def _places(likelihood: Likelihood) -> Int[np.ndarray, "noise"]:

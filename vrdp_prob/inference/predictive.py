@@ -5,8 +5,12 @@ from jaxtyping import Float
 from torch import Tensor
 
 from vrdp_prob.models.likelihood import Likelihood
+from vrdp_prob.models.model_error import straying
 from vrdp_prob.models.noise import NoiseFamily
 from vrdp_prob.models.unknowns import DEGREES_OF_FREEDOM, NOISE
+
+SMALLEST = 1e-10
+"""Share of the variance that keeps covariances positive."""
 
 
 def replicated(
@@ -61,7 +65,9 @@ def _straying(
     error = likelihood.model_error
     if error is None:
         return np.zeros_like(normal)
-    times = likelihood.tracks.times
-    root = np.linalg.cholesky(error.correlation(times) + 1e-9 * np.eye(len(times)))
-    paths: np.ndarray = np.einsum("ts,psbi->ptbi", root, normal)
-    return likelihood.observations.position_reference * error.position * paths
+    tracks, paths = likelihood.tracks, np.zeros_like(normal)
+    for body, release in enumerate(tracks.first_seen.tolist()):
+        covariance = straying(np.maximum(tracks.times, release), release, error.duration)
+        root = np.linalg.cholesky(covariance + SMALLEST * np.trace(covariance) * np.eye(len(covariance)))
+        paths[:, :, body] = root @ normal[:, :, body]
+    return likelihood.observations.position_reference * error.acceleration * paths

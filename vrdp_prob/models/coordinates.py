@@ -101,6 +101,13 @@ class Coordinates:
             dtype=bool,
         )
 
+    def held(self, fields: Iterable[str], point: Float[np.ndarray, "dimension"]) -> "Coordinates":
+        """The vector without some quantities, which keep the values that they have at a point."""
+        values = self.quantities(torch.from_numpy(point[None]))
+        kept = set(fields)
+        defaults = {name: values[name][0].numpy() if name in kept else old for name, old in self.defaults.items()}
+        return Coordinates(tuple(entry for entry in self.entries if entry.field not in kept), defaults)
+
     def quantities(self, points: Float[Tensor, "point dimension"]) -> dict[str, Float[Tensor, "point owner"]]:
         """Values of every quantity for all its owners (one column if it is shared)."""
         flat = self._all_defaults.expand(len(points), -1)

@@ -1,6 +1,6 @@
 """Log density of the tracks of one video, given its unknowns as one unconstrained vector."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -69,10 +69,6 @@ class Likelihood:
     def observations(self) -> Observations:
         """What was seen, as flat lists."""
         return Observations.of(self.tracks)
-
-    def with_model_error(self, error: ModelError) -> "Likelihood":
-        """The same with an error of the model; outliers are discounted by it, so that the noise is Gaussian."""
-        return replace(self, noise=NoiseFamily.GAUSSIAN, model_error=error)
 
     @cached_property
     def strands(self) -> Strands:

@@ -1,8 +1,10 @@
-"""The explicit term for what a model leaves unexplained: every body strays from its simulated path by a random process.
+"""The explicit term for what a model leaves unexplained: a random acceleration of every body.
 
-The process is Gaussian with a Matern covariance of order 3/2: smooth, so it is a force that nobody wrote down and not
-noise. Source: Kennedy and O'Hagan, Bayesian calibration of computer models, Journal of the Royal Statistical Society
-B 63 (2001), equation 4; Rasmussen and Williams, Gaussian Processes for Machine Learning (2006), equation 4.17.
+The acceleration is a Gaussian process that forgets itself exponentially; the path strays by its double integral, more
+and more after the release. So an unknown force leaves room where it acts, on velocities too, while noise stays what it
+is. Source: Kennedy and O'Hagan, Bayesian calibration of computer models, Journal of the Royal Statistical Society B 63
+(2001), equation 4 (a model's discrepancy as a Gaussian process); Singer, Estimating optimal tracking filter performance
+for manned maneuvering targets, IEEE Transactions on Aerospace and Electronic Systems 6 (1970) (this process).
 """
 
 from dataclasses import dataclass
@@ -15,62 +17,89 @@ from torch import Tensor
 
 from vrdp_prob.models.observation import Observations
 
+GRID_STEPS = 3.0
+"""Steps of the numerical integral per duration of the acceleration."""
+FINEST_STEPS = 4
+"""At most so many steps per frame."""
+
 
 @dataclass(frozen=True)
 class ModelError:
-    """Size and duration of the errors of a model.
+    """Size and duration of the accelerations that a model leaves out, and the noise beside it.
 
-    Both sizes are in units of the noise, whose scale is inferred: noise and model error grow together.
+    The noise is no unknown where there is a model error, so its size belongs here.
 
     Parameters
     ----------
-    position
-        Standard deviation of the straying of a position, in units of the position noise.
-    angle
-        Standard deviation of the straying of an angle, in units of the angle noise.
+    noise_scale, angle_noise_scale
+        Scales of the noise.
+    acceleration
+        Standard deviation of the acceleration along each axis, in units of the noise per s^2.
+    angular_acceleration
+        The same about the vertical axis, in units of the angle noise per s^2.
     duration
-        Time in s over which the straying keeps its direction.
+        Time in s after which the acceleration is another.
     position_variance, angle_variance
         Factor of the noise variance of each position and angle; above 1 for outliers.
     """
 
-    position: float
-    angle: float
+    noise_scale: float
+    angle_noise_scale: float
+    acceleration: float
+    angular_acceleration: float
     duration: float
     position_variance: Float[np.ndarray, "observation"]
     angle_variance: Float[np.ndarray, "angle"]
 
-    def correlation(self, times: Float[np.ndarray, "time"]) -> Float[np.ndarray, "time time"]:
-        """Correlation of the straying at some times (s)."""
-        distance = np.sqrt(3) * np.abs(times[:, None] - times[None]) / self.duration
-        return (1 + distance) * np.exp(-distance)
+
+def straying(times: Float[np.ndarray, "time"], release: float, duration: float) -> Float[np.ndarray, "time time"]:
+    """Covariance (s^4) of the double integral, from a release time on, of an acceleration of unit variance."""
+    since = times - release
+    steps = np.diff(np.unique(since))
+    step = float(np.median(steps)) if len(steps) else 1.0
+    step = max(min(step, duration / GRID_STEPS), step / FINEST_STEPS)
+    middles = np.arange(0.0, max(float(since.max()), step), step) + step / 2
+    weights = step * np.clip(since[:, None] - middles, 0.0, None)
+    alike = np.exp(-np.abs(middles[:, None] - middles) / duration)
+    covariance: np.ndarray = weights @ alike @ weights.T
+    return covariance
 
 
 @dataclass(frozen=True)
 class Strand:
-    """The numbers of one body that stray together: its seen positions (x and y in turn) or its measured angles.
+    """The numbers of one body that stray together: its seen positions, or its measured angles.
+
+    The two axes are strands of their own unless the noise mixes them; then x and y come in turn.
 
     Parameters
     ----------
     places
         Their places among all position (or angle) residuals.
     times
-        Time in s of each number.
+        Times in s at which it was seen.
+    release
+        Time in s of the body's release.
     sensitivity
         Change of each residual, at noise scale 1, per unit of straying along each of the strand's directions, where the
         unit is the noise that scale 1 stands for.
     """
 
     places: Int[np.ndarray, "number"]
-    times: Float[np.ndarray, "number"]
+    times: Float[np.ndarray, "seen"]
+    release: float
     sensitivity: Float[np.ndarray, "number direction"]
 
     def covariance(
-        self, error: ModelError, size: float, variance: Float[np.ndarray, "all_numbers"]
+        self, size: float, duration: float, variance: Float[np.ndarray, "all_numbers"]
     ) -> Float[np.ndarray, "number number"]:
         """Covariance of the residuals in units of the noise: independent noise plus straying of a size."""
-        alike = self.sensitivity @ self.sensitivity.T
-        return np.diag(variance[self.places]) + size**2 * alike * error.correlation(self.times)
+        numbers = len(self.places) // len(self.times)
+        paths = straying(self.times, self.release, duration)
+        if numbers > 1:
+            paths = np.kron(paths, np.ones((numbers, numbers)))
+        covariance = size**2 * (self.sensitivity @ self.sensitivity.T) * paths
+        covariance[np.diag_indices(len(covariance))] += variance[self.places]
+        return covariance
 
 
 @dataclass(frozen=True)
@@ -84,16 +113,21 @@ class Strands:
     def of(cls, observations: Observations, times: Float[np.ndarray, "time"]) -> "Strands":
         """The strands of what was seen; in each the numbers are in order of time."""
         positions, angles = [], []
+        whitening = observations.position_reference * observations.whitening
+        axes = [[0], [1]] if not whitening[:, [0, 1], [1, 0]].any() else [[0, 1]]
         for body in range(observations.body_count):
             seen = np.flatnonzero(observations.body == body)
-            if len(seen):
-                places = np.stack([2 * seen, 2 * seen + 1], axis=1).ravel()
-                whitening = observations.position_reference * observations.whitening[seen]
-                moments = np.repeat(times[observations.frame[seen]], 2)
-                positions.append(Strand(places, moments, whitening.reshape(-1, 2)))
+            if not len(seen):
+                continue
+            moments = times[observations.frame[seen]]
+            for chosen in axes:
+                places = (2 * seen[:, None] + np.array(chosen)).ravel()
+                sensitivity = whitening[seen][:, chosen][:, :, chosen].reshape(len(places), len(chosen))
+                positions.append(Strand(places, moments, moments[0], sensitivity))
             turned = np.flatnonzero(observations.angle_body == body)
             if len(turned):
-                angles.append(Strand(turned, times[observations.angle_frame[turned]], np.ones((len(turned), 1))))
+                angle_moments = times[observations.angle_frame[turned]]
+                angles.append(Strand(turned, angle_moments, moments[0], np.ones((len(turned), 1))))
         return cls(tuple(positions), tuple(angles))
 
 
@@ -115,8 +149,13 @@ class Whitening:
         """The whitening of a model error."""
         variance = np.repeat(error.position_variance, 2)
         return cls(
-            tuple(_factor(strand, strand.covariance(error, error.position, variance)) for strand in strands.positions),
-            tuple(_factor(one, one.covariance(error, error.angle, error.angle_variance)) for one in strands.angles),
+            tuple(
+                _factor(one, one.covariance(error.acceleration, error.duration, variance)) for one in strands.positions
+            ),
+            tuple(
+                _factor(one, one.covariance(error.angular_acceleration, error.duration, error.angle_variance))
+                for one in strands.angles
+            ),
         )
 
     @cached_property

@@ -8,6 +8,7 @@ import numpy as np
 from jaxtyping import Float
 
 from vrdp_prob.models.coordinates import Coordinate, Coordinates
+from vrdp_prob.models.model_error import ModelError
 from vrdp_prob.models.noise import NoiseFamily
 from vrdp_prob.models.observation import NOISE_LOG_SD, Observations
 from vrdp_prob.models.parameters import (
@@ -54,17 +55,28 @@ class Structure:
 
 
 def unknowns(
-    tracks: Tracks, model: PhysicsModel, structure: Structure, noise: NoiseFamily = NoiseFamily.GAUSSIAN
+    tracks: Tracks,
+    model: PhysicsModel,
+    structure: Structure,
+    noise: NoiseFamily = NoiseFamily.GAUSSIAN,
+    model_error: ModelError | None = None,
 ) -> Coordinates:
-    """The vector of unknowns of a video under a model, with the defaults of what is not sampled."""
+    """The vector of unknowns of a video under a model, with the defaults of what is not sampled.
+
+    With a model error the noise is none of them: it has the size that was found together with the error.
+    """
     entries = [
         *_motion(tracks, structure),
-        *_turning(tracks, structure),
+        *_turning(tracks, model, structure),
         *_matter(tracks, structure),
         *_physics(tracks, model, structure),
-        *_measurement(tracks, noise),
+        *(_measurement(tracks, noise) if model_error is None else ()),
     ]
-    return Coordinates(tuple(entries), _defaults(tracks, model))
+    defaults = _defaults(tracks, model)
+    if model_error is not None:
+        defaults[NOISE] = np.full(1, model_error.noise_scale)
+        defaults[ANGLE_NOISE] = np.full(1, model_error.angle_noise_scale)
+    return Coordinates(tuple(entries), defaults)
 
 
 def _motion(tracks: Tracks, structure: Structure) -> Iterator[Coordinate]:
@@ -81,15 +93,17 @@ def _motion(tracks: Tracks, structure: Structure) -> Iterator[Coordinate]:
             yield Coordinate(name, body, Transform.IDENTITY, Prior(0.0, SPEED_SD), scale=0.1)
 
 
-def _turning(tracks: Tracks, structure: Structure) -> Iterator[Coordinate]:
-    """Yaw of cubes that meet something, spin of all that are seen to turn or may turn a square's corner forward."""
+def _turning(tracks: Tracks, model: PhysicsModel, structure: Structure) -> Iterator[Coordinate]:
+    """Yaw of cubes that meet something; spin of what is seen to turn, or whose spin matters in contacts."""
     measured = set(Observations.of(tracks).angle_bodies)
     angles = tracks.angles
+    rubs = any(effect.overrides("tangential_impulse") for effect in model.effects)
     for body, description in enumerate(tracks.bodies):
-        meets = description.shape is Shape.CUBE and body in structure.colliding
-        if meets:
+        meets = body in structure.colliding
+        if meets and description.shape is Shape.CUBE:
             yield Coordinate("angle", body, Transform.IDENTITY, Prior(0.0, YAW_SD), scale=0.1)
-        if body in structure.moving and (meets or body in measured):
+        spin_matters = meets and (rubs or description.shape is Shape.CUBE)
+        if body in structure.moving and (spin_matters or body in measured):
             yield Coordinate("spin", body, Transform.IDENTITY, Prior(0.0, SPIN_SD), scale=0.1)
         if body in measured and angles is not None:
             seen = angles[:, body]

@@ -15,8 +15,7 @@ from vrdp_prob.inference.clues import Clues
 from vrdp_prob.inference.map_fit import MapFit, fit_map
 from vrdp_prob.inference.misfit import judge
 from vrdp_prob.inference.mode import Mode
-from vrdp_prob.inference.model_error_fit import fit_model_error
-from vrdp_prob.inference.noise_fit import noise_sd
+from vrdp_prob.inference.model_error_fit import TURNS, next_model_error
 from vrdp_prob.inference.several_videos.joint_fit import JointFit, climb, first_guess, with_alternatives
 from vrdp_prob.inference.several_videos.linking import check_names, link
 from vrdp_prob.models.coordinates import Coordinates
@@ -26,8 +25,6 @@ from vrdp_prob.models.physics import PhysicsModel
 from vrdp_prob.models.unknowns import Structure, unknowns
 from vrdp_prob.progress import ProgressDisplay, SilentProgress
 from vrdp_prob.scene import Tracks
-
-MODEL_ERROR_ROUNDS = 2
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
@@ -212,26 +209,29 @@ def _finished(
         judge(video.likelihood, joint.point(index), fits[index].noise, fits[index].misfit.outliers)
         for index, video in enumerate(joint.videos)
     ]
-    for _ in range(MODEL_ERROR_ROUNDS if model_error else 0):
+    clues = [Clues.of(video.likelihood.tracks) for video in joint.videos]
+    for _ in range(TURNS if model_error else 0):
         errors = [
-            fit_model_error(video.believing(joint.gaussian.mean, joint.gaussian.sd), joint.point(index))
+            next_model_error(
+                video.believing(joint.gaussian.mean, joint.gaussian.sd),
+                joint.point(index),
+                clues[index],
+                misfits[index],
+            )
             for index, video in enumerate(joint.videos)
         ]
-        if not any(errors):
+        if all(error is video.likelihood.model_error for error, video in zip(errors, joint.videos, strict=True)):
             break
         likelihoods = []
-        for video, structure, error in zip(joint.videos, structures, errors, strict=True):
-            plain = plain_likelihood(video.likelihood.tracks, model, structure)
+        for index, (video, structure, error) in enumerate(zip(joint.videos, structures, errors, strict=True)):
             if error is None:
-                likelihoods.append(plain)
+                likelihoods.append(video.likelihood)
                 continue
-            coordinates = unknowns(plain.tracks, model, structure)
-            likelihoods.append(replace(plain, coordinates=coordinates).with_model_error(error))
+            tracks, reference = video.likelihood.tracks, video.likelihood.observations.position_reference
+            coordinates = unknowns(tracks, model, structure, model_error=error)
+            likelihoods.append(Likelihood(tracks, model, coordinates, model_error=error))
+            misfits[index] = misfits[index].with_error(error, reference)
         joint = _again(joint, likelihoods, shared)
-        misfits = [
-            misfit if error is None else misfit.with_error(error, noise_sd(video.likelihood, joint.point(index)))
-            for index, (misfit, error, video) in enumerate(zip(misfits, errors, joint.videos, strict=True))
-        ]
     parts = tuple(
         replace(
             fit,

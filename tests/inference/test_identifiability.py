@@ -1,8 +1,46 @@
 import numpy as np
 import pytest
 
-from vrdp_prob.inference.identifiability import Status, identifiability
+from vrdp_prob.inference.identifiability import BodyStatus, Status, collision_groups, uninformed
+from vrdp_prob.inference.identifiability import identifiability as identifiability_of
+from vrdp_prob.inference.information import Information
+from vrdp_prob.inference.mode import Mode
+from vrdp_prob.models.coordinates import Coordinates
+from vrdp_prob.models.physics import PhysicsModel
+from vrdp_prob.models.unknowns import Structure, unknowns
 from vrdp_prob.scene import Body, Shape, Tracks, Wall
+
+SHARP = 0.01
+"""Standard deviation with which a contact tells a ratio or a product."""
+
+
+def information(
+    video: Tracks,
+    pairs: list[tuple[int, int]],
+    walls: list[tuple[int, int]],
+    *,
+    sharp: float = SHARP,
+    more: list[dict[tuple[str, int], float]] | None = None,
+) -> Information:
+    """What contacts say in linear approximation: a mass ratio and a restitution product each, and what else is told."""
+    everything = frozenset(range(len(video.bodies)))
+    coordinates: Coordinates = unknowns(video, PhysicsModel.base(), Structure(everything, everything))
+    told = [{("mass", i): 1.0, ("mass", j): -1.0} for i, j in pairs]
+    told += [{("restitution", i): 1.0, ("restitution", j): 1.0} for i, j in pairs]
+    told += [{("restitution", i): 1.0, ("wall_restitution", k): 1.0} for i, k in walls]
+    rows = np.zeros((len(told + (more or [])), len(coordinates)))
+    for row, weights in zip(rows, told + (more or []), strict=True):
+        for key, weight in weights.items():
+            if key in coordinates.places:
+                row[coordinates.places[key]] = weight
+    precision = np.diag(coordinates.prior_sd**-2.0) + rows.T @ rows / sharp**2
+    return Information(coordinates, Mode(coordinates.prior_mean, precision, 0.0))
+
+
+def identifiability(
+    video: Tracks, pairs: list[tuple[int, int]], walls: list[tuple[int, int]], **more: object
+) -> dict[str, BodyStatus]:
+    return identifiability_of(video, pairs, walls, information(video, pairs, walls, **more))  # type: ignore[arg-type]
 
 
 def tracks(count: int, *, masses: dict[int, float] | None = None, walls: tuple[Wall, ...] = ()) -> Tracks:
@@ -49,3 +87,34 @@ def test_a_wall_of_known_restitution_fixes_that_of_its_bodies(restitution: float
     status = identifiability(tracks(2, walls=(wall,)), [(0, 1)], [(0, 0)])
     assert status["0"].restitution.status is expected
     assert status["1"].restitution.status is expected
+
+
+def test_a_contact_that_came_too_late_to_tell_leaves_defaults() -> None:
+    video, pairs = tracks(3), [(0, 1)]
+    blunt = information(video, pairs, [], sharp=10.0)
+    status = identifiability_of(video, pairs, [], blunt)
+    assert status["0"].mass.status is Status.DEFAULT
+    assert status["1"].restitution.status is Status.DEFAULT
+    assert uninformed(video, pairs, [], blunt) == {0, 1, 2}
+    assert uninformed(video, pairs, [], information(video, pairs, [])) == {2}
+
+
+def test_a_law_that_depends_on_mass_fixes_the_scale() -> None:
+    status = identifiability(tracks(3), [(0, 1), (1, 2)], [], more=[{("mass", 0): 1.0}])
+    assert {status[name].mass.status for name in "012"} == {Status.IDENTIFIED}
+    assert status["0"].mass.contraction > 0.99
+    assert status["0"].restitution.status is Status.PRODUCT_ONLY
+
+
+def test_groups_say_which_combinations_are_determined() -> None:
+    video, pairs = tracks(5), [(0, 1), (1, 2)]
+    (group,) = collision_groups(video, pairs, information(video, pairs, []))
+    assert group.bodies == ("0", "1", "2")
+    told = {one.name: one for one in group.combinations}
+    ratio = told["mass of 0 / mass of 1"]
+    assert ratio.relative_sd == pytest.approx(SHARP, rel=0.01)
+    assert ratio.determined
+    assert told["restitution of 1 x restitution of 2"].determined
+    assert not told["common scale of the masses"].determined
+    prior_sd = 0.7 / np.sqrt(3)
+    assert told["common scale of the masses"].relative_sd == pytest.approx(prior_sd, rel=0.01)

@@ -3,13 +3,23 @@
 A contact fixes the ratio of two masses and the product of two restitution factors: a difference and a sum of
 logarithms. On the graph of contacts, masses follow from one another but share an unknown scale, unless one was weighed.
 Sums of neighbours fix single values only where the graph has an odd cycle, or touches something known.
+
+The graph says what contacts could tell under the base model; the curvature of the posterior says how much they do, and
+whether another law of the model (a force that depends on mass, say) tells the rest.
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 
+from vrdp_prob.inference.information import Information, Weights
+from vrdp_prob.models.parameters import MASS, RESTITUTION, WALL_RESTITUTION
 from vrdp_prob.scene import Tracks
+
+LEAST_CONTRACTION = 0.05
+"""Below it the data are said to hold no information."""
+FIXED_SCALE = 0.5
+"""From this contraction of a group's common scale on, another law of the model is said to fix it."""
 
 
 class Status(StrEnum):
@@ -32,10 +42,13 @@ class ParameterStatus:
         restitution, times its partners'), or `default` (nothing; the default value is used).
     partners
         Ids of the bodies that a ratio or product refers to; a wall is called `wall N`.
+    contraction
+        Share of the prior variance (of the logarithm) that the data take away; 0 for a default, 1 for a known mass.
     """
 
     status: Status
     partners: tuple[str, ...] = ()
+    contraction: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -51,12 +64,43 @@ class BodyStatus:
         return Status.DEFAULT in (self.mass.status, self.restitution.status)
 
 
+@dataclass(frozen=True)
+class Combination:
+    """A combination of parameters of bodies that collide, and how well the data determine it.
+
+    Parameters
+    ----------
+    name
+        In words, for example `mass of 1 / mass of 2`.
+    relative_sd
+        Posterior standard deviation of its logarithm, about its relative error.
+    contraction
+        Share of the prior variance of the logarithm that the data take away.
+    """
+
+    name: str
+    relative_sd: float
+    contraction: float
+
+    @property
+    def determined(self) -> bool:
+        """Whether the data say more about it than was believed before."""
+        return self.contraction >= LEAST_CONTRACTION
+
+
+@dataclass(frozen=True)
+class CollisionGroup:
+    """Bodies that collisions link, with the combinations that matter: ratios, products, and the common scale."""
+
+    bodies: tuple[str, ...]
+    combinations: tuple[Combination, ...]
+
+
 Graph = dict[str, set[str]]
+Pairs = Iterable[tuple[int, int]]
 
 
-def identifiability(
-    tracks: Tracks, pairs: Iterable[tuple[int, int]], walls: Iterable[tuple[int, int]]
-) -> dict[str, BodyStatus]:
+def identifiability(tracks: Tracks, pairs: Pairs, walls: Pairs, information: Information) -> dict[str, BodyStatus]:
     """Status of every body.
 
     Parameters
@@ -67,19 +111,72 @@ def identifiability(
         Pairs of bodies that collide, by index.
     walls
         Pairs of a body and a wall that collide, by index.
+    information
+        How much the data narrow the prior.
     """
+    contacts, with_walls = _graphs(tracks, pairs, walls)
+    names = [body.id for body in tracks.bodies]
+    return {
+        name: BodyStatus(
+            _mass_status(tracks, name, contacts, information),
+            _restitution_status(tracks, name, with_walls, information),
+        )
+        for name in names
+    }
+
+
+def collision_groups(
+    tracks: Tracks, pairs: Sequence[tuple[int, int]], information: Information
+) -> tuple[CollisionGroup, ...]:
+    """Which combinations of masses and restitutions the data determine, group by group."""
+    contacts, _ = _graphs(tracks, pairs, ())
+    names = [body.id for body in tracks.bodies]
+    groups, left = [], [name for name in names if contacts[name]]
+    while left:
+        members = [name for name in names if name in _component(left[0], contacts)]
+        left = [name for name in left if name not in members]
+        found = []
+        for first, second in ((i, j) for i, j in pairs if names[i] in members):
+            ratio = {(MASS.name, first): 1.0, (MASS.name, second): -1.0}
+            product = {(RESTITUTION.name, first): 1.0, (RESTITUTION.name, second): 1.0}
+            found.append(_combination(f"mass of {names[first]} / mass of {names[second]}", ratio, information))
+            both = f"restitution of {names[first]} x restitution of {names[second]}"
+            found.append(_combination(both, product, information))
+        scale = {(MASS.name, names.index(name)): 1 / len(members) for name in members}
+        found.append(_combination("common scale of the masses", scale, information))
+        groups.append(CollisionGroup(tuple(members), tuple(found)))
+    return tuple(groups)
+
+
+def uninformed(tracks: Tracks, pairs: Pairs, walls: Pairs, information: Information) -> frozenset[int]:
+    """Bodies that collide, but of whose mass and restitution the tracks say nothing, for example as it was too late."""
+    status = identifiability(tracks, pairs, walls, information)
+    weighed = {body.id for body in tracks.bodies if body.mass is not None}
+    return frozenset(
+        index
+        for index, body in enumerate(tracks.bodies)
+        if status[body.id].restitution.status is Status.DEFAULT
+        and (body.id in weighed or status[body.id].mass.status is Status.DEFAULT)
+    )
+
+
+def _combination(name: str, weights: Weights, information: Information) -> Combination:
+    return Combination(name, information.sd(weights), information.contraction(weights))
+
+
+def _graphs(tracks: Tracks, pairs: Pairs, walls: Pairs) -> tuple[Graph, Graph]:
+    """Contacts between bodies, and the same with those of walls."""
     names = [body.id for body in tracks.bodies]
     contacts = _graph(names, ((names[i], names[j]) for i, j in pairs))
-    wall_names = [f"wall {index}" for index in range(len(tracks.walls))]
+    wall_names = [_wall_name(index) for index in range(len(tracks.walls))]
     with_walls = _graph([*names, *wall_names], ((names[i], wall_names[k]) for i, k in walls))
     for name, partners in contacts.items():
         with_walls[name] |= partners
-    weighed = {body.id for body in tracks.bodies if body.mass is not None}
-    known_walls = {name for name, wall in zip(wall_names, tracks.walls, strict=True) if wall.restitution is not None}
-    return {
-        name: BodyStatus(_mass_status(name, contacts, weighed), _restitution_status(name, with_walls, known_walls))
-        for name in names
-    }
+    return contacts, with_walls
+
+
+def _wall_name(index: int) -> str:
+    return f"wall {index}"
 
 
 def _graph(names: Iterable[str], edges: Iterable[tuple[str, str]]) -> Graph:
@@ -91,7 +188,7 @@ def _graph(names: Iterable[str], edges: Iterable[tuple[str, str]]) -> Graph:
 
 
 def _component(name: str, graph: Graph) -> dict[str, int]:
-    """Everything connected to a node, with the parity of its distance."""
+    """Everything connected to a node, with its distance."""
     distance, queue = {name: 0}, [name]
     while queue:
         current = queue.pop(0)
@@ -102,21 +199,44 @@ def _component(name: str, graph: Graph) -> dict[str, int]:
     return distance
 
 
-def _mass_status(name: str, graph: Graph, weighed: set[str]) -> ParameterStatus:
-    if name in weighed:
-        return ParameterStatus(Status.IDENTIFIED)
-    if not graph[name]:
+def _mass_status(tracks: Tracks, name: str, graph: Graph, information: Information) -> ParameterStatus:
+    index = tracks.index(name)
+    if tracks.bodies[index].mass is not None:
+        return ParameterStatus(Status.IDENTIFIED, contraction=1.0)
+    own = {(MASS.name, index): 1.0}
+    partners = tuple(
+        other
+        for other in sorted(graph[name])
+        if information.contraction({**own, (MASS.name, tracks.index(other)): -1.0}) >= LEAST_CONTRACTION
+    )
+    contraction = information.contraction(own)
+    if not partners and contraction < LEAST_CONTRACTION:
         return ParameterStatus(Status.DEFAULT)
-    if weighed & _component(name, graph).keys():
-        return ParameterStatus(Status.IDENTIFIED)
-    return ParameterStatus(Status.RATIO_ONLY, tuple(sorted(graph[name])))
+    members = _component(name, graph)
+    scale = {(MASS.name, tracks.index(member)): 1.0 for member in members}
+    weighed = any(body.id in members and body.mass is not None for body in tracks.bodies)
+    if weighed or information.contraction(scale) >= FIXED_SCALE:
+        return ParameterStatus(Status.IDENTIFIED, contraction=contraction)
+    return ParameterStatus(Status.RATIO_ONLY, partners, contraction)
 
 
-def _restitution_status(name: str, graph: Graph, known: set[str]) -> ParameterStatus:
-    if not graph[name]:
+def _restitution_status(tracks: Tracks, name: str, graph: Graph, information: Information) -> ParameterStatus:
+    keys = {body.id: (RESTITUTION.name, index) for index, body in enumerate(tracks.bodies)}
+    keys |= {_wall_name(index): (WALL_RESTITUTION.name, index) for index in range(len(tracks.walls))}
+    contraction = information.contraction({keys[name]: 1.0})
+    partners = tuple(
+        other
+        for other in sorted(graph[name])
+        if information.contraction({keys[name]: 1.0, keys[other]: 1.0}) >= LEAST_CONTRACTION
+    )
+    if not partners and contraction < LEAST_CONTRACTION:
         return ParameterStatus(Status.DEFAULT)
     component = _component(name, graph)
     odd_cycle = any(component[first] % 2 == component[second] % 2 for first in component for second in graph[first])
-    if odd_cycle or known & component.keys():
-        return ParameterStatus(Status.IDENTIFIED)
-    return ParameterStatus(Status.PRODUCT_ONLY, tuple(sorted(graph[name])))
+    known = any(
+        _wall_name(index) in component and wall.restitution is not None for index, wall in enumerate(tracks.walls)
+    )
+    alternating = {keys[member]: 1.0 - 2.0 * (distance % 2) for member, distance in component.items()}
+    if odd_cycle or known or information.contraction(alternating) >= FIXED_SCALE:
+        return ParameterStatus(Status.IDENTIFIED, contraction=contraction)
+    return ParameterStatus(Status.PRODUCT_ONLY, partners, contraction)

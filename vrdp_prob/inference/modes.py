@@ -7,8 +7,10 @@ import numpy as np
 import torch
 from jaxtyping import Float
 
-from vrdp_prob.inference.events import collision_sequences
+from vrdp_prob.inference.events import collision_sequences, first_contacts, wall_contacts
 from vrdp_prob.inference.hypothesis import distances
+from vrdp_prob.inference.identifiability import uninformed
+from vrdp_prob.inference.information import Information
 from vrdp_prob.inference.mode import Mode
 from vrdp_prob.inference.refinement import Refined, mode_at
 from vrdp_prob.inference.samples import evaluate
@@ -39,8 +41,10 @@ def distinct_modes(likelihood: Likelihood, found: Sequence[Refined]) -> tuple[Mo
 def without_idle(
     likelihood: Likelihood, modes: Sequence[Mode], moving: frozenset[int]
 ) -> tuple[Likelihood, tuple[Mode, ...]]:
-    """The same modes without the unknowns of bodies that meet nobody in any of them."""
-    structure = Structure(moving, colliding(likelihood, [mode.point for mode in modes]))
+    """The same modes without the unknowns of bodies that meet nobody in any of them, or too late to tell."""
+    structure = Structure(
+        moving, colliding(likelihood, [mode.point for mode in modes]) - _uninformed(likelihood, modes)
+    )
     coordinates = unknowns(
         likelihood.tracks, likelihood.model, structure, likelihood.noise, model_error=likelihood.model_error
     )
@@ -54,6 +58,22 @@ def without_idle(
         Mode(point, mode.precision[np.ix_(places, places)], float(value))
         for mode, point, value in zip(modes, points, values, strict=True)
     )
+
+
+def _uninformed(likelihood: Likelihood, modes: Sequence[Mode]) -> frozenset[int]:
+    """Bodies of whose mass and restitution no mode says anything."""
+    with torch.no_grad():
+        rollout = likelihood.rollout(torch.from_numpy(np.array([mode.point for mode in modes])))
+    found = [
+        uninformed(
+            likelihood.tracks,
+            first_contacts(rollout, world),
+            wall_contacts(rollout, world),
+            Information(likelihood.coordinates, mode),
+        )
+        for world, mode in enumerate(modes)
+    ]
+    return frozenset.intersection(*found)
 
 
 def colliding(likelihood: Likelihood, points: Sequence[Float[np.ndarray, "dimension"]]) -> frozenset[int]:

@@ -142,7 +142,7 @@ def _posterior(document: dict[str, Any], tree: xr.DataTree, tracks: Tracks | Non
 
 
 def _parameter_status(document: dict[str, Any]) -> ParameterStatus:
-    return ParameterStatus(Status(document["status"]), tuple(document["partners"]))
+    return ParameterStatus(Status(document["status"]), tuple(document["partners"]), document.get("contraction", 0.0))
 
 
 def _tracks(document: dict[str, Any], tree: xr.DataTree) -> Tracks:

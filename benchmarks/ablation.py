@@ -25,8 +25,8 @@ from tests.inference.map_comparison import compare
 from tests.inference.random_scenes import TIMES, Truth, random_truth
 from vrdp_prob.datasets import load, read_questions
 from vrdp_prob.inference import Posterior, default_model
+from vrdp_prob.inference.assembly import posterior_from
 from vrdp_prob.inference.continuation import continued
-from vrdp_prob.inference.infer import posterior_from
 from vrdp_prob.inference.map_fit import MapFit, fit_map
 from vrdp_prob.inference.plan import FitPlan
 from vrdp_prob.inference.samples import Convergence, Samples

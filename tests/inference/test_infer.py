@@ -176,3 +176,65 @@ def test_a_body_that_drifts_less_than_its_stated_noise_is_at_rest_at_its_release
     posterior = infer(stated, sampler="laplace", draws=50, hand_on=False)
     velocity = posterior.data["posterior"]["velocity"].values[..., resting, :]
     assert (velocity == 0).all()
+
+
+def with_outliers(tracks: Tracks, share: float) -> Tracks:
+    generator = np.random.default_rng(5)
+    positions = tracks.positions.copy()
+    struck = generator.random(positions.shape[:2]) < share
+    positions[struck] += generator.normal(0, 0.5, size=(int(struck.sum()), 2))
+    return Tracks.from_arrays("outliers", tracks.bodies, tracks.times, positions)
+
+
+def test_gross_outliers_and_gaps_do_no_harm() -> None:
+    scene, clean = chain_posterior()
+    posterior = infer(with_outliers(clean.tracks, 0.05), sampler="laplace", draws=400)
+    assert "Student-t" in " ".join(posterior.warnings)
+    assert float(posterior.data["posterior"]["noise_degrees_of_freedom"].mean()) < 3
+    for pair, undisturbed in zip(posterior.mass_ratios(), clean.mass_ratios(), strict=True):
+        first, second = (int(name) for name in pair.objects)
+        assert pair.summary.mean == pytest.approx(scene.mass[first] / scene.mass[second], abs=4 * pair.summary.sd)
+        assert pair.summary.sd < 1.5 * undisturbed.summary.sd
+
+
+def test_gaussian_noise_that_was_asked_for_is_harmed_by_them() -> None:
+    _, clean = chain_posterior()
+    posterior = infer(with_outliers(clean.tracks, 0.05), sampler="laplace", draws=50, noise="gaussian")
+    assert "noise_degrees_of_freedom" not in posterior.data["posterior"]
+    assert posterior.mass_ratios()[0].summary.sd > 3 * clean.mass_ratios()[0].summary.sd
+
+
+def test_defaults_can_be_drawn_from_the_prior() -> None:
+    _, kept = chain_posterior()
+    posterior = infer(kept.tracks, sampler="laplace", draws=400, defaults="prior")
+    drawn = np.log(posterior.data["posterior"]["mass"].sel(body="3").values)
+    assert drawn.std() == pytest.approx(0.7, rel=0.15)
+    np.testing.assert_array_equal(posterior.data["posterior"]["mass"][..., :3], kept.data["posterior"]["mass"][..., :3])
+    assert any("drawn from the prior" in text for text in posterior.warnings)
+    assert posterior.status["3"].is_default
+
+
+def test_a_posterior_given_the_motion_is_narrower_and_keeps_the_motion() -> None:
+    _, free = chain_posterior()
+    posterior = infer(free.tracks, sampler="laplace", draws=200, motion="fixed")
+    velocity = posterior.data["posterior"]["velocity"].values
+    assert (velocity == velocity[0, 0]).all()
+    for given, joint in zip(posterior.mass_ratios(), free.mass_ratios(), strict=True):
+        assert 0 < given.summary.sd < joint.summary.sd
+
+
+def test_unknown_options_are_refused() -> None:
+    for name in ("noise", "defaults", "motion"):
+        with pytest.raises(InputError, match=f"{name} is 'other'; use one of"):
+            infer(observe(chain(), frames=30), **{name: "other"})
+
+
+def test_groups_say_what_collisions_determine_and_survive_a_file(tmp_path: Path) -> None:
+    _, posterior = chain_posterior()
+    (group,) = posterior.groups
+    assert group.bodies == ("0", "1", "2")
+    determined = {one.name: one.determined for one in group.combinations}
+    assert determined["mass of 0 / mass of 1"]
+    assert not determined["common scale of the masses"]
+    posterior.write(tmp_path / "posterior.nc")
+    assert Posterior.read(tmp_path / "posterior.nc").groups == posterior.groups

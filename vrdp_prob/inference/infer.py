@@ -1,27 +1,25 @@
 """From tracks to posterior: the most probable values first, then a sampler that sets out from them."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import torch
-from jaxtyping import Float
 
 from vrdp_prob.errors import InputError
+from vrdp_prob.inference.assembly import posterior_from
 from vrdp_prob.inference.checkpoint import Checkpoint, fingerprint
 from vrdp_prob.inference.diagnostics import Reported
 from vrdp_prob.inference.emcee_sampler import sample_emcee
-from vrdp_prob.inference.events import collision_sequences, first_contacts, wall_contacts
-from vrdp_prob.inference.identifiability import BodyStatus, Status, identifiability
+from vrdp_prob.inference.events import first_contacts
 from vrdp_prob.inference.laplace import sample_laplace
 from vrdp_prob.inference.map_fit import MapFit, fit_map
 from vrdp_prob.inference.nuts_sampler import sample_nuts
 from vrdp_prob.inference.posterior import Posterior
 from vrdp_prob.inference.proposals import proposals
-from vrdp_prob.inference.samples import Convergence, Samples, assess
-from vrdp_prob.inference.tree import posterior_tree
+from vrdp_prob.inference.samples import Samples, assess
 from vrdp_prob.models.effects.body_friction import BodyFriction
+from vrdp_prob.models.noise import NoiseFamily
 from vrdp_prob.models.physics import PhysicsModel
 from vrdp_prob.progress import ProgressDisplay
 from vrdp_prob.scene import Tracks
@@ -32,8 +30,12 @@ SAMPLERS: Mapping[str, Callable[..., Samples]] = {
     "laplace": sample_laplace,
 }
 """The samplers by name; all take the log density and what its modes propose."""
-BATCH = 500
-"""Worlds simulated at once when the draws are looked at again."""
+OPTIONS = {
+    "noise": ("auto", *NoiseFamily),
+    "defaults": ("fixed", "prior"),
+    "motion": ("sampled", "fixed"),
+}
+"""What options of `infer` may be."""
 
 
 def default_model() -> PhysicsModel:
@@ -49,6 +51,9 @@ def infer(
     seed: int = 0,
     draws: int = 1000,
     progress: ProgressDisplay | None = None,
+    noise: str = "auto",
+    defaults: str = "fixed",
+    motion: str = "sampled",
     checkpoint: Path | str | None = None,
     hand_on: bool = True,
 ) -> Posterior:
@@ -69,6 +74,15 @@ def infer(
         Number of draws to keep.
     progress
         Told how far the work is.
+    noise
+        Distribution of the measurement errors: `gaussian`, `student_t`, or `auto`: Student-t where the tracks show
+        gross outliers.
+    defaults
+        What becomes of masses and restitutions that the data say nothing about: `fixed` (default values) or `prior`
+        (drawn from their prior).
+    motion
+        `sampled`, or `fixed`: release states are held at their most probable values, and what remains is the posterior
+        given that motion.
     checkpoint
         Folder that keeps what the sampler has done. A run that was killed and is started again with the same
         arguments goes on from there and ends with the same numbers.
@@ -82,21 +96,26 @@ def infer(
     Raises
     ------
     InputError
-        If the sampler is unknown, fewer than 4 draws are asked for, the seed is negative, no object moves, or the
-        checkpoint belongs to another run.
+        If the sampler or an option is unknown, fewer than 4 draws are asked for, the seed is negative, no object
+        moves, or the checkpoint belongs to another run.
     """
     check_sampler(sampler)
     if draws < 4:
         raise InputError(f"draws is {draws}; ask for at least 4.")
     if seed < 0:
         raise InputError(f"seed is {seed}; give a number that is not negative.")
+    for name, value in (("noise", noise), ("defaults", defaults), ("motion", motion)):
+        if value not in OPTIONS[name]:
+            raise InputError(f"{name} is '{value}'; use one of {', '.join(OPTIONS[name])}.")
     physics = default_model() if model is None else model
     kept = None
     if checkpoint is not None:
-        facts = fingerprint(tracks, physics, seed=seed, sampler=sampler, draws=draws, hand_on=hand_on)
-        kept = Checkpoint(checkpoint, facts)
+        settings = {"sampler": sampler, "draws": draws, "noise": noise, "motion": motion, "hand_on": hand_on}
+        kept = Checkpoint(checkpoint, fingerprint(tracks, physics, seed=seed, **settings))
     generator = np.random.default_rng(seed)
-    fit = fit_map(tracks, physics, generator, progress)
+    fit = fit_map(tracks, physics, generator, progress, noise=None if noise == "auto" else NoiseFamily(noise))
+    if motion == "fixed":
+        fit = fit.given_motion()
     reported = _reported(fit)
     samples = SAMPLERS[sampler](
         fit.likelihood.log_density,
@@ -109,7 +128,14 @@ def infer(
         **({"hand_on": hand_on} if sampler == "laplace" else {}),
     )
     convergence = assess(sampler, samples, reported)
-    return posterior_from(fit, samples.thinned(draws), convergence, seed=seed, generator=generator)
+    return posterior_from(
+        fit,
+        samples.thinned(draws),
+        convergence,
+        seed=seed,
+        generator=generator,
+        draw_defaults=defaults == "prior",
+    )
 
 
 def _reported(fit: MapFit) -> Reported:
@@ -129,81 +155,3 @@ def check_sampler(name: str) -> None:
     """
     if name not in SAMPLERS:
         raise InputError(f"sampler '{name}' is not known; use one of {', '.join(SAMPLERS)}.")
-
-
-def posterior_from(
-    fit: MapFit, samples: Samples, convergence: Convergence, *, seed: int, generator: np.random.Generator
-) -> Posterior:
-    """The posterior that draws of a fit make.
-
-    Parameters
-    ----------
-    fit
-        The most probable values and the density around them.
-    samples
-        The draws to keep.
-    convergence
-        Whether all draws can be trusted.
-    seed
-        Seed that is noted in the posterior.
-    generator
-        Draws the prior and the noise of predicted measurements.
-    """
-    tracks = fit.likelihood.tracks
-    with torch.no_grad():
-        rollout = fit.likelihood.rollout(torch.from_numpy(fit.point[None]))
-    contacts = first_contacts(rollout, 0)
-    status = identifiability(tracks, contacts, wall_contacts(rollout, 0))
-    changed = _changed_order(fit, samples.points, contacts)
-    convergence = replace(convergence, collision_order_changes=float(changed.mean()))
-    names = [body.id for body in tracks.bodies]
-    return Posterior(
-        tracks=tracks,
-        model=fit.likelihood.model,
-        seed=seed,
-        data=posterior_tree(fit, samples, changed, generator),
-        status=status,
-        convergence=convergence,
-        warnings=tuple(_warnings(fit, convergence, status, contacts)),
-        pairs=tuple((names[i], names[j]) for i, j in contacts),
-    )
-
-
-def _changed_order(
-    fit: MapFit, points: Float[np.ndarray, "chain draw dimension"], contacts: tuple[tuple[int, int], ...]
-) -> Float[np.ndarray, "chain draw"]:
-    """1 for a draw in which other pairs collide, or in another order, than in the MAP; else 0."""
-    flat = torch.from_numpy(np.ascontiguousarray(points.reshape(-1, points.shape[-1])))
-    changed: list[bool] = []
-    with torch.no_grad():
-        for begin in range(0, len(flat), BATCH):
-            rollout = fit.likelihood.rollout(flat[begin : begin + BATCH])
-            changed += [sequence != contacts for sequence in collision_sequences(rollout)]
-    return np.array(changed, dtype=float).reshape(points.shape[:2])
-
-
-def _warnings(
-    fit: MapFit, convergence: Convergence, status: dict[str, BodyStatus], contacts: tuple[tuple[int, int], ...]
-) -> list[str]:
-    """What limits the result, the model's misfit first."""
-    names = [body.id for body in fit.likelihood.tracks.bodies]
-    sentences = list(fit.misfit.sentences)
-    if not fit.converged:
-        sentences.append("The search for the most probable values ended before it had converged.")
-    found = {frozenset(pair) for pair in contacts}
-    missed = {(seen.first, seen.second) for seen in fit.contacts if frozenset((seen.first, seen.second)) not in found}
-    for first, second in sorted(missed):
-        sentences.append(
-            f"The tracks look as if objects {names[first]} and {names[second]} collided, but the best fit does without."
-        )
-    if not convergence.converged:
-        sentences.append(convergence.sentence)
-    else:
-        sentences += convergence.notes
-    default = [name for name, one in status.items() if one.mass.status is Status.DEFAULT]
-    if default:
-        subject = (
-            f"Objects {', '.join(default)} never collide" if len(default) > 1 else f"Object {default[0]} never collides"
-        )
-        sentences.append(f"{subject} in view: mass and restitution are default values, not measured.")
-    return sentences

@@ -5,7 +5,7 @@ L-BFGS on the exact gradient and Levenberg-Marquardt on the residuals climb the 
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Float
@@ -22,10 +22,11 @@ from vrdp_prob.inference.model_error_fit import TURNS, next_model_error
 from vrdp_prob.inference.modes import HOPELESS, carried, colliding, distinct_modes, without_idle
 from vrdp_prob.inference.plan import FitPlan
 from vrdp_prob.inference.refinement import Refined, climb, refine
+from vrdp_prob.inference.samples import evaluate
 from vrdp_prob.models.likelihood import Likelihood
 from vrdp_prob.models.noise import NoiseFamily
 from vrdp_prob.models.physics import PhysicsModel
-from vrdp_prob.models.unknowns import NOISE, Structure, unknowns
+from vrdp_prob.models.unknowns import MOTION, NOISE, Structure, unknowns
 from vrdp_prob.progress import ProgressDisplay, SilentProgress
 from vrdp_prob.scene import Tracks
 
@@ -85,6 +86,15 @@ class MapFit:
     def log_density(self) -> float:
         """Log posterior at the MAP."""
         return self.modes[0].log_density
+
+    def given_motion(self) -> "MapFit":
+        """The fit of what remains unknown when the motion is held at its most probable values; of one mode."""
+        mode, coordinates = self.modes[0], self.likelihood.coordinates
+        kept = np.flatnonzero(~coordinates.mask(MOTION))
+        likelihood = replace(self.likelihood, coordinates=coordinates.held(MOTION, mode.point))
+        point = mode.point[kept]
+        value = float(evaluate(likelihood.log_density, point[None])[0])
+        return replace(self, likelihood=likelihood, modes=(Mode(point, mode.precision[np.ix_(kept, kept)], value),))
 
 
 def fit_map(

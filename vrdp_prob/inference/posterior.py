@@ -12,7 +12,7 @@ from jaxtyping import Float
 from torch import Tensor
 
 from vrdp_prob.inference.continuation import continued
-from vrdp_prob.inference.identifiability import BodyStatus
+from vrdp_prob.inference.identifiability import BodyStatus, CollisionGroup
 from vrdp_prob.inference.samples import Convergence
 from vrdp_prob.inference.summaries import ObjectSummary, PairSummary, ParameterSummary, Summary
 from vrdp_prob.inference.tree import for_arviz
@@ -49,6 +49,8 @@ class Posterior:
         Plain sentences: first a misfit of the model, then what else limits the result.
     pairs
         Ids of the pairs that collide in the most probable world, in order of time.
+    groups
+        Bodies that collisions link, with the combinations of masses and restitutions that the data determine.
     """
 
     tracks: Tracks
@@ -59,6 +61,7 @@ class Posterior:
     convergence: Convergence
     warnings: tuple[str, ...]
     pairs: tuple[tuple[str, str], ...]
+    groups: tuple[CollisionGroup, ...] = ()
 
     @property
     def draw_count(self) -> int:

@@ -13,7 +13,7 @@ import xarray as xr
 
 from vrdp_prob.errors import InputError
 from vrdp_prob.files import write_atomically
-from vrdp_prob.inference.identifiability import BodyStatus, ParameterStatus, Status
+from vrdp_prob.inference.identifiability import BodyStatus, CollisionGroup, Combination, ParameterStatus, Status
 from vrdp_prob.inference.posterior import Posterior
 from vrdp_prob.inference.samples import Convergence
 from vrdp_prob.models import model_file
@@ -121,6 +121,7 @@ def _document(posterior: Posterior) -> dict[str, Any]:
         "convergence": asdict(posterior.convergence),
         "warnings": list(posterior.warnings),
         "pairs": [list(pair) for pair in posterior.pairs],
+        "groups": [asdict(group) for group in posterior.groups],
     }
 
 
@@ -138,6 +139,13 @@ def _posterior(document: dict[str, Any], tree: xr.DataTree, tracks: Tracks | Non
         convergence=Convergence.of_document(document["convergence"]),
         warnings=tuple(document["warnings"]),
         pairs=tuple((first, second) for first, second in document["pairs"]),
+        groups=tuple(_group(group) for group in document.get("groups", ())),
+    )
+
+
+def _group(document: dict[str, Any]) -> CollisionGroup:
+    return CollisionGroup(
+        tuple(document["bodies"]), tuple(Combination(**combination) for combination in document["combinations"])
     )
 
 

@@ -28,6 +28,8 @@ ANGLE_NOISE = "angle_noise_scale"
 DEGREES_OF_FREEDOM = "noise_degrees_of_freedom"
 DEGREES_PRIOR = Prior(math.log(8.0), 0.8)
 """Degrees of freedom of Student-t noise: from gross outliers (1.7) to nearly Gaussian (38) in the middle 95 %."""
+MOTION = ("x", "y", "velocity_x", "velocity_y", "angle", "spin", "angle_zero")
+"""Quantities that say where a body is released, and how it moves there."""
 SPEED_SD = 3.0
 """Prior standard deviation in m/s of a release velocity."""
 SPIN_SD = 2.0
@@ -113,7 +115,7 @@ def _turning(tracks: Tracks, model: PhysicsModel, structure: Structure) -> Itera
 
 def _matter(tracks: Tracks, structure: Structure) -> Iterator[Coordinate]:
     """Mass, where nobody weighed it (expected near the weighed ones, if any), and restitution of bodies and walls."""
-    prior = Prior(math.log(_mass_default(tracks)), MASS.prior.sd)
+    prior = mass_prior(tracks)
     for body in sorted(structure.colliding):
         if tracks.bodies[body].mass is None:
             yield Coordinate(MASS.name, body, MASS.transform, prior, scale=0.1)
@@ -166,6 +168,11 @@ def _defaults(tracks: Tracks, model: PhysicsModel) -> dict[str, Float[np.ndarray
             owners = count if parameter.scope is Scope.BODY else 1
             defaults[parameter.name] = np.full(owners, parameter.default)
     return defaults
+
+
+def mass_prior(tracks: Tracks) -> Prior:
+    """Prior of the log mass of a body that nobody weighed."""
+    return Prior(math.log(_mass_default(tracks)), MASS.prior.sd)
 
 
 def _mass_default(tracks: Tracks) -> float:

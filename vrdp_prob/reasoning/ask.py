@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from functools import cached_property
+from pathlib import Path
 
 from vrdp_prob import inference
 from vrdp_prob.inference import Posterior
@@ -85,8 +86,25 @@ def infer(
     seed: int = 0,
     draws: int = 1000,
     progress: ProgressDisplay | None = None,
+    noise: str = "auto",
+    defaults: str = "fixed",
+    motion: str = "sampled",
+    checkpoint: Path | str | None = None,
+    hand_on: bool = True,
 ) -> AskablePosterior:
     """Infer a posterior that can be asked; parameters as for `vrdp_prob.inference.infer`."""
     return AskablePosterior.of(
-        inference.infer(tracks, sampler=sampler, model=model, seed=seed, draws=draws, progress=progress)
+        inference.infer(
+            tracks,
+            sampler=sampler,
+            model=model,
+            seed=seed,
+            draws=draws,
+            progress=progress,
+            noise=noise,
+            defaults=defaults,
+            motion=motion,
+            checkpoint=checkpoint,
+            hand_on=hand_on,
+        )
     )

@@ -7,8 +7,9 @@ import numpy as np
 from jaxtyping import Float
 
 from vrdp_prob.errors import InputError
+from vrdp_prob.inference.assembly import posterior_from
 from vrdp_prob.inference.diagnostics import Statistics
-from vrdp_prob.inference.infer import default_model, posterior_from
+from vrdp_prob.inference.infer import default_model
 from vrdp_prob.inference.map_fit import MapFit
 from vrdp_prob.inference.posterior import Posterior
 from vrdp_prob.inference.samples import Convergence, Samples, assess

@@ -1,0 +1,147 @@
+"""A posterior out of a fit and its draws: what can be told from the data, what limits it, and every draw by name."""
+
+from dataclasses import replace
+
+import numpy as np
+import torch
+import xarray as xr
+from jaxtyping import Float
+
+from vrdp_prob.inference.events import collision_sequences, first_contacts, wall_contacts
+from vrdp_prob.inference.identifiability import BodyStatus, Status, collision_groups, identifiability
+from vrdp_prob.inference.information import Information
+from vrdp_prob.inference.map_fit import MapFit
+from vrdp_prob.inference.posterior import Posterior
+from vrdp_prob.inference.samples import Convergence, Samples
+from vrdp_prob.inference.tree import posterior_tree
+from vrdp_prob.models.parameters import MASS, RESTITUTION
+from vrdp_prob.models.unknowns import mass_prior
+from vrdp_prob.scene import Tracks
+
+BATCH = 500
+"""Worlds simulated at once when the draws are looked at again."""
+
+
+def posterior_from(
+    fit: MapFit,
+    samples: Samples,
+    convergence: Convergence,
+    *,
+    seed: int,
+    generator: np.random.Generator,
+    draw_defaults: bool = False,
+) -> Posterior:
+    """The posterior that draws of a fit make.
+
+    Parameters
+    ----------
+    fit
+        The most probable values and the density around them.
+    samples
+        The draws to keep.
+    convergence
+        Whether all draws can be trusted.
+    seed
+        Seed that is noted in the posterior.
+    generator
+        Draws the prior and the noise of predicted measurements.
+    draw_defaults
+        Whether masses and restitutions that the data say nothing about are drawn from their prior, in place of
+        keeping default values.
+    """
+    tracks = fit.likelihood.tracks
+    with torch.no_grad():
+        rollout = fit.likelihood.rollout(torch.from_numpy(fit.point[None]))
+    contacts = first_contacts(rollout, 0)
+    information = Information(fit.likelihood.coordinates, fit.modes[0])
+    told = _telling(fit, contacts)
+    status = identifiability(tracks, told, wall_contacts(rollout, 0), information)
+    changed = _changed_order(fit, samples.points, contacts)
+    convergence = replace(convergence, collision_order_changes=float(changed.mean()))
+    names = [body.id for body in tracks.bodies]
+    tree = posterior_tree(fit, samples, changed, generator)
+    if draw_defaults:
+        tree["posterior"] = xr.DataTree(_with_drawn_defaults(tree["posterior"].to_dataset(), tracks, status, generator))
+    return Posterior(
+        tracks=tracks,
+        model=fit.likelihood.model,
+        seed=seed,
+        data=tree,
+        status=status,
+        convergence=convergence,
+        warnings=tuple(_warnings(fit, convergence, status, contacts, drawn=draw_defaults)),
+        pairs=tuple((names[i], names[j]) for i, j in contacts),
+        groups=collision_groups(tracks, told, information),
+    )
+
+
+def _telling(fit: MapFit, contacts: tuple[tuple[int, int], ...]) -> tuple[tuple[int, int], ...]:
+    """Contacts of bodies of which both had something to tell, so that their restitutions are unknowns."""
+    places = fit.likelihood.coordinates.places
+    return tuple((i, j) for i, j in contacts if {(RESTITUTION.name, i), (RESTITUTION.name, j)} <= places.keys())
+
+
+def _with_drawn_defaults(
+    draws: xr.Dataset, tracks: Tracks, status: dict[str, BodyStatus], generator: np.random.Generator
+) -> xr.Dataset:
+    """Draws in which what the data say nothing about follows its prior."""
+    drawn = draws.copy(deep=True)
+    for index, body in enumerate(tracks.bodies):
+        for name, prior, one in (
+            (MASS.name, mass_prior(tracks), status[body.id].mass),
+            (RESTITUTION.name, RESTITUTION.prior, status[body.id].restitution),
+        ):
+            if one.status is Status.DEFAULT:
+                shape = (draws.sizes["chain"], draws.sizes["draw"])
+                drawn[name].values[..., index] = np.exp(prior.sample(generator, shape))
+    return drawn
+
+
+def _changed_order(
+    fit: MapFit, points: Float[np.ndarray, "chain draw dimension"], contacts: tuple[tuple[int, int], ...]
+) -> Float[np.ndarray, "chain draw"]:
+    """1 for a draw in which other pairs collide, or in another order, than in the MAP; else 0."""
+    flat = torch.from_numpy(np.ascontiguousarray(points.reshape(-1, points.shape[-1])))
+    changed: list[bool] = []
+    with torch.no_grad():
+        for begin in range(0, len(flat), BATCH):
+            rollout = fit.likelihood.rollout(flat[begin : begin + BATCH])
+            changed += [sequence != contacts for sequence in collision_sequences(rollout)]
+    return np.array(changed, dtype=float).reshape(points.shape[:2])
+
+
+def _warnings(
+    fit: MapFit,
+    convergence: Convergence,
+    status: dict[str, BodyStatus],
+    contacts: tuple[tuple[int, int], ...],
+    *,
+    drawn: bool,
+) -> list[str]:
+    """What limits the result, the model's misfit first."""
+    names = [body.id for body in fit.likelihood.tracks.bodies]
+    sentences = list(fit.misfit.sentences)
+    if not fit.converged:
+        sentences.append("The search for the most probable values ended before it had converged.")
+    found = {frozenset(pair) for pair in contacts}
+    missed = {(seen.first, seen.second) for seen in fit.contacts if frozenset((seen.first, seen.second)) not in found}
+    for first, second in sorted(missed):
+        sentences.append(
+            f"The tracks look as if objects {names[first]} and {names[second]} collided, but the best fit does without."
+        )
+    sentences += convergence.notes if convergence.converged else (convergence.sentence,)
+    default = [name for name, one in status.items() if one.mass.status is Status.DEFAULT]
+    met = {names[body] for pair in contacts for body in pair}
+    for group, one, several in (
+        ([name for name in default if name not in met], "never collides in view", "never collide in view"),
+        (
+            [name for name in default if name in met],
+            "collides too late or too weakly to tell",
+            "collide too late or too weakly to tell",
+        ),
+    ):
+        if group:
+            subject = f"Objects {', '.join(group)} {several}" if len(group) > 1 else f"Object {group[0]} {one}"
+            values = "are drawn from the prior" if drawn else "are default values"
+            sentences.append(f"{subject}: mass and restitution {values}, not measured.")
+    return sentences

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+import torch
 from jaxtyping import Float
 
 from vrdp_prob.inference.mode import Mode
@@ -45,7 +46,11 @@ class Information:
 
     @cached_property
     def _root(self) -> Float[np.ndarray, "dimension dimension"]:
-        return Gaussian.from_precision(self.mode.point, self.mode.precision).root
+        """Root of the covariance of what the data and the Gaussian part of the prior say; a prior's edge is no data."""
+        point = torch.from_numpy(self.mode.point)
+        slopes = torch.func.jacrev(lambda values: self.coordinates.prior_residuals(values[None])[0])(point).numpy()
+        precision = self.mode.precision - slopes.T @ slopes + np.diag(self.coordinates.prior_sd**-2)
+        return Gaussian.from_precision(self.mode.point, precision).root
 
     def _direction(self, weights: Weights) -> Float[np.ndarray, "dimension"]:
         """The combination as a vector; what is not sampled is known and counts for nothing."""

@@ -17,8 +17,8 @@ from vrdp_prob.inference import infer
 
 FALSE_ALARMS = 0.01
 """Probability with which a calibrated sampler fails one of the tests below, over all kinds of quantities together."""
-SEEDS = (128, 193, 542, 563, 685, 746, 871, 905, 948, 974, 1140, 1217)
-"""Scenes that are kept by their data; two or three discs, which collide."""
+SEEDS = (128, 386, 871, 1140, 1270, 1297, 1493, 1572, 1665, 1704, 1733, 2000)
+"""Scenes that are kept by their data: two or three discs and spheres, some of which collide."""
 FEWEST = 6
 
 
@@ -70,7 +70,7 @@ def test_scenes_are_kept_by_their_data_and_their_seed_says_everything() -> None:
 def test_ranks_are_those_of_the_draws() -> None:
     scene = prior_scene(SEEDS[0])
     assert scene is not None
-    posterior = infer(scene.tracks, sampler="laplace", draws=200)
+    posterior = infer(scene.tracks, sampler="laplace", draws=200, hand_on=False)
     found = {rank.name: rank for rank in ranks(scene, posterior)}
     noise = posterior.data["posterior"]["noise_scale"]
     below = float((noise.values * noise.attrs["reference_m"] < scene.noise).mean())
@@ -103,7 +103,7 @@ def test_ranks_over_many_scenes_are_uniform() -> None:
 def ranks_of(scenes: Iterable[PriorScene], *, only_converged: bool = False) -> Iterable[list[Rank]]:
     for scene in scenes:
         try:
-            posterior = infer(scene.tracks, sampler="laplace", draws=1000, seed=scene.seed)
+            posterior = infer(scene.tracks, sampler="laplace", draws=1000, seed=scene.seed, hand_on=False)
         except InputError:  # nothing moves
             continue
         if posterior.convergence.converged or not only_converged:

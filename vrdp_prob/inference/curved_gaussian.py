@@ -19,6 +19,7 @@ from torch import Tensor
 
 from vrdp_prob.inference.least_squares import Residuals, robust_cost
 from vrdp_prob.inference.samples import Gaussian
+from vrdp_prob.inference.straightening import Straightening
 
 MOST_BENT = 4
 """Largest number of axes along which others are bent."""
@@ -43,6 +44,8 @@ class CurvedGaussian:
         Displacement across all `axes` per product of two coordinates along them.
     shift, scale
         Affine map that comes before, by which later knowledge moves and shapes the whole.
+    straightening
+        Shear that comes last, and that bends what a Gaussian can only hold straight; None for none.
     """
 
     gaussian: Gaussian
@@ -50,23 +53,26 @@ class CurvedGaussian:
     bend: Float[Tensor, "bent bent dimension"]
     shift: Float[Tensor, "dimension"]
     scale: Float[Tensor, "dimension dimension"]
+    straightening: Straightening | None = None
 
     @classmethod
-    def straight(cls, gaussian: Gaussian) -> "CurvedGaussian":
+    def straight(cls, gaussian: Gaussian, straightening: Straightening | None = None) -> "CurvedGaussian":
         """A Gaussian as it is."""
         count = len(gaussian.mean)
         none = torch.zeros(count, 0, dtype=torch.float64)
         zero, unit = torch.zeros(count, dtype=torch.float64), torch.eye(count, dtype=torch.float64)
-        return cls(gaussian, none, torch.zeros(0, 0, count, dtype=torch.float64), zero, unit)
+        return cls(gaussian, none, torch.zeros(0, 0, count, dtype=torch.float64), zero, unit, straightening)
 
     @classmethod
-    def around(cls, gaussian: Gaussian, residuals: Residuals) -> "CurvedGaussian":
+    def around(
+        cls, gaussian: Gaussian, residuals: Residuals, straightening: Straightening | None = None
+    ) -> "CurvedGaussian":
         """The Gaussian with its strongest bends, from second differences of the residuals around its mean."""
-        tensor = _bends(gaussian, residuals)
+        straight = cls.straight(gaussian, straightening)
+        tensor = _bends(straight, residuals)
         count = len(gaussian.mean)
         directions, sizes, _ = np.linalg.svd(tensor.reshape(count, -1), full_matrices=False)
         strongest = directions[:, : min(MOST_BENT, int((sizes >= SMALLEST_BEND).sum()))]
-        straight = cls.straight(gaussian)
         kept = [axis for axis in strongest.T if straight._bent(axis[:, None], tensor).helps(straight, residuals)]
         return straight._bent(np.array(kept).reshape(-1, count).T, tensor)
 
@@ -112,7 +118,8 @@ class CurvedGaussian:
             # einsum would take longer to think about the order of three factors than all the rest.
             products = (along[..., :, None] * along[..., None, :]).flatten(-2)
             places = places + products @ self.bend.flatten(0, 1) / 2
-        return self._mean + places @ self._root
+        points = self._mean + places @ self._root
+        return points if self.straightening is None else self.straightening.bent(points)
 
     def points(self, whitened: Float[np.ndarray, "*batch dimension"]) -> Float[np.ndarray, "*batch dimension"]:
         """The same for arrays."""
@@ -121,6 +128,8 @@ class CurvedGaussian:
 
     def whitened(self, points: Float[np.ndarray, "*batch dimension"]) -> Float[np.ndarray, "*batch dimension"]:
         """The inverse of `points`; bends leave the coordinates along their axes alone, so these can be read off."""
+        if self.straightening is not None:
+            points = self.straightening.straightened(torch.from_numpy(np.ascontiguousarray(points))).numpy()
         centred = np.moveaxis(points - self.gaussian.mean, -1, 0)
         bent = solve_triangular(self.gaussian.root, centred.reshape(self.dimension, -1), lower=True)
         along = self.axes.numpy().T @ bent
@@ -138,17 +147,17 @@ class CurvedGaussian:
         )
 
 
-def _bends(gaussian: Gaussian, residuals: Residuals) -> Float[np.ndarray, "dimension dimension dimension"]:
+def _bends(straight: CurvedGaussian, residuals: Residuals) -> Float[np.ndarray, "dimension dimension dimension"]:
     """Displacement, per product of two whitened coordinates, that keeps the residuals as small as they can be.
 
     With J the derivative of the residuals in whitened coordinates, so that J'J is the unit matrix, and H their second
     derivative along two directions, it is -J'H.
     """
-    count = len(gaussian.mean)
+    count = straight.dimension
     unit = np.eye(count)
     first, second = np.triu_indices(count)
     steps = np.concatenate([np.zeros((1, count)), STEP * unit, STEP * (unit[first] + unit[second])])
-    ahead, behind = (_evaluated(gaussian, residuals, sign * steps) for sign in (1.0, -1.0))
+    ahead, behind = (_evaluated(straight, residuals, sign * steps) for sign in (1.0, -1.0))
     derivative = (ahead[1 : count + 1] - behind[1 : count + 1]) / (2 * STEP)
     even = (ahead + behind) / 2
     single, double = even[1 : count + 1], even[count + 1 :]
@@ -159,7 +168,7 @@ def _bends(gaussian: Gaussian, residuals: Residuals) -> Float[np.ndarray, "dimen
 
 
 def _evaluated(
-    gaussian: Gaussian, residuals: Residuals, whitened: Float[np.ndarray, "point dimension"]
+    straight: CurvedGaussian, residuals: Residuals, whitened: Float[np.ndarray, "point dimension"]
 ) -> Float[np.ndarray, "point residual"]:
-    points = gaussian.points(whitened)
+    points = straight.points(whitened)
     return np.concatenate([residuals(points[begin : begin + BATCH]) for begin in range(0, len(points), BATCH)])

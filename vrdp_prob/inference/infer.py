@@ -18,6 +18,7 @@ from vrdp_prob.inference.nuts_sampler import sample_nuts
 from vrdp_prob.inference.posterior import Posterior
 from vrdp_prob.inference.proposals import proposals
 from vrdp_prob.inference.samples import Samples, assess
+from vrdp_prob.inference.straightening import Rates
 from vrdp_prob.models.effects.body_friction import BodyFriction
 from vrdp_prob.models.noise import NoiseFamily
 from vrdp_prob.models.physics import PhysicsModel
@@ -119,7 +120,7 @@ def infer(
     reported = _reported(fit)
     samples = SAMPLERS[sampler](
         fit.likelihood.log_density,
-        proposals(fit.modes, fit.likelihood.residuals),
+        proposals(fit.modes, fit.likelihood.residuals, Rates.of(tracks, fit.likelihood.coordinates)),
         draws=draws,
         generator=generator,
         progress=progress,

@@ -9,6 +9,7 @@ from vrdp_prob.inference.least_squares import Residuals
 from vrdp_prob.inference.mixture import Mixture
 from vrdp_prob.inference.mode import Mode
 from vrdp_prob.inference.samples import Gaussian
+from vrdp_prob.inference.straightening import Rates, Straightening, straight_gaussian
 
 HOPELESS = 12.0
 """A mode whose evidence (nats) is so much lower than the best one's is left out."""
@@ -18,12 +19,19 @@ LEAST_WEIGHT = 0.02
 """Weight that every other mode is proposed with at least, since the evidence of a Gaussian is a guess."""
 
 
-def proposals(modes: Sequence[Mode], residuals: Residuals) -> Mixture:
-    """A curved Gaussian around every mode, weighted by Laplace evidence."""
+def proposals(modes: Sequence[Mode], residuals: Residuals, rates: Rates | None = None) -> Mixture:
+    """A curved Gaussian around every mode, weighted by Laplace evidence, its ridges along some rates straightened."""
     best = max(mode.log_evidence for mode in modes)
     ranked = sorted(modes, key=lambda mode: -mode.log_evidence)[:MOST_MODES]
     kept = [mode for mode in ranked if mode.log_evidence > best - HOPELESS]
-    clouds = [CurvedGaussian.around(Gaussian.from_precision(mode.point, mode.precision), residuals) for mode in kept]
+    clouds = [_cloud(mode, residuals, rates) for mode in kept]
     evidence = np.exp([mode.log_evidence - best for mode in kept])
     weights = np.maximum(evidence / evidence.sum(), LEAST_WEIGHT)
     return Mixture.of(*clouds, log_weights=np.log(weights))
+
+
+def _cloud(mode: Mode, residuals: Residuals, rates: Rates | None) -> CurvedGaussian:
+    if rates is None:
+        return CurvedGaussian.around(Gaussian.from_precision(mode.point, mode.precision), residuals)
+    gaussian = straight_gaussian(mode, rates, np.random.default_rng(0))
+    return CurvedGaussian.around(gaussian, residuals, Straightening.of(mode, rates))

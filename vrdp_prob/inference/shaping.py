@@ -233,7 +233,7 @@ def _probed(density: LogDensity, cloud: CurvedGaussian) -> CurvedGaussian:
     values = np.exp(np.maximum(log_density - log_density.max(axis=0), -700.0))
     moments = [np.trapezoid(values * steps[:, None] ** power, steps, axis=0) for power in range(3)]
     mean = moments[1] / moments[0]
-    variance = np.minimum(moments[2] / moments[0] - mean**2, 1.0)
+    variance = np.clip(moments[2] / moments[0] - mean**2, PROBES[0] ** 2, 1.0)
     cut = variance < CUT
     return cloud.moved(np.where(cut, mean, 0.0), np.diag(np.where(cut, variance, 1.0)))
 

@@ -51,22 +51,23 @@ class Sensitivity:
         Ids of the two bodies of a pair; none for what all share.
     prior, likelihood
         Sensitivity to the prior of masses, restitutions and friction, and to the likelihood.
-    chance
-        Sensitivity to the likelihood that so many draws show where there is none.
+    prior_by_chance, likelihood_by_chance
+        Sensitivity that so many draws show where there is none.
     """
 
     quantity: str
     objects: tuple[str, ...]
     prior: float
     likelihood: float
-    chance: float = 0.0
+    prior_by_chance: float = 0.0
+    likelihood_by_chance: float = 0.0
 
     @property
     def verdict(self) -> Verdict:
         """The numbers in words."""
-        if self.prior < THRESHOLD:
+        if self.prior < max(THRESHOLD, self.prior_by_chance):
             return Verdict.FINE
-        return Verdict.CONFLICT if self.likelihood >= max(THRESHOLD, self.chance) else Verdict.PRIOR
+        return Verdict.CONFLICT if self.likelihood >= max(THRESHOLD, self.likelihood_by_chance) else Verdict.PRIOR
 
     @property
     def sentence(self) -> str:
@@ -86,7 +87,8 @@ class Sensitivity:
             "objects": list(self.objects),
             "prior": self.prior,
             "likelihood": self.likelihood,
-            "likelihood_by_chance": self.chance,
+            "prior_by_chance": self.prior_by_chance,
+            "likelihood_by_chance": self.likelihood_by_chance,
             "verdict": str(self.verdict),
         }
 
@@ -113,6 +115,7 @@ def prior_sensitivity(posterior: Posterior) -> tuple[Sensitivity, ...]:
             objects,
             power_sensitivity(draws, physics),
             power_sensitivity(draws, likelihood),
+            by_chance(draws, physics),
             by_chance(draws, likelihood),
         )
         for quantity, objects, draws in _reported(posterior)

@@ -111,10 +111,10 @@ def test_groups_say_which_combinations_are_determined() -> None:
     (group,) = collision_groups(video, pairs, information(video, pairs, []))
     assert group.bodies == ("0", "1", "2")
     told = {one.name: one for one in group.combinations}
-    ratio = told["mass of 0 / mass of 1"]
+    ratio = told["mass ratio of objects 0 and 1"]
     assert ratio.relative_sd == pytest.approx(SHARP, rel=0.01)
     assert ratio.determined
-    assert told["restitution of 1 x restitution of 2"].determined
-    assert not told["common scale of the masses"].determined
+    assert told["restitution product of objects 1 and 2"].determined
+    assert not told["mass scale of objects 0, 1 and 2"].determined
     prior_sd = 0.7 / np.sqrt(3)
-    assert told["common scale of the masses"].relative_sd == pytest.approx(prior_sd, rel=0.01)
+    assert told["mass scale of objects 0, 1 and 2"].relative_sd == pytest.approx(prior_sd, rel=0.01)

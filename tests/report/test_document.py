@@ -41,6 +41,8 @@ def test_undefined_diagnostics_become_null(content):
         "ess_bulk": None,
         "divergences": None,
         "pareto_k": 0.8,
+        "ess_tail": None,
+        "worst": None,
     }
 
 

@@ -72,6 +72,7 @@ def posterior_from(
         warnings=tuple(_warnings(fit, convergence, status, contacts, drawn=draw_defaults)),
         pairs=tuple((names[i], names[j]) for i, j in contacts),
         groups=collision_groups(tracks, told, information),
+        misfit=fit.misfit,
     )
 
 
@@ -123,6 +124,8 @@ def _warnings(
     sentences = list(fit.misfit.sentences)
     if not fit.converged:
         sentences.append("The search for the most probable values ended before it had converged.")
+    if fit.search.sentence:
+        sentences.append(fit.search.sentence)
     found = {frozenset(pair) for pair in contacts}
     missed = {(seen.first, seen.second) for seen in fit.contacts if frozenset((seen.first, seen.second)) not in found}
     for first, second in sorted(missed):

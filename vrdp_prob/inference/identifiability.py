@@ -70,17 +70,26 @@ class Combination:
 
     Parameters
     ----------
-    name
-        In words, for example `mass of 1 / mass of 2`.
+    quantity
+        `mass_ratio` (first over second), `restitution_product` or `mass_scale` (the geometric mean of all masses).
+    objects
+        Ids of the bodies.
     relative_sd
         Posterior standard deviation of its logarithm, about its relative error.
     contraction
         Share of the prior variance of the logarithm that the data take away.
     """
 
-    name: str
+    quantity: str
+    objects: tuple[str, ...]
     relative_sd: float
     contraction: float
+
+    @property
+    def name(self) -> str:
+        """In words, for example `mass ratio of objects 1 and 2`."""
+        *others, last = self.objects
+        return f"{self.quantity.replace('_', ' ')} of objects {', '.join(others)} and {last}"
 
     @property
     def determined(self) -> bool:
@@ -139,11 +148,11 @@ def collision_groups(
         for first, second in ((i, j) for i, j in pairs if names[i] in members):
             ratio = {(MASS.name, first): 1.0, (MASS.name, second): -1.0}
             product = {(RESTITUTION.name, first): 1.0, (RESTITUTION.name, second): 1.0}
-            found.append(_combination(f"mass of {names[first]} / mass of {names[second]}", ratio, information))
-            both = f"restitution of {names[first]} x restitution of {names[second]}"
-            found.append(_combination(both, product, information))
+            both = (names[first], names[second])
+            found.append(_combination("mass_ratio", both, ratio, information))
+            found.append(_combination("restitution_product", both, product, information))
         scale = {(MASS.name, names.index(name)): 1 / len(members) for name in members}
-        found.append(_combination("common scale of the masses", scale, information))
+        found.append(_combination("mass_scale", tuple(members), scale, information))
         groups.append(CollisionGroup(tuple(members), tuple(found)))
     return tuple(groups)
 
@@ -160,8 +169,8 @@ def uninformed(tracks: Tracks, pairs: Pairs, walls: Pairs, information: Informat
     )
 
 
-def _combination(name: str, weights: Weights, information: Information) -> Combination:
-    return Combination(name, information.sd(weights), information.contraction(weights))
+def _combination(quantity: str, objects: tuple[str, ...], weights: Weights, information: Information) -> Combination:
+    return Combination(quantity, objects, information.sd(weights), information.contraction(weights))
 
 
 def _graphs(tracks: Tracks, pairs: Pairs, walls: Pairs) -> tuple[Graph, Graph]:

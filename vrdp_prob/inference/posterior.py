@@ -12,7 +12,8 @@ from jaxtyping import Float
 from torch import Tensor
 
 from vrdp_prob.inference.continuation import continued
-from vrdp_prob.inference.identifiability import BodyStatus, CollisionGroup
+from vrdp_prob.inference.identifiability import BodyStatus, CollisionGroup, ParameterStatus
+from vrdp_prob.inference.misfit import Misfit
 from vrdp_prob.inference.samples import Convergence
 from vrdp_prob.inference.summaries import ObjectSummary, PairSummary, ParameterSummary, Summary
 from vrdp_prob.inference.tree import for_arviz
@@ -51,6 +52,8 @@ class Posterior:
         Ids of the pairs that collide in the most probable world, in order of time.
     groups
         Bodies that collisions link, with the combinations of masses and restitutions that the data determine.
+    misfit
+        How the residuals of the best fit compare with the noise, and what model error the intervals allow for.
     """
 
     tracks: Tracks
@@ -62,6 +65,7 @@ class Posterior:
     warnings: tuple[str, ...]
     pairs: tuple[tuple[str, str], ...]
     groups: tuple[CollisionGroup, ...] = ()
+    misfit: Misfit | None = None
 
     @property
     def draw_count(self) -> int:
@@ -119,8 +123,8 @@ class Posterior:
         mass, restitution = (Summary.of(self._draws(name)[..., index]) for name in ("mass", "restitution"))
         return ObjectSummary(
             body,
-            ParameterSummary(mass, str(status.mass.status), status.mass.partners),
-            ParameterSummary(restitution, str(status.restitution.status), status.restitution.partners),
+            _parameter_summary(mass, status.mass),
+            _parameter_summary(restitution, status.restitution),
         )
 
     def mass_ratios(self) -> tuple[PairSummary, ...]:
@@ -180,6 +184,10 @@ class Posterior:
 
     def _worlds(self, draws: xr.Dataset) -> Worlds:
         return Scenery.of(self.tracks).worlds(self.model, quantities(draws))
+
+
+def _parameter_summary(summary: Summary, status: ParameterStatus) -> ParameterSummary:
+    return ParameterSummary(summary, str(status.status), status.partners, status.contraction)
 
 
 def quantities(draws: xr.Dataset) -> dict[str, Float[Tensor, "world owner"]]:

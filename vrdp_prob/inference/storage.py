@@ -14,6 +14,7 @@ import xarray as xr
 from vrdp_prob.errors import InputError
 from vrdp_prob.files import write_atomically
 from vrdp_prob.inference.identifiability import BodyStatus, CollisionGroup, Combination, ParameterStatus, Status
+from vrdp_prob.inference.misfit import Misfit
 from vrdp_prob.inference.posterior import Posterior
 from vrdp_prob.inference.samples import Convergence
 from vrdp_prob.models import model_file
@@ -122,6 +123,7 @@ def _document(posterior: Posterior) -> dict[str, Any]:
         "warnings": list(posterior.warnings),
         "pairs": [list(pair) for pair in posterior.pairs],
         "groups": [asdict(group) for group in posterior.groups],
+        "misfit": None if posterior.misfit is None else asdict(posterior.misfit),
     }
 
 
@@ -140,12 +142,14 @@ def _posterior(document: dict[str, Any], tree: xr.DataTree, tracks: Tracks | Non
         warnings=tuple(document["warnings"]),
         pairs=tuple((first, second) for first, second in document["pairs"]),
         groups=tuple(_group(group) for group in document.get("groups", ())),
+        misfit=Misfit(**document["misfit"]) if document.get("misfit") else None,
     )
 
 
 def _group(document: dict[str, Any]) -> CollisionGroup:
     return CollisionGroup(
-        tuple(document["bodies"]), tuple(Combination(**combination) for combination in document["combinations"])
+        tuple(document["bodies"]),
+        tuple(Combination(**{**one, "objects": tuple(one["objects"])}) for one in document["combinations"]),
     )
 
 

@@ -31,16 +31,21 @@ class ParameterSummary:
     """A parameter of a body: its numbers, and what the data say about it.
 
     `status` is one of `identified`, `ratio_only`, `product_only` and `default`, `partners` the bodies that a ratio or
-    product refers to.
+    product refers to, `contraction` the share of the prior variance that the data take away.
     """
 
     summary: Summary
     status: str
     partners: tuple[str, ...] = ()
+    contraction: float = 0.0
 
     def to_document(self) -> dict[str, object]:
         """The numbers and the status by name, as a report holds them."""
-        document: dict[str, object] = {**self.summary.to_document(), "status": self.status}
+        document: dict[str, object] = {
+            **self.summary.to_document(),
+            "status": self.status,
+            "contraction": self.contraction,
+        }
         if self.partners:
             document["with"] = list(self.partners)
         return document

@@ -10,6 +10,9 @@ from enum import StrEnum
 import numpy as np
 from jaxtyping import Bool, Float, Int, UInt8
 
+from vrdp_prob.inference.identifiability import CollisionGroup
+from vrdp_prob.inference.misfit import Misfit
+from vrdp_prob.inference.prior_sensitivity import Sensitivity
 from vrdp_prob.inference.samples import Convergence
 from vrdp_prob.inference.summaries import ObjectSummary, PairSummary
 from vrdp_prob.reasoning.answer import Answer
@@ -184,6 +187,12 @@ class ReportContent:
         Seed of the run and version of the software.
     footage
         Pictures of the video, None where the input was no video.
+    groups
+        Which combinations of masses and restitutions the collisions determine.
+    misfit
+        How well the model explains the tracks.
+    sensitivities
+        How much quantities rest on the prior.
     """
 
     tracks: Tracks
@@ -199,6 +208,9 @@ class ReportContent:
     seed: int
     version: str
     footage: Footage | None = None
+    groups: tuple[CollisionGroup, ...] = ()
+    misfit: Misfit | None = None
+    sensitivities: tuple[Sensitivity, ...] = ()
 
     def world(self, kind: WorldKind) -> WorldContent | None:
         """The first world of a kind, None where there is none."""

@@ -2,6 +2,7 @@
 
 import json
 import math
+from dataclasses import asdict
 from importlib import resources
 from typing import Any, Literal
 
@@ -46,7 +47,12 @@ def to_document(content: ReportContent) -> dict[str, Any]:
             "ess_bulk": _finite(convergence.ess_bulk),
             "divergences": convergence.divergences,
             "pareto_k": _finite(convergence.pareto_k),
+            "ess_tail": _finite(convergence.ess_tail),
+            "worst": convergence.worst,
         },
+        "misfit": None if content.misfit is None else {**asdict(content.misfit), "fits": content.misfit.fits},
+        "collision_groups": [asdict(group) for group in content.groups],
+        "prior_sensitivity": [one.to_document() for one in content.sensitivities],
         "answers": [item.answer.to_document() for item in content.answers],
         "warnings": list(content.warnings),
     }

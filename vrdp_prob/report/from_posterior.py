@@ -7,6 +7,7 @@ from jaxtyping import UInt8
 
 from vrdp_prob import __version__
 from vrdp_prob.inference.posterior import Posterior
+from vrdp_prob.inference.prior_sensitivity import prior_sensitivity
 from vrdp_prob.progress import ProgressDisplay
 from vrdp_prob.reasoning.answer import Answer
 from vrdp_prob.reasoning.worlds import PosteriorWorlds
@@ -62,4 +63,7 @@ def build(
         seed=posterior.seed,
         version=__version__,
         footage=None if frames is None else footage(frames, tracks),
+        groups=posterior.groups,
+        misfit=posterior.misfit,
+        sensitivities=prior_sensitivity(posterior) if "log_prior" in posterior.data.children else (),
     )

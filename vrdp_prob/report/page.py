@@ -255,8 +255,25 @@ def _row(objects: list[dict[str, Any]], interval: Summary) -> dict[str, Any]:
     return {"objects": objects, "interval": interval, "mean": mean, "range": span, "label": label}
 
 
+def _combinations(content: ReportContent) -> list[tuple[str, str, str]]:
+    """Term, value and meaning of what the collisions of each group determine."""
+    rows = []
+    for combination in (one for group in content.groups for one in group.combinations):
+        name = sentence(with_names(combination.name, content.tracks.bodies))
+        if combination.determined:
+            told = f"{percent(combination.contraction)} of what was open before, in the logarithm's variance"
+            rows.append((name, f"known to {100 * combination.relative_sd:.2g} %", told))
+        else:
+            rows.append((name, "not determined", "as believed beforehand"))
+    return rows
+
+
 def _closing(content: ReportContent) -> dict[str, Any]:
     return {
+        "combinations": _combinations(content),
+        "prior_words": [
+            with_names(one.sentence, content.tracks.bodies) for one in content.sensitivities if one.sentence
+        ],
         "convergence_words": content.convergence.sentence,
         "diagnostics": _diagnostics(content),
         "model": content.model,
@@ -270,7 +287,7 @@ def _closing(content: ReportContent) -> dict[str, Any]:
 def _diagnostics(content: ReportContent) -> list[tuple[str, str, str]]:
     """Term, value and meaning of each diagnostic that applies."""
     convergence = content.convergence
-    rows: list[tuple[str, str, str]] = [("Sampler", convergence.sampler, "")]
+    rows: list[tuple[str, str, str]] = [*_misfit_rows(content), ("Sampler", convergence.sampler, "")]
     if convergence.r_hat is not None and math.isfinite(convergence.r_hat):
         rows.append(
             ("R-hat, largest", f"{convergence.r_hat:.3f}", "1 where independent runs agree; below 1.01 is good")
@@ -278,6 +295,9 @@ def _diagnostics(content: ReportContent) -> list[tuple[str, str, str]]:
     if convergence.ess_bulk is not None and math.isfinite(convergence.ess_bulk):
         meaning = "independent draws that the dependent ones are worth; above 400 is good"
         rows.append(("Effective sample size, smallest", f"{convergence.ess_bulk:.0f}", meaning))
+    if convergence.ess_tail is not None and math.isfinite(convergence.ess_tail):
+        meaning = "the same for the ends of 90 % intervals; above 400 is good"
+        rows.append(("... in the tails", f"{convergence.ess_tail:.0f}", meaning))
     if convergence.divergences is not None:
         rows.append(("Divergences", str(convergence.divergences), "steps at which the sampler lost its way; 0 is good"))
     if convergence.pareto_k is not None and math.isfinite(convergence.pareto_k):
@@ -289,4 +309,17 @@ def _diagnostics(content: ReportContent) -> list[tuple[str, str, str]]:
     if content.worlds:
         meaning = "a sample of the posterior; worlds that no question asks about were simulated in these alone"
         rows.append(("Draws in the player", counted(content.worlds[0].draws, "draw"), meaning))
+    return rows
+
+
+def _misfit_rows(content: ReportContent) -> list[tuple[str, str, str]]:
+    """Term, value and meaning of how the model explains the tracks."""
+    misfit = content.misfit
+    if misfit is None:
+        return []
+    noise = f"of the best fit; the noise of the tracks is {1000 * misfit.noise_sd:.2g} mm"
+    rows = [("Residuals", f"{1000 * misfit.residual_sd:.2g} mm", noise)]
+    if misfit.error_acceleration is not None:
+        meaning = f"that the intervals allow for; it lasts about {misfit.error_duration:.2g} s"
+        rows.append(("Unknown acceleration", f"{misfit.error_acceleration:.2g} m/s²", meaning))
     return rows

@@ -6,7 +6,7 @@ SETUP := $(VENV)/.complete
 OUT ?= out
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
-.PHONY: help setup demo test test-slow lint types bench clean
+.PHONY: help setup demo test test-slow lint types bench calibrate clean
 
 help:
 	@echo "make demo       the main job on the example that ships: a video in, a report out"
@@ -14,6 +14,7 @@ help:
 	@echo "make test-slow  the statistical and large tests"
 	@echo "make lint       format and lint"
 	@echo "make types      types"
+	@echo "make calibrate  simulation-based calibration of every sampler, figures to docs/ (hours; goes on where it was)"
 	@echo "make bench      every benchmark, tables to the terminal and JSON to $(OUT)/"
 	@echo "make clean      remove the environment and caches; $(OUT)/ stays"
 
@@ -44,9 +45,13 @@ types: $(SETUP)
 
 bench: $(SETUP)
 	mkdir -p $(OUT)
-	for script in benchmarks/[a-z]*.py; do \
+	for script in $(filter-out benchmarks/calibration.py,$(wildcard benchmarks/[a-z]*.py)); do \
 	  $(BIN)/python $$script --json $(OUT)/$$(basename $$script .py).json || exit 1; \
 	done
+
+calibrate: $(SETUP)
+	mkdir -p $(OUT)
+	$(BIN)/python benchmarks/calibration.py --samplers laplace,emcee,nuts --docs docs --json $(OUT)/calibration.json
 
 clean:
 	rm -rf $(VENV) .pytest_cache .mypy_cache .ruff_cache build dist

@@ -54,7 +54,7 @@ class Clues:
     @classmethod
     def of(cls, tracks: Tracks) -> "Clues":
         """The clues of a video."""
-        return cls(tracks, gross_outliers(tracks, _roughness(tracks)))
+        return cls(tracks, gross_outliers(tracks, _position_sd(tracks, _roughness(tracks))))
 
     @cached_property
     def clean(self) -> Tracks:
@@ -134,19 +134,19 @@ class Clues:
         freedom = 2 * (len(places) - 1)
         if freedom < SHORTEST_REST_TEST:
             return False
-        sd = self._position_sd(body)[chosen, None]
+        sd = _position_sd(self.tracks, self.noise)[chosen, body, None]
         scatter = float((((places - np.average(places, axis=0, weights=sd[:, 0] ** -2)) / sd) ** 2).sum())
         angles = self.tracks.angles
         turning = 0.0 if angles is None else float(np.std(_finite(angles[chosen, body])))
         return bool(scatter <= freedom + REST_TEST * np.sqrt(2 * freedom)) and turning <= STILL_ANGLE_SD
 
-    def _position_sd(self, body: int) -> Float[np.ndarray, "time"]:
-        """Standard deviation (m) per axis: the stated one where it is larger; errors that last look like motion."""
-        covariance = self.tracks.position_covariance
-        if covariance is None:
-            return np.full(len(self.tracks.times), self.noise)
-        stated = np.trace(covariance[:, body], axis1=-2, axis2=-1) / 2
-        return np.sqrt(np.fmax(stated, self.noise**2))
+
+def _position_sd(tracks: Tracks, noise: float) -> Float[np.ndarray, "time body"]:
+    """Standard deviation (m) per axis: the stated one where it is larger; errors that last look like motion."""
+    covariance = tracks.position_covariance
+    if covariance is None:
+        return np.full(tracks.seen.shape, noise)
+    return np.sqrt(np.fmax(np.trace(covariance, axis1=-2, axis2=-1) / 2, noise**2))
 
 
 def _roughness(tracks: Tracks) -> float:

@@ -15,14 +15,14 @@ PREDICTIONS = ((-2, -1), (-1, 1), (1, 2))
 """Neighbours, counted in seen frames, through which a straight line predicts a position."""
 
 
-def gross_outliers(tracks: Tracks, noise: float) -> Bool[np.ndarray, "time body"]:
-    """Which positions are gross outliers, for measurement noise (m) of a size."""
+def gross_outliers(tracks: Tracks, sd: Float[np.ndarray, "time body"]) -> Bool[np.ndarray, "time body"]:
+    """Which positions are gross outliers, for measurement noise of a standard deviation (m) per axis each."""
     found = np.zeros(tracks.seen.shape, dtype=bool)
     for body in range(len(tracks.bodies)):
         seen = np.flatnonzero(tracks.seen[:, body])
         for _ in range(ROUNDS):
             kept = seen[~found[seen, body]]
-            new = _far_off(tracks.times[seen], tracks.positions[seen, body], ~found[seen, body], noise)
+            new = _far_off(tracks.times[seen], tracks.positions[seen, body], ~found[seen, body], sd[seen, body])
             new &= ~found[seen, body]
             if not new.any() or len(kept) - int(new.sum()) < FEWEST_LEFT:
                 break
@@ -44,7 +44,7 @@ def _far_off(
     times: Float[np.ndarray, "seen"],
     positions: Float[np.ndarray, "seen 2"],
     trusted: Bool[np.ndarray, "seen"],
-    noise: float,
+    sd: Float[np.ndarray, "seen"],
 ) -> Bool[np.ndarray, "seen"]:
     """Positions that no pair of trusted neighbours predicts."""
     count = len(times)
@@ -64,6 +64,6 @@ def _far_off(
             first, second = chosen
             share = (times[place] - times[first]) / (times[second] - times[first])
             predicted = (1 - share) * positions[first] + share * positions[second]
-            sd = noise * np.sqrt(1 + share**2 + (1 - share) ** 2)
-            nearest[place] = min(nearest[place], float(np.linalg.norm(positions[place] - predicted)) / sd)
+            spread = np.linalg.norm([sd[place], share * sd[second], (1 - share) * sd[first]])
+            nearest[place] = min(nearest[place], float(np.linalg.norm(positions[place] - predicted) / spread))
     return np.isfinite(nearest) & (nearest > FARTHEST)

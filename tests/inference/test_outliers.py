@@ -1,0 +1,50 @@
+import numpy as np
+import pytest
+
+from tests.inference.generator import observe
+from tests.inference.test_infer import chain, with_outliers
+from vrdp_prob.inference.clues import Clues
+from vrdp_prob.inference.outliers import gross_outliers, without
+from vrdp_prob.models.noise import NoiseFamily
+from vrdp_prob.scene import Tracks
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_neither_noise_nor_collisions_are_outliers(seed: int) -> None:
+    tracks = observe(chain(), noise=0.005, dropout=0.1, seed=seed)
+    clues = Clues.of(tracks)
+    assert not clues.outliers.any()
+    assert clues.noise_family is NoiseFamily.GAUSSIAN
+    assert without(tracks, clues.outliers) is tracks
+
+
+def test_gross_outliers_are_found_next_to_one_another_and_at_the_ends() -> None:
+    tracks = observe(chain(), noise=0.005, seed=1)
+    positions = tracks.positions.copy()
+    struck = [(0, 0), (40, 1), (41, 1), (60, 2), (len(positions) - 1, 3)]
+    for frame, body in struck:
+        positions[frame, body] += [0.3, -0.4]
+    moved = Tracks.from_arrays("moved", tracks.bodies, tracks.times, positions)
+    found = Clues.of(moved).outliers
+    assert {(int(frame), int(body)) for frame, body in np.argwhere(found)} == set(struck)
+    assert not without(moved, found).seen[found].any()
+
+
+def test_most_of_many_outliers_are_found() -> None:
+    tracks = observe(chain(), noise=0.005, seed=2)
+    spoilt = with_outliers(tracks, 0.05)
+    far = np.linalg.norm(spoilt.positions - tracks.positions, axis=-1) > 0.1
+    found = Clues.of(spoilt).outliers
+    assert (found & far).sum() > 0.8 * far.sum()
+    assert (found & ~far).sum() <= 0.03 * far.size
+
+
+def test_jumps_within_the_stated_noise_are_none() -> None:
+    tracks = observe(chain(), noise=0.0002, seed=3)
+    positions = tracks.positions.copy()
+    positions[30:45:5, 1] += 0.004
+    stated = np.broadcast_to(0.004**2 * np.eye(2), (*positions.shape[:2], 2, 2)).copy()
+    jumped = Tracks.from_arrays("jumped", tracks.bodies, tracks.times, positions, position_covariance=stated)
+    assert not Clues.of(jumped).outliers.any()
+    unstated = Tracks.from_arrays("unstated", tracks.bodies, tracks.times, positions)
+    assert gross_outliers(unstated, np.full(tracks.seen.shape, 0.0002)).any()

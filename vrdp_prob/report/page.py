@@ -261,7 +261,7 @@ def _combinations(content: ReportContent) -> list[tuple[str, str, str]]:
     for combination in (one for group in content.groups for one in group.combinations):
         name = sentence(with_names(combination.name, content.tracks.bodies))
         if combination.determined:
-            told = f"{percent(combination.contraction)} of what was open before, in the logarithm's variance"
+            told = f"the data took away {percent(combination.contraction)} of the prior variance (of the logarithm)"
             rows.append((name, f"known to {100 * combination.relative_sd:.2g} %", told))
         else:
             rows.append((name, "not determined", "as believed beforehand"))

@@ -4,13 +4,11 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import torch
 from arviz_stats.base.array import array_stats
 
 from tests.inference.generator import observe, random_scene
 from vrdp_prob.inference import SAMPLERS, default_model
 from vrdp_prob.inference.diagnostics import Reported
-from vrdp_prob.inference.events import first_contacts
 from vrdp_prob.inference.map_fit import MapFit, fit_map
 from vrdp_prob.inference.proposals import proposals
 from vrdp_prob.inference.samples import Samples, assess
@@ -34,7 +32,7 @@ def agreement(count: int, *, most_gradients: int | None = None) -> Iterator[tupl
     """For each of some synthetic scenes what every sampler says of itself, and all comparisons of pairs of them."""
     for seed in range(count):
         fit = _fit(seed)
-        reported = reported_of(fit)
+        reported = Reported.of(fit.likelihood.coordinates, fit.contacts)
         moments, verdicts = {}, {}
         for name, sampler in SAMPLERS.items():
             options = {"most_gradients": most_gradients} if name == "nuts" and most_gradients else {}
@@ -49,13 +47,6 @@ def agreement(count: int, *, most_gradients: int | None = None) -> Iterator[tupl
             moments[name] = _moments(samples, reported)
             verdicts[name] = assess(name, samples, reported).sentence
         yield seed, verdicts, list(_comparisons(seed, reported.names, moments))
-
-
-def reported_of(fit: MapFit) -> Reported:
-    """What is read off the draws of a fit."""
-    with torch.no_grad():
-        rollout = fit.likelihood.rollout(torch.from_numpy(fit.point[None]))
-    return Reported.of(fit.likelihood.coordinates, first_contacts(rollout, 0))
 
 
 def _fit(seed: int) -> MapFit:

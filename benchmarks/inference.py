@@ -24,12 +24,13 @@ import torch
 
 sys.path.insert(0, str(Path(__file__).parents[1]))  # the scenes of the tests
 
-from _agreement import Compared, agreement, reported_of
+from _agreement import Compared, agreement
 from _fixed_step_posterior import FixedStepPosterior
 
 from tests.inference.generator import observe, random_scene
 from vrdp_prob.datasets import load_all
 from vrdp_prob.inference import SAMPLERS, default_model
+from vrdp_prob.inference.diagnostics import Reported
 from vrdp_prob.inference.map_fit import fit_map
 from vrdp_prob.inference.nuts_chain import Task, make
 from vrdp_prob.inference.proposals import proposals
@@ -90,7 +91,7 @@ def samplers(videos: Sequence[Tracks], names: Sequence[str]) -> list[Check]:
     print("video        unknowns  sampler  cpu s  ESS bulk  tail  ESS/s  densities  gradients  converged")
     for tracks in videos:
         fit = fit_map(tracks, default_model(), np.random.default_rng(0))
-        reported = reported_of(fit)
+        reported = Reported.of(fit.likelihood.coordinates, fit.contacts)
         for key in names:
             begin = processor_seconds()
             samples = SAMPLERS[key](
@@ -132,7 +133,8 @@ def peer(most_gradients: int) -> list[Check]:
     """Pyro's NUTS on our simulator and on the fixed-step one, for the same tracks of three discs."""
     scene = random_scene(np.random.default_rng(500), bodies=3, squares=False)
     fit = fit_map(observe(scene, noise=0.01, seed=0), PhysicsModel.base(), np.random.default_rng(0))
-    reported, start = reported_of(fit), proposals(fit.modes, fit.likelihood.residuals)
+    reported = Reported.of(fit.likelihood.coordinates, fit.contacts)
+    start = proposals(fit.modes, fit.likelihood.residuals)
     begin = processor_seconds()
     generator = np.random.default_rng(1)
     samples = SAMPLERS["nuts"](

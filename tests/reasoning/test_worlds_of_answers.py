@@ -1,5 +1,6 @@
 """What comes next and what if, against the same discs run again with the change."""
 
+import inspect
 from dataclasses import replace
 
 import numpy as np
@@ -7,6 +8,7 @@ import pytest
 from sliding_discs import Disc, KnownPosterior, changed, path, tracks_of
 from test_seen import CHAIN
 
+from vrdp_prob import inference
 from vrdp_prob.errors import InputError
 from vrdp_prob.inference import Status
 from vrdp_prob.models.parameters import RESTITUTION
@@ -172,3 +174,9 @@ def test_a_cube_that_no_change_reaches_turns_as_it_was_seen() -> None:
     world = PosteriorWorlds(KnownPosterior(turning, discs), draws=DRAWS).counterfactual(Change.REMOVED, 0)
     turned = world.trajectory[:, :, 2, 2] - world.trajectory[:, :1, 2, 2]
     assert turned == pytest.approx(np.broadcast_to(0.7 * tracks.times, turned.shape), abs=1e-9)
+
+
+def test_the_public_door_shows_the_parameters_of_the_inference() -> None:
+    assert inspect.signature(infer).parameters == inspect.signature(inference.infer).parameters
+    assert "checkpoint" in inspect.signature(infer).parameters
+    assert inspect.getdoc(infer) == inspect.getdoc(inference.infer)

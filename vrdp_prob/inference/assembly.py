@@ -7,7 +7,7 @@ import torch
 import xarray as xr
 from jaxtyping import Float
 
-from vrdp_prob.inference.events import collision_sequences, first_contacts, wall_contacts
+from vrdp_prob.inference.events import Pairs, collision_sequences, wall_contacts
 from vrdp_prob.inference.identifiability import BodyStatus, Status, collision_groups, identifiability
 from vrdp_prob.inference.information import Information
 from vrdp_prob.inference.map_fit import MapFit
@@ -50,13 +50,10 @@ def posterior_from(
         keeping default values.
     """
     tracks = fit.likelihood.tracks
-    with torch.no_grad():
-        rollout = fit.likelihood.rollout(torch.from_numpy(fit.point[None]))
-    contacts = first_contacts(rollout, 0)
     information = Information(fit.likelihood.coordinates, fit.modes[0])
-    told = _telling(fit, contacts)
-    status = identifiability(tracks, told, wall_contacts(rollout, 0), information)
-    changed = _changed_order(fit, samples.points, contacts)
+    told = _telling(fit)
+    status = identifiability(tracks, told, wall_contacts(fit.rollout, 0), information)
+    changed = _changed_order(fit, samples.points)
     convergence = replace(convergence, collision_order_changes=float(changed.mean()))
     names = [body.id for body in tracks.bodies]
     tree = posterior_tree(fit, samples, changed, generator)
@@ -69,17 +66,17 @@ def posterior_from(
         data=tree,
         status=status,
         convergence=convergence,
-        warnings=tuple(_warnings(fit, convergence, status, contacts, drawn=draw_defaults)),
-        pairs=tuple((names[i], names[j]) for i, j in contacts),
+        warnings=tuple(_warnings(fit, convergence, status, drawn=draw_defaults)),
+        pairs=tuple((names[i], names[j]) for i, j in fit.contacts),
         groups=collision_groups(tracks, told, information),
         misfit=fit.misfit,
     )
 
 
-def _telling(fit: MapFit, contacts: tuple[tuple[int, int], ...]) -> tuple[tuple[int, int], ...]:
+def _telling(fit: MapFit) -> Pairs:
     """Contacts of bodies of which both had something to tell, so that their restitutions are unknowns."""
     places = fit.likelihood.coordinates.places
-    return tuple((i, j) for i, j in contacts if {(RESTITUTION.name, i), (RESTITUTION.name, j)} <= places.keys())
+    return tuple((i, j) for i, j in fit.contacts if {(RESTITUTION.name, i), (RESTITUTION.name, j)} <= places.keys())
 
 
 def _with_drawn_defaults(
@@ -98,27 +95,18 @@ def _with_drawn_defaults(
     return drawn
 
 
-def _changed_order(
-    fit: MapFit, points: Float[np.ndarray, "chain draw dimension"], contacts: tuple[tuple[int, int], ...]
-) -> Float[np.ndarray, "chain draw"]:
+def _changed_order(fit: MapFit, points: Float[np.ndarray, "chain draw dimension"]) -> Float[np.ndarray, "chain draw"]:
     """1 for a draw in which other pairs collide, or in another order, than in the MAP; else 0."""
     flat = torch.from_numpy(np.ascontiguousarray(points.reshape(-1, points.shape[-1])))
     changed: list[bool] = []
     with torch.no_grad():
         for begin in range(0, len(flat), BATCH):
             rollout = fit.likelihood.rollout(flat[begin : begin + BATCH])
-            changed += [sequence != contacts for sequence in collision_sequences(rollout)]
+            changed += [sequence != fit.contacts for sequence in collision_sequences(rollout)]
     return np.array(changed, dtype=float).reshape(points.shape[:2])
 
 
-def _warnings(
-    fit: MapFit,
-    convergence: Convergence,
-    status: dict[str, BodyStatus],
-    contacts: tuple[tuple[int, int], ...],
-    *,
-    drawn: bool,
-) -> list[str]:
+def _warnings(fit: MapFit, convergence: Convergence, status: dict[str, BodyStatus], *, drawn: bool) -> list[str]:
     """What limits the result, the model's misfit first."""
     names = [body.id for body in fit.likelihood.tracks.bodies]
     sentences = list(fit.misfit.sentences)
@@ -126,15 +114,16 @@ def _warnings(
         sentences.append("The search for the most probable values ended before it had converged.")
     if fit.search.sentence:
         sentences.append(fit.search.sentence)
-    found = {frozenset(pair) for pair in contacts}
-    missed = {(seen.first, seen.second) for seen in fit.contacts if frozenset((seen.first, seen.second)) not in found}
+    found = {frozenset(pair) for pair in fit.contacts}
+    seen = {(contact.first, contact.second) for contact in fit.clues.contacts}
+    missed = {pair for pair in seen if frozenset(pair) not in found}
     for first, second in sorted(missed):
         sentences.append(
             f"The tracks look as if objects {names[first]} and {names[second]} collided, but the best fit does without."
         )
     sentences += convergence.notes if convergence.converged else (convergence.sentence,)
     default = [name for name, one in status.items() if one.mass.status is Status.DEFAULT]
-    met = {names[body] for pair in contacts for body in pair}
+    met = {names[body] for pair in fit.contacts for body in pair}
     for group, one, several in (
         ([name for name in default if name not in met], "never collides in view", "never collide in view"),
         (

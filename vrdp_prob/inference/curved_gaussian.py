@@ -19,15 +19,13 @@ from torch import Tensor
 
 from vrdp_prob.inference.least_squares import Residuals, robust_cost
 from vrdp_prob.inference.samples import Gaussian
+from vrdp_prob.inference.second_differences import second_differences
 from vrdp_prob.inference.straightening import Straightening
 
 MOST_BENT = 4
 """Largest number of axes along which others are bent."""
 SMALLEST_BEND = 0.5
 """Bend, in standard deviations at one standard deviation from the MAP, below which an axis counts as straight."""
-STEP = 0.5
-"""Step of the second differences in standard deviations: large enough to see past kinks at contacts."""
-BATCH = 200
 
 
 @dataclass(frozen=True)
@@ -148,27 +146,6 @@ class CurvedGaussian:
 
 
 def _bends(straight: CurvedGaussian, residuals: Residuals) -> Float[np.ndarray, "dimension dimension dimension"]:
-    """Displacement, per product of two whitened coordinates, that keeps the residuals as small as they can be.
-
-    With J the derivative of the residuals in whitened coordinates, so that J'J is the unit matrix, and H their second
-    derivative along two directions, it is -J'H.
-    """
-    count = straight.dimension
-    unit = np.eye(count)
-    first, second = np.triu_indices(count)
-    steps = np.concatenate([np.zeros((1, count)), STEP * unit, STEP * (unit[first] + unit[second])])
-    ahead, behind = (_evaluated(straight, residuals, sign * steps) for sign in (1.0, -1.0))
-    derivative = (ahead[1 : count + 1] - behind[1 : count + 1]) / (2 * STEP)
-    even = (ahead + behind) / 2
-    single, double = even[1 : count + 1], even[count + 1 :]
-    mixed = (double - single[first] - single[second] + even[0]) / STEP**2
-    tensor = np.zeros((count, count, count))
-    tensor[first, second] = tensor[second, first] = np.nan_to_num(-(mixed @ derivative.T))
-    return tensor
-
-
-def _evaluated(
-    straight: CurvedGaussian, residuals: Residuals, whitened: Float[np.ndarray, "point dimension"]
-) -> Float[np.ndarray, "point residual"]:
-    points = straight.points(whitened)
-    return np.concatenate([residuals(points[begin : begin + BATCH]) for begin in range(0, len(points), BATCH)])
+    """Displacement, per product of two whitened coordinates, that keeps the residuals as small as they can be."""
+    found = second_differences(lambda whitened: residuals(straight.points(whitened)), straight.dimension)
+    return found.displacement(found.first_derivative)

@@ -4,16 +4,14 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 
 import numpy as np
-import torch
 
 from vrdp_prob.errors import InputError
 from vrdp_prob.inference.assembly import posterior_from
 from vrdp_prob.inference.checkpoint import Checkpoint, fingerprint
 from vrdp_prob.inference.diagnostics import Reported
 from vrdp_prob.inference.emcee_sampler import sample_emcee
-from vrdp_prob.inference.events import first_contacts
 from vrdp_prob.inference.laplace import sample_laplace
-from vrdp_prob.inference.map_fit import MapFit, fit_map
+from vrdp_prob.inference.map_fit import fit_map
 from vrdp_prob.inference.nuts_sampler import sample_nuts
 from vrdp_prob.inference.posterior import Posterior
 from vrdp_prob.inference.proposals import proposals
@@ -117,7 +115,7 @@ def infer(
     fit = fit_map(tracks, physics, generator, progress, noise=None if noise == "auto" else NoiseFamily(noise))
     if motion == "fixed":
         fit = fit.given_motion()
-    reported = _reported(fit)
+    reported = Reported.of(fit.likelihood.coordinates, fit.contacts)
     samples = SAMPLERS[sampler](
         fit.likelihood.log_density,
         proposals(fit.modes, fit.likelihood.residuals, Rates.of(tracks, fit.likelihood.coordinates)),
@@ -137,13 +135,6 @@ def infer(
         generator=generator,
         draw_defaults=defaults == "prior",
     )
-
-
-def _reported(fit: MapFit) -> Reported:
-    """What is read off the draws of a fit: all unknowns, and the ratios and products of pairs that collide."""
-    with torch.no_grad():
-        rollout = fit.likelihood.rollout(torch.from_numpy(fit.point[None]))
-    return Reported.of(fit.likelihood.coordinates, first_contacts(rollout, 0))
 
 
 def check_sampler(name: str) -> None:

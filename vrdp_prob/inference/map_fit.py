@@ -6,26 +6,28 @@ L-BFGS on the exact gradient and Levenberg-Marquardt on the residuals climb the 
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
+import torch
 from jaxtyping import Float
 
 from vrdp_prob.errors import InputError
 from vrdp_prob.inference.clues import Clues
 from vrdp_prob.inference.descent import Descent
-from vrdp_prob.inference.free_flight import SeenContact
+from vrdp_prob.inference.events import Pairs, first_contacts
 from vrdp_prob.inference.growing_fit import GrowingFit, merged
 from vrdp_prob.inference.misfit import Misfit, judge
 from vrdp_prob.inference.mode import Mode
 from vrdp_prob.inference.mode_search import ModeSearch
 from vrdp_prob.inference.model_error_fit import TURNS, next_model_error
-from vrdp_prob.inference.modes import HOPELESS, carried, colliding, distinct_modes, without_idle
+from vrdp_prob.inference.modes import HOPELESS, colliding, distinct_modes, restricted, without_idle
 from vrdp_prob.inference.plan import FitPlan
 from vrdp_prob.inference.refinement import Refined, climb, refine
-from vrdp_prob.inference.samples import evaluate
 from vrdp_prob.models.likelihood import Likelihood
 from vrdp_prob.models.noise import NoiseFamily
 from vrdp_prob.models.physics import PhysicsModel
+from vrdp_prob.models.simulator.rollout import Rollout
 from vrdp_prob.models.unknowns import MOTION, NOISE, Structure, unknowns
 from vrdp_prob.progress import ProgressDisplay, SilentProgress
 from vrdp_prob.scene import Tracks
@@ -53,12 +55,10 @@ class MapFit:
         Whether the last refinement ended by itself.
     search
         How far other modes were looked for.
-    contacts
-        Contacts seen in the tracks by local fits.
-    noise
-        Measurement noise (m) from the tracks alone.
+    clues
+        What the tracks show by themselves.
     misfit
-        How the residuals compare with it.
+        How the residuals compare with the noise.
     evaluations
         Number of worlds simulated.
     """
@@ -67,8 +67,7 @@ class MapFit:
     modes: tuple[Mode, ...]
     converged: bool
     search: ModeSearch
-    contacts: tuple[SeenContact, ...]
-    noise: float
+    clues: Clues
     misfit: Misfit
     evaluations: int
 
@@ -87,14 +86,22 @@ class MapFit:
         """Log posterior at the MAP."""
         return self.modes[0].log_density
 
+    @cached_property
+    def rollout(self) -> Rollout:
+        """The world of the MAP, as a batch of one."""
+        with torch.no_grad():
+            return self.likelihood.rollout(torch.from_numpy(self.point[None]))
+
+    @cached_property
+    def contacts(self) -> Pairs:
+        """Pairs of bodies that collide in the world of the MAP, in the order of their first contact."""
+        return first_contacts(self.rollout, 0)
+
     def given_motion(self) -> "MapFit":
         """The fit of what remains unknown when the motion is held at its most probable values; of one mode."""
-        mode, coordinates = self.modes[0], self.likelihood.coordinates
-        kept = np.flatnonzero(~coordinates.mask(MOTION))
-        likelihood = replace(self.likelihood, coordinates=coordinates.held(MOTION, mode.point))
-        point = mode.point[kept]
-        value = float(evaluate(likelihood.log_density, point[None])[0])
-        return replace(self, likelihood=likelihood, modes=(Mode(point, mode.precision[np.ix_(kept, kept)], value),))
+        held = self.likelihood.coordinates.held(MOTION, self.point)
+        likelihood, modes = restricted(self.likelihood, self.modes[:1], held)
+        return replace(self, likelihood=likelihood, modes=modes)
 
 
 def fit_map(
@@ -155,7 +162,7 @@ def fit_map(
     likelihood, modes = without_idle(likelihood, distinct_modes(likelihood, climbed), clues.moving)
     converged = found[0].converged or max(climbed, key=lambda one: one.log_density).converged
     search = ModeSearch(stages.alternatives, len(attempts), not _in_doubt(attempts))
-    return MapFit(likelihood, modes, converged, search, clues.contacts, clues.noise, misfit, evaluations)
+    return MapFit(likelihood, modes, converged, search, clues, misfit, evaluations)
 
 
 def _refined(
@@ -163,7 +170,7 @@ def _refined(
 ) -> list[Refined]:
     """What refinement makes of several starts, the best first; those without hope left out."""
     descent = Descent(likelihood, plan.optimiser)
-    found = [refine(descent, carried(source, point, likelihood)) for point in starts]
+    found = [refine(descent, source.coordinates.carried(point, likelihood.coordinates)) for point in starts]
     found.sort(key=lambda one: -one.log_density)
     return [one for one in found if one is found[0] or one.log_density > found[0].log_density - HOPELESS]
 

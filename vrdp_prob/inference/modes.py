@@ -14,6 +14,7 @@ from vrdp_prob.inference.information import Information
 from vrdp_prob.inference.mode import Mode
 from vrdp_prob.inference.refinement import Refined, mode_at
 from vrdp_prob.inference.samples import evaluate
+from vrdp_prob.models.coordinates import Coordinates
 from vrdp_prob.models.likelihood import Likelihood
 from vrdp_prob.models.unknowns import Structure, unknowns
 
@@ -50,10 +51,17 @@ def without_idle(
     )
     if len(coordinates) == len(likelihood.coordinates):
         return likelihood, tuple(modes)
+    return restricted(likelihood, modes, coordinates)
+
+
+def restricted(
+    likelihood: Likelihood, modes: Sequence[Mode], coordinates: Coordinates
+) -> tuple[Likelihood, tuple[Mode, ...]]:
+    """The same modes in some of their unknowns; the others have the values that the coordinates hold them at."""
     reduced = replace(likelihood, coordinates=coordinates)
-    places = [likelihood.coordinates.places[entry.field, entry.owner] for entry in coordinates.entries]
-    points = [mode.point[places] for mode in modes]
-    values = evaluate(reduced.log_density, np.array(points))
+    places = [likelihood.coordinates.places[key] for key in coordinates.places]
+    points = np.array([mode.point[places] for mode in modes])
+    values = evaluate(reduced.log_density, points)
     return reduced, tuple(
         Mode(point, mode.precision[np.ix_(places, places)], float(value))
         for mode, point, value in zip(modes, points, values, strict=True)
@@ -81,16 +89,3 @@ def colliding(likelihood: Likelihood, points: Sequence[Float[np.ndarray, "dimens
     with torch.no_grad():
         sequences = collision_sequences(likelihood.rollout(torch.from_numpy(np.array(points))))
     return frozenset(body for pairs in sequences for pair in pairs for body in pair)
-
-
-def carried(
-    source: Likelihood, point: Float[np.ndarray, "dimension"], target: Likelihood
-) -> Float[np.ndarray, "target_dimension"]:
-    """The same values in the vector of another structure; what it does not have stays at the mean of its prior."""
-    places = source.coordinates.places
-    return np.array(
-        [
-            point[places[entry.field, entry.owner]] if (entry.field, entry.owner) in places else entry.prior.mean
-            for entry in target.coordinates.entries
-        ]
-    )

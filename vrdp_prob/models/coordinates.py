@@ -108,6 +108,16 @@ class Coordinates:
         defaults = {name: values[name][0].numpy() if name in kept else old for name, old in self.defaults.items()}
         return Coordinates(tuple(entry for entry in self.entries if entry.field not in kept), defaults)
 
+    def carried(
+        self, point: Float[np.ndarray, "dimension"], target: "Coordinates"
+    ) -> Float[np.ndarray, "target_dimension"]:
+        """The same values in another vector; what is new there is at the mean of its prior."""
+        carried = target.prior_mean.copy()
+        for key, place in target.places.items():
+            if key in self.places:
+                carried[place] = point[self.places[key]]
+        return carried
+
     def quantities(self, points: Float[Tensor, "point dimension"]) -> dict[str, Float[Tensor, "point owner"]]:
         """Values of every quantity for all its owners (one column if it is shared)."""
         flat = self._all_defaults.expand(len(points), -1)

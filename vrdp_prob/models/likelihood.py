@@ -157,13 +157,7 @@ class Likelihood:
         Points that differ in noise scales alone share one simulation.
         """
         quantities = self.coordinates.quantities(points)
-        log_likelihood = self._log_likelihood(discrepancies, quantities)
-        log_prior = self.log_prior(points)
-        return log_likelihood + log_prior
-
-    def log_prior(self, points: Float[Tensor, "point dimension"]) -> Float[Tensor, "point"]:
-        """Log prior density (nats, up to a constant)."""
-        return -(self.coordinates.prior_residuals(points) ** 2).sum(dim=1) / 2
+        return self._log_likelihood(discrepancies, quantities) + self.coordinates.log_prior(points).sum(dim=1)
 
     def predicted(self, points: Float[Tensor, "point dimension"]) -> Float[np.ndarray, "point time body 3"]:
         """Positions (m) and angles (rad) of all frames and bodies as they would be measured without noise."""

@@ -1,20 +1,21 @@
 """The door: a posterior and a question in, an answer out."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields
-from functools import cached_property
-from pathlib import Path
+from functools import cached_property, wraps
+from typing import ParamSpec
 
 from vrdp_prob import inference
 from vrdp_prob.inference import Posterior
-from vrdp_prob.models.physics import PhysicsModel
 from vrdp_prob.progress import ProgressDisplay
 from vrdp_prob.reasoning.answer import Answer
 from vrdp_prob.reasoning.defaults import Defaults
 from vrdp_prob.reasoning.executor import ChoiceInput, answer_question
 from vrdp_prob.reasoning.facts import Facts
 from vrdp_prob.reasoning.worlds import DRAWS, PosteriorLike, PosteriorWorlds
-from vrdp_prob.scene import Question, Tracks
+from vrdp_prob.scene import Question
+
+Options = ParamSpec("Options")
 
 
 def ask(
@@ -78,33 +79,14 @@ class AskablePosterior(Posterior):
         return answer_question(self.all_worlds, question, choices=choices)
 
 
-def infer(
-    tracks: Tracks,
-    *,
-    sampler: str = "emcee",
-    model: PhysicsModel | None = None,
-    seed: int = 0,
-    draws: int = 1000,
-    progress: ProgressDisplay | None = None,
-    noise: str = "auto",
-    defaults: str = "fixed",
-    motion: str = "sampled",
-    checkpoint: Path | str | None = None,
-    hand_on: bool = True,
-) -> AskablePosterior:
-    """Infer a posterior that can be asked; parameters as for `vrdp_prob.inference.infer`."""
-    return AskablePosterior.of(
-        inference.infer(
-            tracks,
-            sampler=sampler,
-            model=model,
-            seed=seed,
-            draws=draws,
-            progress=progress,
-            noise=noise,
-            defaults=defaults,
-            motion=motion,
-            checkpoint=checkpoint,
-            hand_on=hand_on,
-        )
-    )
+def _askable(infer: Callable[Options, Posterior]) -> Callable[Options, AskablePosterior]:
+    """The same function, whose posterior can be asked."""
+
+    @wraps(infer)
+    def infer_askable(*arguments: Options.args, **options: Options.kwargs) -> AskablePosterior:
+        return AskablePosterior.of(infer(*arguments, **options))
+
+    return infer_askable
+
+
+infer = _askable(inference.infer)

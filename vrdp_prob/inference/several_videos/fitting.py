@@ -17,7 +17,7 @@ from vrdp_prob.inference.misfit import judge
 from vrdp_prob.inference.mode import Mode
 from vrdp_prob.inference.model_error_fit import TURNS, next_model_error
 from vrdp_prob.inference.several_videos.joint_fit import JointFit, climb, first_guess, with_alternatives
-from vrdp_prob.inference.several_videos.linking import check_names, link
+from vrdp_prob.inference.several_videos.linking import LinkedVideo, check_names, link
 from vrdp_prob.models.coordinates import Coordinates
 from vrdp_prob.models.likelihood import Likelihood
 from vrdp_prob.models.parameters import MASS, RESTITUTION, Transform
@@ -81,7 +81,7 @@ class SharedFit:
         """
         joint = self.joint
         likelihoods = [
-            plain_likelihood(fit.likelihood.tracks, model, structure)
+            plain_likelihood(fit.clues, model, structure)
             for fit, structure in zip(self.fits, self.structures, strict=True)
         ]
         numbers, videos = link(likelihoods, self.shared)
@@ -94,7 +94,7 @@ class SharedFit:
             elif key[0] in first and first[key[0]] > entry.transform.support[0]:
                 shared[place] = _coordinate(entry.transform, first[key[0]])
         locals_ = [
-            video.split(carried(old.likelihood.coordinates, joint.point(index), video.likelihood.coordinates))[1]
+            video.split(old.likelihood.coordinates.carried(joint.point(index), video.likelihood.coordinates))[1]
             for index, (old, video) in enumerate(zip(joint.videos, videos, strict=True))
         ]
         found = climb(numbers, videos, shared, locals_)
@@ -145,13 +145,9 @@ def fit_together(
 
         fits = in_parallel(fit, videos)
     structures = tuple(structure_of(one.likelihood.coordinates) for one in fits)
-    likelihoods = [plain_likelihood(tracks, model, one) for tracks, one in zip(videos, structures, strict=True)]
+    likelihoods = [plain_likelihood(fit.clues, model, one) for fit, one in zip(fits, structures, strict=True)]
     numbers, linked = link(likelihoods, shared)
-    starts = [
-        np.array([carried(fit.likelihood.coordinates, mode.point, video.likelihood.coordinates) for mode in fit.modes])
-        for fit, video in zip(fits, linked, strict=True)
-    ]
-    joint = climb(numbers, linked, *first_guess(numbers, linked, starts))
+    joint = climb(numbers, linked, *first_guess(numbers, linked, _starts(fits, linked)))
     names = None if shared is None else tuple(shared)
     found = _finished(joint, model, fits, structures, names, model_error=model_error)
     return replace(found, joint=_with_modes(found.joint, fits))
@@ -161,11 +157,15 @@ def _with_modes(joint: JointFit, fits: Sequence[MapFit]) -> JointFit:
     """The joint fit with the further modes that the videos' own fits found."""
     if all(len(fit.modes) == 1 for fit in fits):
         return joint
-    starts = [
-        np.array([carried(fit.likelihood.coordinates, mode.point, video.likelihood.coordinates) for mode in fit.modes])
-        for fit, video in zip(fits, joint.videos, strict=True)
+    return with_alternatives(joint, _starts(fits, joint.videos))
+
+
+def _starts(fits: Sequence[MapFit], videos: Sequence[LinkedVideo]) -> list[Float[np.ndarray, "mode dimension"]]:
+    """The modes of the videos' own fits, in the vectors of the linked videos."""
+    return [
+        np.array([fit.likelihood.coordinates.carried(mode.point, video.likelihood.coordinates) for mode in fit.modes])
+        for fit, video in zip(fits, videos, strict=True)
     ]
-    return with_alternatives(joint, starts)
 
 
 def check_videos(videos: Sequence[Tracks]) -> None:
@@ -206,16 +206,15 @@ def _finished(
 ) -> SharedFit:
     """The joint fit with what the model leaves unexplained, and each video's part of it."""
     misfits = [
-        judge(video.likelihood, joint.point(index), fits[index].noise, fits[index].misfit.outliers)
+        judge(video.likelihood, joint.point(index), fits[index].clues.noise, fits[index].misfit.outliers)
         for index, video in enumerate(joint.videos)
     ]
-    clues = [Clues.of(video.likelihood.tracks) for video in joint.videos]
     for _ in range(TURNS if model_error else 0):
         errors = [
             next_model_error(
                 video.believing(joint.gaussian.mean, joint.gaussian.sd),
                 joint.point(index),
-                clues[index],
+                fits[index].clues,
                 misfits[index],
             )
             for index, video in enumerate(joint.videos)
@@ -251,7 +250,7 @@ def _again(joint: JointFit, likelihoods: Sequence[Likelihood], shared: tuple[str
     known = dict(zip(joint.numbers.keys, joint.gaussian.mean, strict=True))
     start = np.array([known[key] for key in numbers.keys])
     locals_ = [
-        video.split(carried(old.likelihood.coordinates, joint.point(index), video.likelihood.coordinates))[1]
+        video.split(old.likelihood.coordinates.carried(joint.point(index), video.likelihood.coordinates))[1]
         for index, (old, video) in enumerate(zip(joint.videos, videos, strict=True))
     ]
     return climb(numbers, videos, start, locals_)
@@ -263,9 +262,9 @@ def _mode(joint: JointFit, index: int) -> Mode:
     return Mode(point, joint.precision(index), video.value(joint.gaussian.mean, joint.gaussian.locals[index].centre))
 
 
-def plain_likelihood(tracks: Tracks, model: PhysicsModel, structure: Structure) -> Likelihood:
+def plain_likelihood(clues: Clues, model: PhysicsModel, structure: Structure) -> Likelihood:
     """Density of a video without a model error."""
-    family = Clues.of(tracks).noise_family
+    tracks, family = clues.tracks, clues.noise_family
     return Likelihood(tracks, model, unknowns(tracks, model, structure, family), family)
 
 
@@ -276,18 +275,6 @@ def structure_of(coordinates: Coordinates) -> Structure:
         for field in ("velocity_x", MASS.name, RESTITUTION.name)
     }
     return Structure(moving=owners["velocity_x"], colliding=owners[MASS.name] | owners[RESTITUTION.name])
-
-
-def carried(
-    source: Coordinates, point: Float[np.ndarray, "dimension"], target: Coordinates
-) -> Float[np.ndarray, "target_dimension"]:
-    """The same values in another vector; what is new there at the mean of its prior."""
-    places = source.places
-    carried = target.prior_mean.copy()
-    for place, entry in enumerate(target.entries):
-        if (entry.field, entry.owner) in places:
-            carried[place] = point[places[entry.field, entry.owner]]
-    return carried
 
 
 def _vanishing(model: PhysicsModel) -> dict[str, float]:

@@ -11,7 +11,7 @@ from vrdp_prob.inference.map_fit import fit_map
 from vrdp_prob.inference.samples import PARETO_K_GOAL
 from vrdp_prob.inference.several_videos.arrow import ArrowGaussian
 from vrdp_prob.inference.several_videos.clouds import Clouds
-from vrdp_prob.inference.several_videos.fitting import carried, plain_likelihood, stream, structure_of
+from vrdp_prob.inference.several_videos.fitting import plain_likelihood, stream, structure_of
 from vrdp_prob.inference.several_videos.importance import resampled, weighted_locals
 from vrdp_prob.inference.several_videos.joint_fit import local_modes
 from vrdp_prob.inference.several_videos.linking import linked
@@ -78,11 +78,11 @@ def predictive_log_density(
     generator = stream(seed, tracks.video)
     fit = fit_map(tracks, posterior.model, generator, progress)
     structure = structure_of(fit.likelihood.coordinates)
-    video = linked(plain_likelihood(tracks, posterior.model, structure), posterior.numbers)
+    video = linked(plain_likelihood(fit.clues, posterior.model, structure), posterior.numbers)
     draws = posterior.points.reshape(-1, posterior.points.shape[-1])
     mean, root = draws.mean(axis=0), _root(draws)
     source, target = fit.likelihood.coordinates, video.likelihood.coordinates
-    starts = np.array([video.split(carried(source, one.point, target))[1] for one in fit.modes])
+    starts = np.array([video.split(source.carried(one.point, target))[1] for one in fit.modes])
     modes = local_modes(video, posterior.numbers, mean, starts)
     arrow = ArrowGaussian(mean, root, (modes[0].gaussian,), posterior.numbers.logarithms)
     clouds = Clouds.of(video, arrow, modes, generator)

@@ -80,8 +80,8 @@ class SharedNumbers:
 
     def log_prior(self, shared: Float[np.ndarray, "point shared"]) -> Float[np.ndarray, "point"]:
         """Log prior up to a constant."""
-        residuals = self.prior_residuals(shared)
-        return -(residuals**2).sum(axis=1) / 2
+        values: np.ndarray = self._prior.log_prior(torch.from_numpy(np.ascontiguousarray(shared))).sum(dim=1).numpy()
+        return values
 
     def prior_residuals(self, shared: Float[np.ndarray, "point shared"]) -> Float[np.ndarray, "point residual"]:
         """Numbers whose half sum of squares is the negative log prior."""
@@ -119,11 +119,6 @@ class LinkedVideo:
     def local_places(self) -> Int[np.ndarray, "local"]:
         """Places of its own numbers."""
         return np.setdiff1d(np.arange(len(self.likelihood.coordinates)), self.shared_places)
-
-    @cached_property
-    def local_scale(self) -> Float[np.ndarray, "local"]:
-        """Typical size of a change of each of its own numbers."""
-        return self.likelihood.coordinates.scale[self.local_places]
 
     @cached_property
     def data(self) -> Likelihood:

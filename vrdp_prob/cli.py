@@ -4,7 +4,6 @@ Exit code 0: done; 2: input that cannot be used (one line says what, where, and 
 """
 
 import json
-import math
 import sys
 from pathlib import Path
 from typing import Annotated
@@ -12,18 +11,30 @@ from typing import Annotated
 import typer
 
 from vrdp_prob import __version__
+from vrdp_prob.command_options import (
+    CameraOption,
+    CheckpointFolder,
+    Defaults,
+    Input,
+    Model,
+    Noise,
+    Quiet,
+    Sampler,
+    Seed,
+    Video,
+)
 from vrdp_prob.datasets import load, load_all, read_questions, video_files, video_names
 from vrdp_prob.errors import InputError
 from vrdp_prob.files import check_writable
-from vrdp_prob.inference import SAMPLERS, check_sampler, default_model
+from vrdp_prob.inference import check_options, default_model
 from vrdp_prob.models.physics import PhysicsModel
 from vrdp_prob.models.simulator.rollout import compile_model
 from vrdp_prob.progress import progress_display
-from vrdp_prob.reasoning import Answer, ask, infer
+from vrdp_prob.reasoning import ask, infer
 from vrdp_prob.reasoning.checking import check_question
+from vrdp_prob.report.answer_lines import answer_lines
 from vrdp_prob.report.pipeline import Report, check_questions
 from vrdp_prob.report.pipeline import report as write_report
-from vrdp_prob.report.wording import listed, percent, percent_error
 from vrdp_prob.scene import Choice, Question
 
 UNUSABLE_INPUT = 2
@@ -37,25 +48,6 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
 )
-
-Input = Annotated[Path, typer.Argument(metavar="INPUT", help="A video, a tracks folder, or a CLEVRER annotation file.")]
-Model = Annotated[
-    Path | None,
-    typer.Option(
-        metavar="FILE.toml", help="Physics model; by default the base model with a friction of its own for every body."
-    ),
-]
-Sampler = Annotated[str, typer.Option(metavar="|".join(SAMPLERS), help="How the posterior is drawn.")]
-Seed = Annotated[int, typer.Option(min=0, help="Same seed, same numbers.")]
-Quiet = Annotated[bool, typer.Option("--quiet", help="No progress bars, no closing lines.")]
-CameraOption = Annotated[
-    str | None,
-    typer.Option(
-        metavar="FILE|clevrer",
-        help="Camera file; by default camera.json beside the video or in its parent folder, or in the tracks folder.",
-    ),
-]
-Video = Annotated[str | None, typer.Option(metavar="ID", help="Which video of a folder of several.")]
 
 
 def _tell_version(asked: bool) -> bool:
@@ -88,26 +80,35 @@ def report(
     camera: CameraOption = None,
     model: Model = None,
     sampler: Sampler = DEFAULT_SAMPLER,
+    noise: Noise = "auto",
+    defaults: Defaults = "fixed",
+    checkpoint: CheckpointFolder = None,
     seed: Seed = 0,
     quiet: Quiet = False,
 ) -> None:
     """Write an uncertainty report: report.html, report.json and posterior.nc."""
     progress = progress_display(quiet=quiet)
-    check_sampler(sampler)
+    check_options(sampler=sampler, noise=noise, defaults=defaults)
     check_writable(out)
+    if checkpoint is not None:
+        check_writable(checkpoint)
     physics = _model(model)
     names = [name for name in video_names(path) if video in (None, name)]
     asked = {name: [] for name in names} if questions is None else _questions_of(questions, names)
     videos = load_all(path, videos=None if video is None else [video], camera=camera, progress=progress)
     files = video_files(path)
     for tracks in videos:
+        own = Path() if len(videos) == 1 else Path(tracks.video)
         written = write_report(
             tracks,
             questions=asked[tracks.video],
-            directory=out if len(videos) == 1 else out / tracks.video,
+            directory=out / own,
             video_file=files.get(tracks.video),
             model=physics,
             sampler=sampler,
+            noise=noise,
+            defaults=defaults,
+            checkpoint=None if checkpoint is None else checkpoint / own,
             seed=seed,
             progress=progress,
         )
@@ -126,6 +127,9 @@ def ask_question(
     camera: CameraOption = None,
     model: Model = None,
     sampler: Sampler = DEFAULT_SAMPLER,
+    noise: Noise = "auto",
+    defaults: Defaults = "fixed",
+    checkpoint: CheckpointFolder = None,
     seed: Seed = 0,
     quiet: Quiet = False,
 ) -> None:
@@ -134,17 +138,28 @@ def ask_question(
     if not question.strip():
         raise InputError('the question is empty; ask one, for example "What will happen next?" with --choice options.')
     asked = Question(question, choices=tuple(Choice(number, text) for number, text in enumerate(choice or ())))
-    check_sampler(sampler)
+    check_options(sampler=sampler, noise=noise, defaults=defaults)
+    if checkpoint is not None:
+        check_writable(checkpoint)
     physics = _model(model)
     check_question(asked)
     tracks = load(path, video=video, camera=camera, progress=progress)
     check_question(asked, tracks=tracks)
-    posterior = infer(tracks, sampler=sampler, model=physics, seed=seed, progress=progress)
+    posterior = infer(
+        tracks,
+        sampler=sampler,
+        model=physics,
+        noise=noise,
+        defaults=defaults,
+        checkpoint=checkpoint,
+        seed=seed,
+        progress=progress,
+    )
     answer = ask(posterior, asked, progress=progress)
     if as_json:
         print(json.dumps(answer.to_document(), allow_nan=False))
     else:
-        print("\n".join(_answer_lines(answer)))
+        print("\n".join(answer_lines(answer)))
 
 
 @app.command()
@@ -284,25 +299,3 @@ def _tell(written: Report) -> None:
         print(line)
     for file in written.files:
         print(file)
-
-
-def _answer_lines(answer: Answer) -> list[str]:
-    """The answer in the report's words, one line for each choice or value, then what limits it."""
-    if answer.choices:
-        shares = [(choice.probability, choice.mc_error, choice.choice) for choice in answer.choices]
-    else:
-        ordered = sorted(answer.distribution.items(), key=lambda item: -item[1])
-        shares = [(share, _error_of(share, answer), value) for value, share in ordered]
-    lines = [f"{percent(share, error):>6} {percent_error(share, error):<7} {text}" for share, error, text in shares]
-    notes = list(answer.notes)
-    if answer.relies_on_default:
-        who = f"object{'s' * (len(answer.relies_on_default) > 1)} {listed(answer.relies_on_default)}"
-        notes.insert(0, f"Rests on default values of {who}, which this video does not determine.")
-    return lines + [f"note: {note}" for note in notes]
-
-
-def _error_of(share: float, answer: Answer) -> float:
-    """Monte Carlo error of the share of one value, from that of the most probable one: both are of the same draws."""
-    if not 0 < answer.probability < 1:
-        return answer.mc_error
-    return answer.mc_error * math.sqrt(share * (1 - share) / (answer.probability * (1 - answer.probability)))

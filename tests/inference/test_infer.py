@@ -227,7 +227,7 @@ def test_a_posterior_given_the_motion_is_narrower_and_keeps_the_motion() -> None
 
 def test_unknown_options_are_refused() -> None:
     for name in ("noise", "defaults", "motion"):
-        with pytest.raises(InputError, match=f"{name} is 'other'; use one of"):
+        with pytest.raises(InputError, match=f"{name} 'other' is not known; use one of"):
             infer(observe(chain(), frames=30), **{name: "other"})
 
 

@@ -1,7 +1,7 @@
 """How we learn: MAP, Laplace draws, emcee, NUTS, identifiability, the posterior."""
 
 from vrdp_prob.inference.identifiability import BodyStatus, ParameterStatus, Status
-from vrdp_prob.inference.infer import SAMPLERS, check_sampler, default_model, infer
+from vrdp_prob.inference.infer import OPTIONS, SAMPLERS, check_options, default_model, infer
 from vrdp_prob.inference.posterior import Posterior
 from vrdp_prob.inference.samples import Convergence
 from vrdp_prob.inference.several_videos import (
@@ -16,6 +16,7 @@ from vrdp_prob.inference.several_videos import (
 from vrdp_prob.inference.summaries import ObjectSummary, PairSummary, ParameterSummary, Summary
 
 __all__ = [
+    "OPTIONS",
     "SAMPLERS",
     "BodyStatus",
     "Convergence",
@@ -29,7 +30,7 @@ __all__ = [
     "SharedPosterior",
     "Status",
     "Summary",
-    "check_sampler",
+    "check_options",
     "default_model",
     "fit_together",
     "infer",

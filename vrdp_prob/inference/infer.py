@@ -30,6 +30,7 @@ SAMPLERS: Mapping[str, Callable[..., Samples]] = {
 }
 """The samplers by name; all take the log density and what its modes propose."""
 OPTIONS = {
+    "sampler": tuple(SAMPLERS),
     "noise": ("auto", *NoiseFamily),
     "defaults": ("fixed", "prior"),
     "motion": ("sampled", "fixed"),
@@ -98,14 +99,11 @@ def infer(
         If the sampler or an option is unknown, fewer than 4 draws are asked for, the seed is negative, no object
         moves, or the checkpoint belongs to another run.
     """
-    check_sampler(sampler)
+    check_options(sampler=sampler, noise=noise, defaults=defaults, motion=motion)
     if draws < 4:
         raise InputError(f"draws is {draws}; ask for at least 4.")
     if seed < 0:
         raise InputError(f"seed is {seed}; give a number that is not negative.")
-    for name, value in (("noise", noise), ("defaults", defaults), ("motion", motion)):
-        if value not in OPTIONS[name]:
-            raise InputError(f"{name} is '{value}'; use one of {', '.join(OPTIONS[name])}.")
     physics = default_model() if model is None else model
     kept = None
     if checkpoint is not None:
@@ -137,13 +135,14 @@ def infer(
     )
 
 
-def check_sampler(name: str) -> None:
-    """Refuse a sampler that does not exist.
+def check_options(**options: str) -> None:
+    """Refuse values that options of `infer` cannot have.
 
     Raises
     ------
     InputError
-        If there is none of that name.
+        If there is such a value.
     """
-    if name not in SAMPLERS:
-        raise InputError(f"sampler '{name}' is not known; use one of {', '.join(SAMPLERS)}.")
+    for name, value in options.items():
+        if value not in OPTIONS[name]:
+            raise InputError(f"{name} '{value}' is not known; use one of {', '.join(OPTIONS[name])}.")

@@ -55,6 +55,9 @@ def report(
     video_file: Path | str | None = None,
     sampler: str = "emcee",
     model: PhysicsModel | None = None,
+    noise: str = "auto",
+    defaults: str = "fixed",
+    checkpoint: Path | str | None = None,
     seed: int = 0,
     progress: ProgressDisplay | None = None,
 ) -> Report:
@@ -70,7 +73,7 @@ def report(
         Questions to answer.
     video_file
         The video itself, for the pictures in the page.
-    sampler, model, seed
+    sampler, model, noise, defaults, checkpoint, seed
         How the posterior is drawn, where `source` is not one yet; see `vrdp_prob.infer`.
     progress
         Who follows the work.
@@ -89,7 +92,16 @@ def report(
     if isinstance(source, Posterior):
         posterior = source
     else:
-        posterior = infer(source, sampler=sampler, model=model, seed=seed, progress=progress)
+        posterior = infer(
+            source,
+            sampler=sampler,
+            model=model,
+            noise=noise,
+            defaults=defaults,
+            checkpoint=checkpoint,
+            seed=seed,
+            progress=progress,
+        )
     worlds = PosteriorWorlds(posterior)
     answers = []
     with progress.stage("Questions", total=len(questions)) as advance:

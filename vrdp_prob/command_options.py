@@ -1,0 +1,44 @@
+"""Arguments and options that several commands take."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from vrdp_prob.inference import OPTIONS
+
+Input = Annotated[Path, typer.Argument(metavar="INPUT", help="A video, a tracks folder, or a CLEVRER annotation file.")]
+Model = Annotated[
+    Path | None,
+    typer.Option(
+        metavar="FILE.toml", help="Physics model; by default the base model with a friction of its own for every body."
+    ),
+]
+Sampler = Annotated[str, typer.Option(metavar="|".join(OPTIONS["sampler"]), help="How the posterior is drawn.")]
+Noise = Annotated[
+    str,
+    typer.Option(
+        metavar="|".join(OPTIONS["noise"]), help="Measurement errors; auto: Student-t where the tracks show outliers."
+    ),
+]
+Defaults = Annotated[
+    str,
+    typer.Option(
+        metavar="|".join(OPTIONS["defaults"]),
+        help="Masses and restitutions that the data say nothing about: default values, or drawn from their prior.",
+    ),
+]
+CheckpointFolder = Annotated[
+    Path | None,
+    typer.Option(metavar="DIR", help="Keeps what is done; the same command, run again after a kill, goes on from it."),
+]
+Seed = Annotated[int, typer.Option(min=0, help="Same seed, same numbers.")]
+Quiet = Annotated[bool, typer.Option("--quiet", help="No progress bars, no closing lines.")]
+CameraOption = Annotated[
+    str | None,
+    typer.Option(
+        metavar="FILE|clevrer",
+        help="Camera file; by default camera.json beside the video or in its parent folder, or in the tracks folder.",
+    ),
+]
+Video = Annotated[str | None, typer.Option(metavar="ID", help="Which video of a folder of several.")]

@@ -1,0 +1,28 @@
+"""An answer as lines of text, in the report's words."""
+
+import math
+
+from vrdp_prob.reasoning import Answer
+from vrdp_prob.report.wording import listed, percent, percent_error
+
+
+def answer_lines(answer: Answer) -> list[str]:
+    """One line for each choice or value, then what limits the answer."""
+    if answer.choices:
+        shares = [(choice.probability, choice.mc_error, choice.choice) for choice in answer.choices]
+    else:
+        ordered = sorted(answer.distribution.items(), key=lambda item: -item[1])
+        shares = [(share, _error_of(share, answer), value) for value, share in ordered]
+    lines = [f"{percent(share, error):>6} {percent_error(share, error):<7} {text}" for share, error, text in shares]
+    notes = list(answer.notes)
+    if answer.relies_on_default:
+        who = f"object{'s' * (len(answer.relies_on_default) > 1)} {listed(answer.relies_on_default)}"
+        notes.insert(0, f"Rests on default values of {who}, which this video does not determine.")
+    return lines + [f"note: {note}" for note in notes]
+
+
+def _error_of(share: float, answer: Answer) -> float:
+    """Monte Carlo error of the share of one value, from that of the most probable one: both are of the same draws."""
+    if not 0 < answer.probability < 1:
+        return answer.mc_error
+    return answer.mc_error * math.sqrt(share * (1 - share) / (answer.probability * (1 - answer.probability)))

@@ -1,5 +1,6 @@
 """A posterior out of a fit and its draws: what can be told from the data, what limits it, and every draw by name."""
 
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -20,6 +21,12 @@ from vrdp_prob.scene import Tracks
 
 BATCH = 500
 """Worlds simulated at once when the draws are looked at again."""
+BOTH = ("mass and restitution are default values", "mass and restitution are drawn from the prior")
+MASS_ALONE = ("mass is a default value", "mass is drawn from the prior")
+ALONE = ("never collides in view", "never collide in view", BOTH)
+LATE = ("collides too late or too weakly to tell", "collide too late or too weakly to tell", BOTH)
+BOUNCED = ("tells something only where it meets walls", "tell something only where they meet walls", MASS_ALONE)
+"""Why the tracks do not tell (of one object, of several), and what stands in for what they do not tell."""
 
 
 def posterior_from(
@@ -122,18 +129,19 @@ def _warnings(fit: MapFit, convergence: Convergence, status: dict[str, BodyStatu
             f"The tracks look as if objects {names[first]} and {names[second]} collided, but the best fit does without."
         )
     sentences += convergence.notes if convergence.converged else (convergence.sentence,)
-    default = [name for name, one in status.items() if one.mass.status is Status.DEFAULT]
+    return [*sentences, *_untold(fit, status, drawn=drawn)]
+
+
+def _untold(fit: MapFit, status: dict[str, BodyStatus], *, drawn: bool) -> Iterator[str]:
+    """What the tracks say nothing about."""
+    names = [body.id for body in fit.likelihood.tracks.bodies]
     met = {names[body] for pair in fit.contacts for body in pair}
-    for group, one, several in (
-        ([name for name in default if name not in met], "never collides in view", "never collide in view"),
-        (
-            [name for name in default if name in met],
-            "collides too late or too weakly to tell",
-            "collide too late or too weakly to tell",
-        ),
-    ):
+    groups: dict[tuple[str, str, tuple[str, str]], list[str]] = {ALONE: [], LATE: [], BOUNCED: []}
+    for name, one in status.items():
+        if one.mass.status is Status.DEFAULT:
+            bounced = one.restitution.status is not Status.DEFAULT
+            groups[BOUNCED if bounced else LATE if name in met else ALONE].append(name)
+    for (one_does, several_do, values), group in groups.items():
         if group:
-            subject = f"Objects {', '.join(group)} {several}" if len(group) > 1 else f"Object {group[0]} {one}"
-            values = "are drawn from the prior" if drawn else "are default values"
-            sentences.append(f"{subject}: mass and restitution {values}, not measured.")
-    return sentences
+            subject = f"Objects {', '.join(group)} {several_do}" if len(group) > 1 else f"Object {group[0]} {one_does}"
+            yield f"{subject}: {values[drawn]}, not measured."

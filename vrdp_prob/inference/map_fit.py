@@ -21,7 +21,7 @@ from vrdp_prob.inference.misfit import Misfit, judge
 from vrdp_prob.inference.mode import Mode
 from vrdp_prob.inference.mode_search import ModeSearch
 from vrdp_prob.inference.model_error_fit import TURNS, next_model_error
-from vrdp_prob.inference.modes import HOPELESS, colliding, distinct_modes, restricted, without_idle
+from vrdp_prob.inference.modes import HOPELESS, distinct_modes, restricted, structure_at, without_idle
 from vrdp_prob.inference.plan import FitPlan
 from vrdp_prob.inference.refinement import Refined, climb, refine
 from vrdp_prob.models.likelihood import Likelihood
@@ -144,7 +144,7 @@ def fit_map(
     attempts = _attempts(task, generator, progress)
     everything = attempts[0].likelihood
     starts = [one.point for one in merged(everything, [one for fit in attempts for one in fit.hypotheses])]
-    structure = Structure(moving=clues.moving, colliding=colliding(everything, starts))
+    structure = structure_at(everything, starts, clues.moving)
     likelihood = Likelihood(tracks, model, unknowns(tracks, model, structure, family), family)
     found = _refined(everything, starts, likelihood, stages)
     misfit = judge(likelihood, found[0].point, clues.noise, int(clues.outliers.sum()))

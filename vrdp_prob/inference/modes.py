@@ -43,9 +43,8 @@ def without_idle(
     likelihood: Likelihood, modes: Sequence[Mode], moving: frozenset[int]
 ) -> tuple[Likelihood, tuple[Mode, ...]]:
     """The same modes without the unknowns of bodies that meet nobody in any of them, or too late to tell."""
-    structure = Structure(
-        moving, colliding(likelihood, [mode.point for mode in modes]) - _uninformed(likelihood, modes)
-    )
+    structure, idle = structure_at(likelihood, [mode.point for mode in modes], moving), _uninformed(likelihood, modes)
+    structure = replace(structure, colliding=structure.colliding - idle, bouncing=structure.bouncing - idle)
     coordinates = unknowns(
         likelihood.tracks, likelihood.model, structure, likelihood.noise, model_error=likelihood.model_error
     )
@@ -84,8 +83,12 @@ def _uninformed(likelihood: Likelihood, modes: Sequence[Mode]) -> frozenset[int]
     return frozenset.intersection(*found)
 
 
-def colliding(likelihood: Likelihood, points: Sequence[Float[np.ndarray, "dimension"]]) -> frozenset[int]:
-    """Bodies that meet another one at some of the points."""
+def structure_at(
+    likelihood: Likelihood, points: Sequence[Float[np.ndarray, "dimension"]], moving: frozenset[int]
+) -> Structure:
+    """Bodies that move, that meet another one, and that meet a wall at some of the points."""
     with torch.no_grad():
-        sequences = collision_sequences(likelihood.rollout(torch.from_numpy(np.array(points))))
-    return frozenset(body for pairs in sequences for pair in pairs for body in pair)
+        rollout = likelihood.rollout(torch.from_numpy(np.array(points)))
+    colliding = frozenset(body for pairs in collision_sequences(rollout) for pair in pairs for body in pair)
+    bouncing = frozenset(body for world in range(len(points)) for body, _ in wall_contacts(rollout, world))
+    return Structure(moving, colliding, bouncing)

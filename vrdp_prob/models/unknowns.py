@@ -49,11 +49,19 @@ class Structure:
     moving
         Bodies whose release velocity and spin are unknown; the others are at rest when they are released.
     colliding
-        Bodies whose mass and restitution (and, of a cube, yaw) the motion can say something about.
+        Bodies that meet others, so that the motion can say something about mass and restitution (and yaw of a cube).
+    bouncing
+        Bodies that meet walls, which say nothing about a mass, but about the rest.
     """
 
     moving: frozenset[int]
     colliding: frozenset[int]
+    bouncing: frozenset[int] = frozenset()
+
+    @property
+    def meeting(self) -> frozenset[int]:
+        """Bodies that meet something."""
+        return self.colliding | self.bouncing
 
 
 def unknowns(
@@ -101,7 +109,7 @@ def _turning(tracks: Tracks, model: PhysicsModel, structure: Structure) -> Itera
     angles = tracks.angles
     rubs = any(effect.overrides("tangential_impulse") for effect in model.effects)
     for body, description in enumerate(tracks.bodies):
-        meets = body in structure.colliding
+        meets = body in structure.meeting
         if meets and description.shape is Shape.CUBE:
             yield Coordinate("angle", body, Transform.IDENTITY, Prior(0.0, YAW_SD), scale=0.1)
         spin_matters = meets and (rubs or description.shape is Shape.CUBE)
@@ -119,7 +127,7 @@ def _matter(tracks: Tracks, structure: Structure) -> Iterator[Coordinate]:
     for body in sorted(structure.colliding):
         if tracks.bodies[body].mass is None:
             yield Coordinate(MASS.name, body, MASS.transform, prior, scale=0.1)
-    for body in sorted(structure.colliding):
+    for body in sorted(structure.meeting):
         yield Coordinate.of(RESTITUTION, body)
     for index, wall in enumerate(tracks.walls):
         if wall.restitution is None:
@@ -128,14 +136,14 @@ def _matter(tracks: Tracks, structure: Structure) -> Iterator[Coordinate]:
 
 def _physics(tracks: Tracks, model: PhysicsModel, structure: Structure) -> Iterator[Coordinate]:
     """Parameters of the model that can have an effect on these bodies."""
-    turning = any(tracks.bodies[body].shape is Shape.CUBE for body in structure.colliding)
+    turning = any(tracks.bodies[body].shape is Shape.CUBE for body in structure.meeting)
     spin_matters = turning or bool(Observations.of(tracks).angle_bodies)
     for parameter in model.parameters:
         concerned = [index for index, body in enumerate(tracks.bodies) if body.shape in parameter.shapes]
         if parameter.scope is Scope.SHARED and concerned and (spin_matters or parameter.name != ANGULAR_DRAG.name):
             yield Coordinate.of(parameter)
         if parameter.scope is Scope.BODY and parameter.name not in (MASS.name, RESTITUTION.name):
-            for body in sorted((structure.moving | structure.colliding).intersection(concerned)):
+            for body in sorted((structure.moving | structure.meeting).intersection(concerned)):
                 yield Coordinate.of(parameter, body)
 
 

@@ -168,7 +168,7 @@ def mass_status(parameter: ParameterSummary, body: Body, name: Mapping[str, str]
     if body.mass is not None:
         return "Weighed: given with the input."
     if parameter.status == "default":
-        return "Never collided in the video: a default value, the data say nothing."
+        return "Never collided with another object in the video: a default value, the data say nothing."
     if parameter.status == "identified":
         return "Known from its collisions."
     return f"Only its ratio to {_the(parameter.partners, name)} is known, not the mass itself."

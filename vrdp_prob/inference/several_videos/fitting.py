@@ -274,7 +274,8 @@ def structure_of(coordinates: Coordinates) -> Structure:
         field: frozenset(e.owner for e in coordinates.entries if e.field == field and e.owner is not None)
         for field in ("velocity_x", MASS.name, RESTITUTION.name)
     }
-    return Structure(moving=owners["velocity_x"], colliding=owners[MASS.name] | owners[RESTITUTION.name])
+    # A weighed body that meets others counts among those that meet walls: it has the same unknowns.
+    return Structure(moving=owners["velocity_x"], colliding=owners[MASS.name], bouncing=owners[RESTITUTION.name])
 
 
 def _vanishing(model: PhysicsModel) -> dict[str, float]:

@@ -1,0 +1,79 @@
+"""A disc that meets nothing but a wall tells the product of both restitutions, and nothing of its mass."""
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from tests.inference.generator import Scene, states
+from vrdp_prob.inference import Posterior, Status, infer
+from vrdp_prob.models.parameters import MASS
+from vrdp_prob.models.physics import PhysicsModel
+from vrdp_prob.scene import Body, Shape, Tracks, Wall
+
+PRODUCT = 0.6
+STATED = 0.8
+NOISE = 0.004
+RADIUS = 0.2
+WALL_AT = 0.5
+TIMES = np.arange(50) / 25
+
+
+@cache
+def against_a_wall(stated: float | None) -> Posterior:
+    """What is inferred from a disc that slides at a wall; a normal impact turns the speed across the wall."""
+    before = Scene(
+        (Shape.CYLINDER,),
+        np.array([[-1.0, 0.0]]),
+        np.array([[1.8, 0.3]]),
+        np.ones(1),
+        np.ones(1),
+        np.full(1, RADIUS),
+        np.full(1, 0.5),
+        drag=0.04,
+    )
+    fine = np.linspace(0, TIMES[-1], 4001)
+    x, y, velocity_x, velocity_y = states(before, fine)[:, 0, :4].T
+    hit = int(np.argmax(x >= WALL_AT - RADIUS))
+    after = replace(
+        before,
+        position=np.array([[x[hit], y[hit]]]),
+        velocity=np.array([[-PRODUCT * velocity_x[hit], velocity_y[hit]]]),
+        contacts=[],
+    )
+    early = fine[hit] > TIMES
+    since = np.concatenate([[0.0], TIMES[~early] - fine[hit]])
+    path = np.concatenate([states(before, TIMES[early])[:, :, :2], states(after, since)[1:, :, :2]])
+    path = path + NOISE * np.random.default_rng(0).standard_normal(path.shape)
+    wall = Wall(WALL_AT, -3.0, WALL_AT, 3.0, stated)
+    tracks = Tracks.from_arrays("wall", (Body("disc", Shape.CYLINDER, RADIUS),), TIMES, path, walls=(wall,))
+    return infer(tracks, model=PhysicsModel.base(), sampler="laplace", draws=500, hand_on=False)
+
+
+def test_a_stated_wall_tells_the_restitution_of_the_body() -> None:
+    posterior = against_a_wall(STATED)
+    restitution = posterior.object_summary("disc").restitution
+    assert posterior.status["disc"].restitution.status is Status.IDENTIFIED
+    assert restitution.summary.mean == pytest.approx(PRODUCT / STATED, abs=4 * restitution.summary.sd)
+    assert restitution.summary.sd < 0.02
+
+
+def test_an_unknown_wall_leaves_the_product() -> None:
+    posterior = against_a_wall(None)
+    status = posterior.status["disc"].restitution
+    assert (status.status, status.partners) == (Status.PRODUCT_ONLY, ("wall 0",))
+    draws = posterior.data["posterior"]
+    product = draws["restitution"].values[..., 0] * draws["wall_restitution"].values[..., 0]
+    assert product.mean() == pytest.approx(PRODUCT, abs=4 * product.std())
+    assert product.std() < 0.02
+    assert draws["restitution"].values.std() > 3 * product.std()
+
+
+@pytest.mark.parametrize("stated", [STATED, None])
+def test_a_wall_says_nothing_of_a_mass(stated: float | None) -> None:
+    posterior = against_a_wall(stated)
+    assert posterior.status["disc"].mass.status is Status.DEFAULT
+    assert (posterior.data["posterior"]["mass"].values == MASS.default).all()
+    assert any("only where it meets walls" in sentence for sentence in posterior.warnings)
+    assert not any("never collide" in sentence for sentence in posterior.warnings)

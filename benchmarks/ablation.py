@@ -26,7 +26,6 @@ from tests.inference.random_scenes import TIMES, Truth, random_truth
 from vrdp_prob.datasets import load, read_questions
 from vrdp_prob.inference import Posterior, default_model
 from vrdp_prob.inference.assembly import posterior_from
-from vrdp_prob.inference.continuation import continued
 from vrdp_prob.inference.map_fit import MapFit, fit_map
 from vrdp_prob.inference.plan import FitPlan
 from vrdp_prob.inference.samples import Convergence, Samples
@@ -88,15 +87,16 @@ def row(plan: FitPlan, scenes: int, practice: int) -> Row:
         truth = random_truth(seed)
         fit = fit_map(truth.tracks, default_model(), np.random.default_rng(0), plan=plan)
         result.found.append(compare(truth, fit).succeeded)
-        worlds = map_posterior(fit).map_worlds()
+        posterior = map_posterior(fit)
+        worlds = posterior.map_worlds()
         seen = truth.tracks.seen
         difference = positions(fit, worlds, TIMES) - truth.states[:, :, :2]
         result.inside.append(float(np.sqrt((difference[seen] ** 2).sum(axis=1).mean())))
-        result.later.append(later_error(truth, fit, worlds))
-        place = fit.likelihood.coordinates.places["noise_scale", None]
-        noise = float(np.exp(fit.point[place])) * fit.likelihood.observations.position_reference
-        onward = continued(truth.tracks, fit.likelihood.model, worlds, noise, None)
-        result.later_reoptimised.append(later_error(truth, fit, onward))
+        end = float(TIMES[-1])
+        result.later.append(later_error(truth, positions(fit, worlds, np.array([end, end + LATER]))[-1]))
+        future = PosteriorWorlds(posterior, draws=DRAWS).future
+        frame = int(np.abs(future.times - (end + LATER)).argmin())
+        result.later_reoptimised.append(later_error(truth, future.trajectory[:, frame, :, :2].mean(axis=0)))
     if scoring.DATA.is_dir():
         asked = read_questions(scoring.DATA / "questions.json")
         for scene in range(practice):
@@ -110,11 +110,9 @@ def positions(fit: MapFit, worlds: Worlds, times: np.ndarray) -> np.ndarray:
         return simulate(worlds, torch.from_numpy(times), fit.likelihood.model).trajectory[0, :, :, :2].numpy()
 
 
-def later_error(truth: Truth, fit: MapFit, worlds: Worlds) -> float:
-    """Error (m) of the predicted places some time after the video, root mean square over the bodies."""
-    end = float(TIMES[-1])
-    true = states(replace(truth.scene, contacts=[]), np.array([*TIMES, end + LATER]))[-1, :, :2]
-    predicted = positions(fit, worlds, np.array([end, end + LATER]))[-1]
+def later_error(truth: Truth, predicted: np.ndarray) -> float:
+    """Error (m) of predicted places (body, 2) some time after the video, root mean square over the bodies."""
+    true = states(replace(truth.scene, contacts=[]), np.array([*TIMES, TIMES[-1] + LATER]))[-1, :, :2]
     return float(np.sqrt(((predicted - true) ** 2).sum(axis=1).mean()))
 
 

@@ -118,7 +118,7 @@ def _facts(scene: int, arguments: argparse.Namespace) -> Facts:
     tracks = load(DATA / "videos" / f"{name}.mp4") if arguments.input == "videos" else load(DATA, video=name)
     if arguments.parameters == "true":
         return PosteriorWorlds(TruePosterior(tracks, DATA / "truth"), draws=arguments.draws)
-    posterior = infer(tracks, sampler=arguments.sampler)
+    posterior = infer(tracks, sampler=arguments.sampler, hand_on=False)
     return PosteriorWorlds(posterior, draws=arguments.draws, defaults=arguments.defaults)
 
 

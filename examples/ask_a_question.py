@@ -9,7 +9,9 @@ VIDEO = Path(__file__).parent / "demo" / "video_00000.mp4"
 
 def main() -> None:
     tracks = vrdp_prob.load(VIDEO)
-    posterior = vrdp_prob.infer(tracks, sampler="laplace", seed=1)
+    # The fast way, which says how far it can be trusted; without both options the draws take a minute and can be.
+    posterior = vrdp_prob.infer(tracks, sampler="laplace", hand_on=False, seed=1)
+    print(posterior.convergence.sentence)
 
     answer = posterior.ask("How many collisions happen?")
     print(answer.question)

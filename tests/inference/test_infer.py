@@ -6,7 +6,7 @@ import pytest
 import torch
 import xarray as xr
 
-from tests.inference.generator import Scene, integrate, observe
+from tests.inference.generator import Scene, observe
 from vrdp_prob.errors import InputError
 from vrdp_prob.inference import Posterior, Status, infer
 from vrdp_prob.models.simulator.rollout import simulate
@@ -80,17 +80,6 @@ def test_draws_are_worlds_that_reproduce_what_was_seen() -> None:
     error = (rollout.trajectory[..., :2].numpy() - posterior.tracks.positions)[:, seen]
     assert np.sqrt((error**2).mean()) < 0.008
     assert len(posterior.map_worlds()) == 1
-
-
-def test_worlds_go_on_from_the_last_frame_where_the_body_was_seen() -> None:
-    scene, posterior = chain_posterior()
-    worlds = posterior.continued_worlds(50, generator=np.random.default_rng(0))
-    assert worlds.release_time.unique().tolist() == [posterior.tracks.times[-1]]
-    true, _ = integrate(scene, posterior.tracks.times)
-    assert np.abs(worlds.position.numpy() - true[-1]).max() < 0.02
-    rollout = simulate(worlds, torch.tensor([posterior.tracks.times[-1], 4.0]), posterior.model)
-    later, _ = integrate(scene, np.array([0.0, 4.0]))
-    assert np.abs(rollout.trajectory[:, -1, :, :2].numpy().mean(axis=0) - later[-1]).max() < 0.05
 
 
 def test_the_file_holds_everything(tmp_path: Path) -> None:

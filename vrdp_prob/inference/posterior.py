@@ -11,7 +11,6 @@ import xarray as xr
 from jaxtyping import Float
 from torch import Tensor
 
-from vrdp_prob.inference.continuation import continued
 from vrdp_prob.inference.identifiability import BodyStatus, CollisionGroup, ParameterStatus
 from vrdp_prob.inference.misfit import Misfit
 from vrdp_prob.inference.samples import Convergence
@@ -96,20 +95,6 @@ class Posterior:
     def map_worlds(self) -> Worlds:
         """The most probable world, as a batch of one."""
         return self._worlds(self.data["map_estimate"].to_dataset().expand_dims("world"))
-
-    def continued_worlds(self, count: int | None = None, *, generator: np.random.Generator) -> Worlds:
-        """Draws released anew at the last frame, where the last frames set the simulation right; for predictions.
-
-        Parameters
-        ----------
-        count
-            Number of worlds; all draws where None or where there are not so many.
-        generator
-            Draws the error of the states at the last frame.
-        """
-        scale = self.data["posterior"]["noise_scale"]
-        noise = float(scale.mean()) * float(scale.attrs["reference_m"])
-        return continued(self.tracks, self.model, self.worlds(count), noise, generator)
 
     def object_summary(self, body: str) -> ObjectSummary:
         """Mass and restitution of a body with their intervals and status.

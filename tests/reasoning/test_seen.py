@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from sliding_discs import FRAME, FRICTION, GRAVITY, Disc, path, tracks_of
 
+from vrdp_prob.reasoning.chance import MostProbable, Seeded
 from vrdp_prob.reasoning.contacts import see
 from vrdp_prob.reasoning.rest import DrawnMotion, possible_rests
 from vrdp_prob.reasoning.seen import SeenVideo
@@ -130,6 +131,16 @@ def test_without_a_camera_being_seen_late_is_entering() -> None:
 
 def test_the_same_seed_gives_the_same_draws() -> None:
     tracks = tracks_of(CHAIN)
-    one, other = SeenVideo(tracks, 20, seed=5), SeenVideo(tracks, 20, seed=5)
+    one, other = SeenVideo(tracks, 20, Seeded(5)), SeenVideo(tracks, 20, Seeded(5))
     assert np.array_equal(one.events.time, other.events.time, equal_nan=True)
     assert np.array_equal(one.motion.moving, other.motion.moving)
+
+
+def test_without_chance_everything_is_as_is_most_probable() -> None:
+    tracks = tracks_of(CHAIN)
+    drawn, best = SeenVideo(tracks, 400, Seeded(0)), SeenVideo(tracks, 1, MostProbable())
+    assert np.array_equal(best.events.happens[0], drawn.events.happens.mean(axis=0) > 0.5)
+    happened = best.events.happens[0]
+    middle = np.nanmedian(drawn.events.time[:, happened], axis=0)
+    np.testing.assert_allclose(best.events.time[0, happened], middle, atol=0.005)
+    np.testing.assert_array_equal(best.motion.in_view[0], drawn.motion.in_view.all(axis=0))

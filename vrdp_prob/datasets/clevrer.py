@@ -105,20 +105,45 @@ def read_questions(path: Path | str) -> dict[str, list[Question]]:
     InputError
         If the file is not such a document, or holds no question.
     """
-    document = read_json(path)
-    scenes = document if isinstance(document, list) else [document]
     questions: dict[str, list[Question]] = {}
-    for scene in scenes:
-        try:
-            name, entries = Path(scene["video_filename"]).stem, scene["questions"]
-        except (KeyError, TypeError) as error:
-            raise InputError(
-                f"{path}: not a CLEVRER question file ({error}); every scene needs 'video_filename' and 'questions'."
-            ) from error
+    for name, scene in _scenes(path):
+        entries = scene["questions"]
         questions.setdefault(name, []).extend(_question(f"{path}, {name}", entry) for entry in entries)
     if not any(questions.values()):
         raise InputError(f"{path}: the file holds no question; give at least one.")
     return questions
+
+
+def scene_indices(path: Path | str) -> dict[str, int]:
+    """`scene_index` of each video of a CLEVRER question file, its place in the file where none is stated.
+
+    Raises
+    ------
+    InputError
+        If the file is not such a document, or an index is no number.
+    """
+    indices: dict[str, int] = {}
+    for place, (name, scene) in enumerate(_scenes(path)):
+        index = scene.get("scene_index", place)
+        if not isinstance(index, int):
+            raise InputError(f"{path}, {name}: 'scene_index' is {index!r}; it must be a whole number.")
+        indices.setdefault(name, index)
+    return indices
+
+
+def _scenes(path: Path | str) -> list[tuple[str, Document]]:
+    """Entries of a question file with the stems of their videos."""
+    document = read_json(path)
+    found = []
+    for scene in document if isinstance(document, list) else [document]:
+        try:
+            found.append((Path(scene["video_filename"]).stem, scene))
+            scene["questions"]
+        except (KeyError, TypeError) as error:
+            raise InputError(
+                f"{path}: not a CLEVRER question file ({error}); every scene needs 'video_filename' and 'questions'."
+            ) from error
+    return found
 
 
 def _body(path: Path | str, entry: Document) -> Body:

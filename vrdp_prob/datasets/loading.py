@@ -78,6 +78,12 @@ def video_names(path: Path | str) -> list[str]:
     return list(_annotation_files(source) or video_files(source))
 
 
+def has_tracks(path: Path | str) -> bool:
+    """Whether an input states positions, as a tracks folder or annotations do, rather than films."""
+    source = _existing(path)
+    return _is_tracks_folder(source) or bool(_annotation_files(source))
+
+
 def video_files(path: Path | str) -> dict[str, Path]:
     """Video files by their stem: the file itself, or those of a folder or of its sub-folder `videos`."""
     source = Path(path)

@@ -7,6 +7,7 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 from jaxtyping import Bool, Float
 
+from vrdp_prob.reasoning.chance import Purpose, Random, Seeded
 from vrdp_prob.reasoning.events import EventTable
 from vrdp_prob.reasoning.values import Change, Label
 from vrdp_prob.scene import Body
@@ -101,9 +102,7 @@ def attribute_values(name: str, bodies: tuple[Body, ...]) -> tuple[str, ...]:
     return (NOT_STATED, *known, *sorted(others))
 
 
-def draw_attributes(
-    bodies: tuple[Body, ...], draws: int, generator: np.random.Generator
-) -> dict[str, tuple[Label, ...]]:
+def draw_attributes(bodies: tuple[Body, ...], draws: int, numbers: Random) -> dict[str, tuple[Label, ...]]:
     """Attributes of all bodies, drawn from what perception made of them; certain ones are the same in all draws."""
     attributes = {}
     for name in ATTRIBUTES:
@@ -116,7 +115,7 @@ def draw_attributes(
             if len(values) == 1:
                 index = np.full(draws, values[0])
             else:
-                index = generator.choice(values, size=draws, p=weights / weights.sum())
+                index = numbers.choice(values, size=draws, p=weights / weights.sum())
             labels.append(Label(index, names))
         attributes[name] = tuple(labels)
     return attributes
@@ -159,7 +158,7 @@ class TableFacts:
 
     def attribute(self, name: str) -> tuple[Label, ...]:
         """Value of an attribute in each draw, one entry for each object."""
-        return draw_attributes(self.bodies, self.draws, np.random.default_rng(self.seed))[name]
+        return draw_attributes(self.bodies, self.draws, Seeded(self.seed).numbers(Purpose.ATTRIBUTES))[name]
 
     def motion(self) -> Motion:
         """Who moves when."""

@@ -9,6 +9,7 @@ from jaxtyping import Bool, Float
 from vrdp_prob.models.effects.body_friction import FRICTION_RATIO
 from vrdp_prob.models.physics import PhysicsModel
 from vrdp_prob.models.simulator.worlds import Worlds
+from vrdp_prob.reasoning.chance import Random
 from vrdp_prob.reasoning.smoother import BodyTrack
 from vrdp_prob.reasoning.stretch import State, advance
 
@@ -74,9 +75,9 @@ class Flight:
         start: Float[np.ndarray, "draw 4"],
         log_ratio: Float[np.ndarray, "draw"],
         log_ratio_sd: float,
-        generator: np.random.Generator | None,
+        numbers: Random | None,
     ) -> FittedFlight:
-        """Fit by Gauss-Newton steps and draw around the fit; without a generator give the fit itself.
+        """Fit by Gauss-Newton steps and draw around the fit; without numbers give the fit itself.
 
         Parameters
         ----------
@@ -84,7 +85,7 @@ class Flight:
             Position (m) and velocity (m/s) to set out from, held by `START_SD`.
         log_ratio, log_ratio_sd
             Prior of the logarithm of the friction ratio.
-        generator
+        numbers
             Source of the draws.
         """
         noise, measured = self._track.noise, self._track.positions
@@ -104,9 +105,9 @@ class Flight:
         freedom = max(2 * len(noise) - 5, 1)
         # where the physics does not fit the flight, its state is less certain by as much
         inflation = np.clip((left**2).sum(axis=(1, 2)) / freedom, 1.0, 100.0)
-        if generator is not None:
+        if numbers is not None:
             root = np.linalg.cholesky(np.linalg.inv(data + prior)) * np.sqrt(inflation)[:, None, None]
-            at = at + np.einsum("dij,dj->di", root, generator.standard_normal(at.shape))
+            at = at + np.einsum("dij,dj->di", root, numbers.standard_normal(at.shape))
         final = end + np.einsum("dsi,di->ds", end_slope, at - base)
         told = np.linalg.inv(np.linalg.inv(data + prior)[:, 4:, 4:])[:, 0, 0] - prior[4, 4]
         return FittedFlight(

@@ -16,6 +16,7 @@ from vrdp_prob.models.effects.body_friction import FRICTION_RATIO, BodyFriction
 from vrdp_prob.models.effects.dry_friction import DryFriction
 from vrdp_prob.models.physics import PhysicsModel
 from vrdp_prob.models.simulator.worlds import Worlds
+from vrdp_prob.reasoning.chance import Purpose
 from vrdp_prob.reasoning.flight import Flight, scaled_friction
 from vrdp_prob.reasoning.seen import SeenVideo
 from vrdp_prob.reasoning.smoother import BodyTrack
@@ -77,7 +78,7 @@ def own_friction(seen: SeenVideo, worlds: Worlds, model: PhysicsModel) -> OwnFri
     model
         The physics, with the effect of that ratio.
     """
-    generator = np.random.default_rng((seen.seed, 6))
+    numbers = seen.chance.numbers(Purpose.FRICTION)
     middle = worlds.select([len(worlds) // 2])
     mean, sd = np.zeros(len(seen.drawn)), np.full(len(seen.drawn), PRIOR_SD)
     for body in range(len(seen.drawn)):
@@ -86,7 +87,7 @@ def own_friction(seen: SeenVideo, worlds: Worlds, model: PhysicsModel) -> OwnFri
         values = np.array([value for value, precision in told if precision > 0])
         total = weights.sum() + PRIOR_SD**-2
         mean[body], sd[body] = (weights * values).sum() / total, total**-0.5
-    normal = generator.standard_normal((seen.draws, len(mean)))
+    normal = numbers.standard_normal((seen.draws, len(mean)))
     return OwnFriction(mean + sd * normal, sd)
 
 

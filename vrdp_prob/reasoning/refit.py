@@ -12,6 +12,7 @@ from jaxtyping import Float
 
 from vrdp_prob.models.physics import PhysicsModel
 from vrdp_prob.models.simulator.worlds import Worlds
+from vrdp_prob.reasoning.chance import Purpose
 from vrdp_prob.reasoning.flight import Flight
 from vrdp_prob.reasoning.friction import OwnFriction
 from vrdp_prob.reasoning.seen import SeenVideo
@@ -60,7 +61,7 @@ def state_at_end(
     state = State(
         np.zeros((*shape, 2)), np.zeros((*shape, 2)), zero.copy(), zero.copy(), zero.copy(), np.ones(shape, dtype=bool)
     )
-    generator = np.random.default_rng((seen.seed, 4))
+    numbers = seen.chance.numbers(Purpose.LAST_FLIGHT)
     for body, drawn in enumerate(seen.drawn):
         track = seen.seen.smoothers[body].track
         last = float(track.times[-1])
@@ -77,7 +78,7 @@ def state_at_end(
         start = np.concatenate([array[:, 0] for array in drawn.state(np.array([begin]))], axis=1)
         flight = Flight(worlds, model, body, track=window, begin=begin)
         prior_sd = float(np.hypot(friction.sd[body], CHANGE_SD[worlds.shapes[body] is Shape.SPHERE]))
-        fitted = flight.fit(start, np.full(seen.draws, log_ratio[:, body].mean()), prior_sd, generator)
+        fitted = flight.fit(start, np.full(seen.draws, log_ratio[:, body].mean()), prior_sd, numbers)
         moves = ~still
         state.position[moves, body], state.velocity[moves, body] = fitted.position[moves], fitted.velocity[moves]
         log_ratio[moves, body] = fitted.log_ratio[moves]

@@ -10,6 +10,7 @@ import numpy as np
 from jaxtyping import Float
 from scipy.special import expit, logsumexp
 
+from vrdp_prob.reasoning.chance import Random
 from vrdp_prob.reasoning.smoother import Smoother
 
 SLOW = 0.5
@@ -66,13 +67,13 @@ class DrawnMotion:
         Where it may lie still.
     draws
         Number of draws.
-    generator
+    numbers
         Source of the draws.
     """
 
-    def __init__(self, smoother: Smoother, rests: tuple[Rest, ...], draws: int, generator: np.random.Generator) -> None:
+    def __init__(self, smoother: Smoother, rests: tuple[Rest, ...], draws: int, numbers: Random) -> None:
         chance = np.array([rest.probability for rest in rests])
-        has_rest = generator.random((draws, len(rests))) < chance
+        has_rest = numbers.random((draws, len(rests))) < chance
         self._end = float(smoother.track.times[-1])
         self.rests_at_end = np.zeros(draws, dtype=bool)
         self._smoother = smoother
@@ -80,7 +81,7 @@ class DrawnMotion:
         for pattern in np.unique(has_rest, axis=0):
             own = np.flatnonzero((has_rest == pattern).all(axis=1))
             chosen = tuple((rest.start, rest.stop) for rest, taken in zip(rests, pattern, strict=True) if taken)
-            self._weights[own] = smoother.with_rests(chosen).draw_weights(len(own), generator)
+            self._weights[own] = smoother.with_rests(chosen).draw_weights(len(own), numbers)
             self.rests_at_end[own] = any(stop >= self._end - 2 * MARGIN for _, stop in chosen)
 
     def state(

@@ -1,11 +1,12 @@
 """What happened in the video, from the tracks: collisions, entrances, exits, and who moves when, draw by draw."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from vrdp_prob.reasoning.chance import Chance, Purpose, Seeded
 from vrdp_prob.reasoning.contacts import Contact, SeenMotion, see
 from vrdp_prob.reasoning.events import EventTable, EventUniverse
 from vrdp_prob.reasoning.facts import MOVING_SPEED, Motion
@@ -33,13 +34,13 @@ class SeenVideo:
         The measured positions.
     draws
         Number of draws of what they leave open.
-    seed
-        Seed of the draws.
+    chance
+        Where the draws come from.
     """
 
     tracks: Tracks
     draws: int
-    seed: int = 0
+    chance: Chance = field(default_factory=Seeded)
 
     @cached_property
     def seen(self) -> SeenMotion:
@@ -81,13 +82,13 @@ class SeenVideo:
     def happened(self) -> Bool[np.ndarray, "draw contact"]:
         """Which contacts happened in each draw."""
         probability = np.array([contact.probability for contact in self.contacts])
-        return np.random.default_rng((self.seed, 1)).random((self.draws, len(probability))) < probability
+        return self.chance.numbers(Purpose.CONTACTS).random((self.draws, len(probability))) < probability
 
     @cached_property
     def contact_times(self) -> Float[np.ndarray, "draw contact"]:
         """Time in s of each contact in each draw."""
         times = np.array([contact.time for contact in self.contacts])
-        jitter = np.random.default_rng((self.seed, 2)).standard_normal((self.draws, len(times)))
+        jitter = self.chance.numbers(Purpose.CONTACT_TIMES).standard_normal((self.draws, len(times)))
         return np.clip(times + CONTACT_TIME_SD * jitter, self.tracks.times[0], self.tracks.times[-1])
 
     @cached_property
@@ -99,9 +100,9 @@ class SeenVideo:
     @cached_property
     def drawn(self) -> tuple[DrawnMotion, ...]:
         """Draws of the motion of each body."""
-        generator = np.random.default_rng((self.seed, 3))
+        numbers = self.chance.numbers(Purpose.MOTION)
         return tuple(
-            DrawnMotion(smoother, rests, self.draws, generator)
+            DrawnMotion(smoother, rests, self.draws, numbers)
             for smoother, rests in zip(self.seen.smoothers, self.rests, strict=True)
         )
 

@@ -13,6 +13,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from vrdp_prob.inference.free_flight import noise_scale
+from vrdp_prob.reasoning.chance import Random
 from vrdp_prob.scene import Tracks
 
 POSITION_SD = 10.0
@@ -160,9 +161,9 @@ class Smoother:
         covariance: Float[np.ndarray, "2 2"] = features @ self._root @ (features @ self._root).T
         return covariance
 
-    def draw_weights(self, draws: int, generator: np.random.Generator) -> Float[np.ndarray, "draw weight 2"]:
+    def draw_weights(self, draws: int, numbers: Random) -> Float[np.ndarray, "draw weight 2"]:
         """Draws of the weights; with `features` each is one smooth motion."""
-        normal = generator.standard_normal((draws, self._root.shape[1], 2))
+        normal = numbers.standard_normal((draws, self._root.shape[1], 2))
         return np.asarray(self._mean + np.einsum("wk,dka->dwa", self._root, normal))
 
     def one_more(self, times: Float[np.ndarray, "time"]) -> "OneMoreKick":

@@ -18,6 +18,7 @@ from vrdp_prob.models.physics import PhysicsModel
 from vrdp_prob.models.simulator.rollout import Rollout, simulate
 from vrdp_prob.models.simulator.worlds import Worlds
 from vrdp_prob.progress import ProgressDisplay, SilentProgress
+from vrdp_prob.reasoning.chance import Chance, Purpose, Seeded
 from vrdp_prob.reasoning.counterfactual import Counterfactual
 from vrdp_prob.reasoning.defaults import DEFAULT, Defaults, with_defaults
 from vrdp_prob.reasoning.events import EventTable
@@ -94,6 +95,8 @@ class PosteriorWorlds:
     defaults
         Whether an object that never collided has default mass and restitution (`fixed`), or values drawn from the prior
         (`prior`).
+    chance
+        Where draws of what the tracks leave open come from; the posterior's seed where None.
     progress
         Who follows the simulation of each world.
 
@@ -109,6 +112,7 @@ class PosteriorWorlds:
         *,
         draws: int = DRAWS,
         defaults: Defaults = "fixed",
+        chance: Chance | None = None,
         progress: ProgressDisplay | None = None,
     ) -> None:
         if draws < 1:
@@ -116,9 +120,9 @@ class PosteriorWorlds:
         self.posterior = posterior
         self._progress = progress or SilentProgress()
         statuses = [(str(status.mass.status), str(status.restitution.status)) for status in self._statuses()]
-        generator = np.random.default_rng((posterior.seed, 7))
+        generator = Seeded(posterior.seed).numbers(Purpose.DEFAULTS)
         self._drawn = with_defaults(posterior.worlds(draws), statuses, defaults, generator)
-        self._seen = SeenVideo(posterior.tracks, len(self._drawn), posterior.seed)
+        self._seen = SeenVideo(posterior.tracks, len(self._drawn), chance or Seeded(posterior.seed))
         self._changed: dict[tuple[Change, int], WorldDraws] = {}
 
     @property
@@ -222,8 +226,7 @@ class PosteriorWorlds:
 
     @cached_property
     def _attributes(self) -> dict[str, tuple[Label, ...]]:
-        generator = np.random.default_rng((self.posterior.seed, 5))
-        return draw_attributes(self.bodies, self.draws, generator)
+        return draw_attributes(self.bodies, self.draws, self._seen.chance.numbers(Purpose.ATTRIBUTES))
 
     @cached_property
     def _extended(self) -> tuple[Worlds, PhysicsModel]:

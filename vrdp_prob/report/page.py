@@ -2,10 +2,8 @@
 
 import json
 import math
-from importlib import resources
 from typing import Any
 
-import jinja2
 from markupsafe import Markup
 
 from vrdp_prob.inference.summaries import PairSummary, ParameterSummary, Summary
@@ -22,6 +20,7 @@ from vrdp_prob.report.summary import (
     is_doubtful,
     summary,
 )
+from vrdp_prob.report.templating import asset, environment
 from vrdp_prob.report.wording import (
     color_of,
     counted,
@@ -46,13 +45,6 @@ SCRIPTS = ("worlds.js", "views.js", "scene.js", "player.js")
 
 def render(content: ReportContent) -> str:
     """The page as HTML text; the same content gives the same text."""
-    environment = jinja2.Environment(
-        loader=jinja2.PackageLoader("vrdp_prob.report", "templates"),
-        autoescape=True,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        undefined=jinja2.StrictUndefined,
-    )
     values = {
         **_opening(content),
         **_player(content),
@@ -60,11 +52,7 @@ def render(content: ReportContent) -> str:
         **_estimates(content),
         **_closing(content),
     }
-    return environment.get_template("page.html.j2").render(values)
-
-
-def _asset(name: str) -> Markup:
-    return Markup((resources.files("vrdp_prob.report") / "assets" / name).read_text(encoding="utf-8"))
+    return environment().get_template("page.html.j2").render(values)
 
 
 def _objects(content: ReportContent) -> list[dict[str, Any]]:
@@ -95,7 +83,7 @@ def _opening(content: ReportContent) -> dict[str, Any]:
         caption += f" Lines: {draws} posterior draws"
         caption += f", carried on to {seconds(float(future.times[-1]))}, where the rings stand." if future else "."
     return {
-        "css": _asset("page.css"),
+        "css": asset("page.css"),
         "video": content.tracks.video,
         "summary": " ".join(summary(content)),
         "limits": [with_names(warning, content.tracks.bodies) for warning in content.warnings],
@@ -122,7 +110,7 @@ def _player(content: ReportContent) -> dict[str, Any]:
         "has_camera": content.tracks.camera is not None,
         "floor_image": None if shown is None else still_uri(shown.floor),
         "player_data": _script_json(player_data(content)) if content.worlds else None,
-        "javascript": Markup("\n").join(_asset(name) for name in SCRIPTS),
+        "javascript": Markup("\n").join(asset(name) for name in SCRIPTS),
     }
 
 

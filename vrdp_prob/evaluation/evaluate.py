@@ -1,0 +1,264 @@
+"""Evaluate the answers to a file of questions about many videos, in parallel; broken off, it can go on."""
+
+import json
+import os
+from collections.abc import Mapping, Sequence
+from concurrent.futures import as_completed
+from dataclasses import dataclass
+from functools import cached_property
+from hashlib import sha256
+from importlib.metadata import version
+from pathlib import Path
+from typing import Literal
+
+from vrdp_prob.datasets import (
+    find_camera,
+    has_tracks,
+    load_all,
+    read_questions,
+    scene_indices,
+    video_files,
+    video_names,
+)
+from vrdp_prob.datasets.loading import CameraChoice
+from vrdp_prob.errors import InputError
+from vrdp_prob.evaluation.judgement import Judgement, Kind, is_answered
+from vrdp_prob.evaluation.one_scene import BEST_FIT, POSTERIOR, VARIANTS, SceneResult, Settings, Task, evaluate_scene
+from vrdp_prob.evaluation.scores import Interval, Scores, brier_gain
+from vrdp_prob.evaluation.workers import cluster, local_workers
+from vrdp_prob.files import write_atomically
+from vrdp_prob.inference import check_sampler, default_model
+from vrdp_prob.inference.checkpoint import Checkpoint
+from vrdp_prob.models import model_file
+from vrdp_prob.models.physics import PhysicsModel
+from vrdp_prob.models.simulator.rollout import compile_model
+from vrdp_prob.progress import ProgressDisplay, SilentProgress
+from vrdp_prob.reasoning.executor import prepare
+from vrdp_prob.reasoning.worlds import DRAWS
+from vrdp_prob.scene import Question
+
+Source = Literal["tracks", "videos"]
+GROUPS: Mapping[str, tuple[Kind, ...]] = {
+    "descriptive": (Kind.DESCRIPTIVE,),
+    "explanatory": (Kind.EXPLANATORY,),
+    "predictive": (Kind.PREDICTIVE,),
+    "counterfactual": (Kind.REMOVAL, Kind.MASS),
+    "counterfactual_removal": (Kind.REMOVAL,),
+    "counterfactual_mass": (Kind.MASS,),
+}
+"""What is scored together, by its name in the document."""
+
+
+@dataclass(frozen=True)
+class Evaluation:
+    """Judgements of all questions, and their scores.
+
+    Parameters
+    ----------
+    results
+        What each video gave, in the order of the question file.
+    absent
+        Number of videos that the question file asks about and the folder does not hold.
+    seed
+        Seed of the bootstrap.
+    """
+
+    results: tuple[SceneResult, ...]
+    absent: int = 0
+    seed: int = 0
+
+    def judgements(self, variant: str = POSTERIOR, group: str | None = None) -> tuple[Judgement, ...]:
+        """Judgements of a variant; those of one group, or all."""
+        kinds = tuple(Kind) if group is None else GROUPS[group]
+        return tuple(one for result in self.results for one in result.judgements[variant] if one.kind in kinds)
+
+    @cached_property
+    def scores(self) -> dict[str, dict[str, Scores]]:
+        """Scores by variant and group."""
+        return {
+            variant: {group: Scores.of(self.judgements(variant, group), seed=self.seed) for group in GROUPS}
+            for variant in VARIANTS
+        }
+
+    @cached_property
+    def gains(self) -> dict[str, tuple[float, Interval] | None]:
+        """How much lower the Brier score of the posterior is than that of the best fit, by group."""
+        return {
+            group: brier_gain(ours, self.judgements(BEST_FIT, group), seed=self.seed) if ours else None
+            for group in GROUPS
+            for ours in [self.judgements(POSTERIOR, group)]
+        }
+
+    @property
+    def failed(self) -> tuple[SceneResult, ...]:
+        """Videos without answers."""
+        return tuple(result for result in self.results if result.failed is not None)
+
+    @property
+    def seconds_per_video(self) -> float:
+        """Mean time that a video took in its process, in s."""
+        return sum(result.seconds for result in self.results) / len(self.results)
+
+
+def evaluate(
+    folder: Path | str,
+    questions: Path | str,
+    *,
+    scenes: tuple[int, int] | None = None,
+    source: Source | None = None,
+    camera: CameraChoice = None,
+    model: PhysicsModel | None = None,
+    sampler: str = "laplace",
+    seed: int = 0,
+    draws: int = DRAWS,
+    out: Path | str | None = None,
+    processes: int | None = None,
+    dask: str | None = None,
+    progress: ProgressDisplay | None = None,
+) -> Evaluation:
+    """Answer the questions of a file about the videos of a folder, and score the answers.
+
+    Parameters
+    ----------
+    folder
+        Tracks folder, or folder of annotations or of videos.
+    questions
+        CLEVRER question file with answers.
+    scenes
+        First `scene_index` of the question file and the one after the last; all where None.
+    source
+        `tracks` or `videos`; where None, tracks where the folder holds any.
+    camera
+        Camera of the videos; see `vrdp_prob.load`.
+    model, sampler, seed
+        See `vrdp_prob.infer`. `laplace` does not hand on to another sampler here.
+    draws
+        Posterior draws that answer the questions.
+    out
+        Folder that keeps the result of each video. The same call again, after an interruption, goes on from there.
+    processes
+        Videos that are worked on at a time; as many as there are cores where None.
+    dask
+        Address of the scheduler of a Dask cluster that does the work instead. Its workers need this package, and of
+        videos the files.
+    progress
+        Told how many videos are done.
+
+    Raises
+    ------
+    InputError
+        If an input cannot be used, no video of the question file is in the folder, no question has an answer, or `out`
+        holds the results of another evaluation.
+    """
+    check_sampler(sampler)
+    if draws < 1 or (processes is not None and processes < 1):
+        raise InputError(f"draws is {draws} and processes is {processes}; both must be at least 1.")
+    settings = Settings(model, sampler, seed, draws)
+    asked = _asked(Path(questions), scenes)
+    tasks = _tasks(Path(folder), asked, source, camera, settings)
+    facts = _facts(Path(folder), Path(questions), source, settings)
+    kept = None if out is None else Checkpoint(Path(out) / "scenes", facts)
+    done = {} if kept is None else _done(kept, tasks)
+    waiting = [task for task in tasks if task.scene not in done]
+    if waiting and dask is None:
+        compile_model(model or default_model())
+    with (progress or SilentProgress()).stage("Evaluating", total=len(tasks)) as advance:
+        advance(len(done))
+        several = min(processes or os.cpu_count() or 1, max(len(waiting), 1))
+        with cluster(dask) if dask is not None else local_workers(several) as workers:
+            for future in as_completed([workers.submit(evaluate_scene, task) for task in waiting]):
+                result = future.result()
+                done[result.scene] = result
+                if kept is not None:
+                    _keep(kept, result)
+                advance(1)
+    return Evaluation(tuple(done[task.scene] for task in tasks), len(asked) - len(tasks), seed)
+
+
+def _asked(path: Path, scenes: tuple[int, int] | None) -> dict[str, list[Question]]:
+    """Questions with answers of the scenes that are wanted, understood before any work."""
+    index = scene_indices(path)
+    asked = {
+        name: [question for question in several if is_answered(question)]
+        for name, several in read_questions(path).items()
+        if scenes is None or scenes[0] <= index[name] < scenes[1]
+    }
+    if not asked:
+        first, last = min(index.values()), max(index.values())
+        raise InputError(f"{path}: no scene from {scenes} is in the file, which holds {first} to {last}.")
+    if not any(asked.values()):
+        raise InputError(f"{path}: no question has its right answer beside it, so there is nothing to score.")
+    for name, several in asked.items():
+        for question in several:
+            try:
+                prepare(question, ())
+            except InputError as error:
+                raise InputError(f"{path}, {name}, question {question.question_id}: {error}") from error
+    return {name: several for name, several in asked.items() if several}
+
+
+def _tasks(
+    folder: Path,
+    asked: Mapping[str, Sequence[Question]],
+    source: Source | None,
+    camera: CameraChoice,
+    settings: Settings,
+) -> list[Task]:
+    if source == "tracks" and not has_tracks(folder):
+        raise InputError(f"{folder}: the folder holds no tracks.csv and no annotation; use --input videos.")
+    if source == "videos" and not video_files(folder):
+        raise InputError(f"{folder}: the folder holds no video; use --input tracks.")
+    if source != "videos" and has_tracks(folder):
+        there = set(video_names(folder))
+        names = [name for name in asked if name in there]
+        every = load_all(folder, videos=names, camera=camera) if names else []
+        return _some(folder, [Task(one.video, one, None, tuple(asked[one.video]), settings) for one in every])
+    files = video_files(folder)
+    tasks = [
+        Task(name, files[name], find_camera(files[name], camera), tuple(asked[name]), settings)
+        for name in asked
+        if name in files
+    ]
+    return _some(folder, tasks)
+
+
+def _some(folder: Path, tasks: list[Task]) -> list[Task]:
+    if not tasks:
+        raise InputError(f"{folder}: none of the videos that the question file asks about is in the folder.")
+    return tasks
+
+
+def _facts(folder: Path, questions: Path, source: Source | None, settings: Settings) -> dict[str, str]:
+    """What the results depend on: another evaluation must not go on from them."""
+    model = settings.model or default_model()
+    table = folder / "tracks.csv"
+    return {
+        "folder": str(folder.resolve()),
+        "tracks": sha256(table.read_bytes()).hexdigest() if table.is_file() and source != "videos" else "",
+        "input": str(source),
+        "questions": sha256(questions.read_bytes()).hexdigest(),
+        "model": sha256(model_file.text(model.name, model.effects, model.parameters).encode()).hexdigest(),
+        "sampler": settings.sampler,
+        "seed": str(settings.seed),
+        "draws": str(settings.draws),
+        "version": version("vrdp-prob"),
+    }
+
+
+def _done(kept: Checkpoint, tasks: Sequence[Task]) -> dict[str, SceneResult]:
+    """Results that are there already; those of videos that failed, and files that cannot be read, are made anew."""
+    found = {}
+    for task in tasks:
+        try:
+            document = json.loads(kept.path(f"{task.scene}.json").read_text(encoding="utf-8"))
+            result = SceneResult.of_document(document)
+        except (OSError, ValueError, KeyError, TypeError):
+            continue
+        if result.failed is None:
+            found[task.scene] = result
+    return found
+
+
+def _keep(kept: Checkpoint, result: SceneResult) -> None:
+    with write_atomically(kept.path(f"{result.scene}.json")) as temporary:
+        temporary.write_text(json.dumps(result.to_document(), indent=1, allow_nan=False) + "\n", encoding="utf-8")

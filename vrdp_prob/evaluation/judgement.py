@@ -1,0 +1,165 @@
+"""One answer beside the truth."""
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from enum import StrEnum
+from typing import Any
+
+from vrdp_prob.errors import InputError
+from vrdp_prob.reasoning import Answer, ask
+from vrdp_prob.reasoning.executor import prepare
+from vrdp_prob.reasoning.facts import Facts
+from vrdp_prob.scene import Question, QuestionType
+
+RIGHT_CHOICE = "correct"
+"""Judgement of a choice in CLEVRER's files."""
+MASS_TOKENS = {"counterfact_heavier", "counterfact_lighter", "apply_heavier", "apply_lighter"}
+
+
+class Kind(StrEnum):
+    """Kinds of questions that are scored apart."""
+
+    DESCRIPTIVE = "descriptive"
+    EXPLANATORY = "explanatory"
+    PREDICTIVE = "predictive"
+    REMOVAL = "counterfactual_removal"
+    MASS = "counterfactual_mass"
+
+    @property
+    def question_type(self) -> QuestionType:
+        """CLEVRER's type."""
+        return QuestionType(self.value.split("_", maxsplit=1)[0])
+
+
+@dataclass(frozen=True)
+class Judgement:
+    """One answer, and whether it is right.
+
+    Parameters
+    ----------
+    scene
+        Name of the video.
+    question_id
+        Name of the question within it.
+    kind
+        Its kind.
+    question
+        Its text.
+    answer, truth
+        What was answered, and what is right: an open answer, or the ids of the choices judged correct.
+    right
+        Whether the whole answer is right.
+    confidence
+        Probability that was given to the answer.
+    probability
+        Probability that was given to the truth.
+    squared_error
+        Half the sum over all possible answers of the squared error of their probability: (p - y)^2 for yes or no.
+    choices
+        Probability and truth of each choice.
+    refused
+        Why there is no answer; None where there is one. A question without an answer counts as wrong.
+    """
+
+    scene: str
+    question_id: str
+    kind: Kind
+    question: str
+    answer: str
+    truth: str
+    right: bool
+    confidence: float
+    probability: float
+    squared_error: float
+    choices: tuple[tuple[float, bool], ...] = ()
+    refused: str | None = None
+
+    def to_document(self) -> dict[str, Any]:
+        """The judgement as JSON values."""
+        return asdict(self)
+
+    @classmethod
+    def of_document(cls, document: Mapping[str, Any]) -> "Judgement":
+        """What `to_document` made a document of."""
+        choices = tuple((float(probability), bool(right)) for probability, right in document["choices"])
+        return cls(**{**document, "kind": Kind(document["kind"]), "choices": choices})
+
+
+def is_answered(question: Question) -> bool:
+    """Whether the question file holds the right answer."""
+    if question.choices:
+        return all(choice.answer is not None for choice in question.choices)
+    return question.answer is not None
+
+
+def judge(scene: str, facts: Facts, question: Question) -> Judgement:
+    """Ask a question and compare the answer with the truth."""
+    try:
+        answer = ask(facts, question)
+    except InputError as error:
+        return unanswered(scene, question, str(error))
+    truth = _truth(question)
+    given = _key(answer)
+    probability = answer.distribution.get(truth, 0.0)
+    squares = sum(share**2 for share in answer.distribution.values())
+    rights = [choice.answer == RIGHT_CHOICE for choice in question.choices]
+    return Judgement(
+        scene=scene,
+        question_id=str(question.question_id),
+        kind=kind_of(question),
+        question=question.text,
+        answer=given,
+        truth=truth,
+        right=given == truth,
+        confidence=answer.probability,
+        probability=probability,
+        squared_error=(squares - 2 * probability + 1) / 2,
+        choices=tuple((choice.probability, right) for choice, right in zip(answer.choices, rights, strict=True)),
+    )
+
+
+def unanswered(scene: str, question: Question, reason: str) -> Judgement:
+    """The judgement of a question that got no answer: wrong, every choice judged as likely as not."""
+    return Judgement(
+        scene=scene,
+        question_id=str(question.question_id),
+        kind=kind_of(question),
+        question=question.text,
+        answer="",
+        truth=_truth(question),
+        right=False,
+        confidence=0.0,
+        probability=0.0,
+        squared_error=1.0,
+        choices=tuple((0.5, choice.answer == RIGHT_CHOICE) for choice in question.choices),
+        refused=reason,
+    )
+
+
+def kind_of(question: Question) -> Kind:
+    """Kind of a question of a question file.
+
+    Raises
+    ------
+    InputError
+        If it is not understood.
+    """
+    asked = prepare(question, ())
+    if asked.kind is not QuestionType.COUNTERFACTUAL:
+        return Kind(asked.kind.value)
+    programs = [program for _, program in asked.options]
+    programs += [] if asked.program is None else [asked.program]
+    tokens = {token for program in programs for token in program.tokens}
+    return Kind.MASS if tokens & MASS_TOKENS else Kind.REMOVAL
+
+
+def _truth(question: Question) -> str:
+    if not question.choices:
+        return str(question.answer)
+    return ",".join(str(choice.choice_id) for choice in question.choices if choice.answer == RIGHT_CHOICE)
+
+
+def _key(answer: Answer) -> str:
+    if isinstance(answer.answer, tuple):
+        return ",".join(str(choice) for choice in answer.answer)
+    return str(answer.answer)

@@ -1,0 +1,50 @@
+"""Who works on the videos: processes of this machine, or a Dask cluster."""
+
+import os
+from collections.abc import Iterator
+from concurrent.futures import Executor
+from contextlib import contextmanager
+
+import loky
+
+from vrdp_prob.errors import InputError
+
+PATIENCE = 20
+"""Seconds in which a cluster has to answer."""
+
+
+@contextmanager
+def local_workers(processes: int | None) -> Iterator[Executor]:
+    """Processes of this machine, as many as there are cores where None; they end with the block, however it ends."""
+    workers = loky.ProcessPoolExecutor(max_workers=processes or os.cpu_count() or 1)
+    finished = False
+    try:
+        yield workers
+        finished = True
+    finally:
+        workers.shutdown(wait=finished, kill_workers=not finished)
+
+
+@contextmanager
+def cluster(address: str) -> Iterator[Executor]:
+    """The workers of a Dask cluster.
+
+    Raises
+    ------
+    InputError
+        If the library is not installed, or no scheduler answers.
+    """
+    try:
+        from distributed import Client  # noqa: PLC0415 - an optional part
+    except ImportError as error:
+        raise InputError(
+            "--dask needs the library distributed; install it with pip install 'vrdp-prob[dask]'."
+        ) from error
+    try:
+        client = Client(address, timeout=PATIENCE)
+    except (OSError, ValueError, TimeoutError) as error:
+        raise InputError(
+            f"{address}: no Dask scheduler answers there; start one (dask scheduler) or check the address."
+        ) from error
+    with client, client.get_executor(pure=False) as workers:
+        yield workers

@@ -1,4 +1,4 @@
-"""The command line: `vrdp-prob report`, `ask`, `demo`, `calibrate-camera` and `compile`.
+"""The command line: `vrdp-prob report`, `ask`, `evaluate`, `demo`, `calibrate-camera` and `compile`.
 
 Exit code 0: done; 2: input that cannot be used (one line says what, where, and how to mend it); 1: anything else.
 """
@@ -25,6 +25,8 @@ from vrdp_prob.command_options import (
 )
 from vrdp_prob.datasets import load, load_all, read_questions, video_files, video_names
 from vrdp_prob.errors import InputError
+from vrdp_prob.evaluation import evaluate
+from vrdp_prob.evaluation.document import table, to_document, write_evaluation
 from vrdp_prob.files import check_writable
 from vrdp_prob.inference import check_options, default_model
 from vrdp_prob.models.physics import PhysicsModel
@@ -162,6 +164,56 @@ def ask_question(
         print("\n".join(answer_lines(answer)))
 
 
+@app.command(name="evaluate")
+def evaluate_answers(
+    folder: Annotated[Path, typer.Argument(metavar="FOLDER", help="A tracks folder, or a folder of videos.")],
+    *,
+    questions: Annotated[Path, typer.Option(metavar="FILE", help="CLEVRER question file with the right answers.")],
+    scenes: Annotated[
+        str | None, typer.Option(metavar="A:B", help="Scenes A to B-1 of the question file; all by default.")
+    ] = None,
+    source: Annotated[
+        str | None, typer.Option("--input", metavar="tracks|videos", help="By default tracks where there are any.")
+    ] = None,
+    out: Annotated[
+        Path, typer.Option(metavar="DIR", help="Folder of the results; the same call again goes on from what is there.")
+    ] = Path("vrdp-prob-evaluation"),
+    processes: Annotated[
+        int | None, typer.Option(metavar="N", min=1, help="Videos at a time; by default one per core.")
+    ] = None,
+    dask: Annotated[
+        str | None, typer.Option(metavar="ADDRESS", help="Scheduler of a Dask cluster that does the work.")
+    ] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="One JSON document on standard output.")] = False,
+    camera: CameraOption = None,
+    model: Model = None,
+    sampler: Sampler = "laplace",
+    seed: Seed = 0,
+    quiet: Quiet = False,
+) -> None:
+    """Answer all questions of a file and score the answers: evaluation.html and evaluation.json."""
+    check_writable(out)
+    evaluation = evaluate(
+        folder,
+        questions,
+        scenes=None if scenes is None else _range(scenes),
+        source=source,
+        camera=camera,
+        model=_model(model),
+        sampler=sampler,
+        seed=seed,
+        out=out,
+        processes=processes,
+        dask=dask,
+        progress=progress_display(quiet=quiet),
+    )
+    files = write_evaluation(evaluation, out)
+    if as_json:
+        print(json.dumps(to_document(evaluation), allow_nan=False))
+    else:
+        print("\n".join([*table(evaluation), *(str(file) for file in files)]))
+
+
 @app.command()
 def demo(
     *,
@@ -262,6 +314,14 @@ def _interrupted() -> int:
 def _refuse(message: str) -> int:
     print(f"vrdp-prob: {' '.join(message.split())}", file=sys.stderr)
     return UNUSABLE_INPUT
+
+
+def _range(text: str) -> tuple[int, int]:
+    """Scenes A to B-1, written A:B."""
+    first, colon, end = text.partition(":")
+    if not colon or not first.isdecimal() or not end.isdecimal() or int(first) >= int(end):
+        raise InputError(f"--scenes is '{text}'; give A:B with A below B, for example 0:30.")
+    return int(first), int(end)
 
 
 def _model(path: Path | None) -> PhysicsModel | None:

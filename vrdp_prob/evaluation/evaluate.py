@@ -9,7 +9,6 @@ from functools import cached_property
 from hashlib import sha256
 from importlib.metadata import version
 from pathlib import Path
-from typing import Literal
 
 from vrdp_prob.datasets import (
     find_camera,
@@ -27,7 +26,7 @@ from vrdp_prob.evaluation.one_scene import BEST_FIT, POSTERIOR, VARIANTS, SceneR
 from vrdp_prob.evaluation.scores import Interval, Scores, brier_gain
 from vrdp_prob.evaluation.workers import cluster, local_workers
 from vrdp_prob.files import write_atomically
-from vrdp_prob.inference import check_sampler, default_model
+from vrdp_prob.inference import check_options, default_model
 from vrdp_prob.inference.checkpoint import Checkpoint
 from vrdp_prob.models import model_file
 from vrdp_prob.models.physics import PhysicsModel
@@ -37,7 +36,8 @@ from vrdp_prob.reasoning.executor import prepare
 from vrdp_prob.reasoning.worlds import DRAWS
 from vrdp_prob.scene import Question
 
-Source = Literal["tracks", "videos"]
+SOURCES = ("tracks", "videos")
+"""What videos may be read from."""
 GROUPS: Mapping[str, tuple[Kind, ...]] = {
     "descriptive": (Kind.DESCRIPTIVE,),
     "explanatory": (Kind.EXPLANATORY,),
@@ -105,7 +105,7 @@ def evaluate(
     questions: Path | str,
     *,
     scenes: tuple[int, int] | None = None,
-    source: Source | None = None,
+    source: str | None = None,
     camera: CameraChoice = None,
     model: PhysicsModel | None = None,
     sampler: str = "laplace",
@@ -150,7 +150,9 @@ def evaluate(
         If an input cannot be used, no video of the question file is in the folder, no question has an answer, or `out`
         holds the results of another evaluation.
     """
-    check_sampler(sampler)
+    check_options(sampler=sampler)
+    if source not in (None, *SOURCES):
+        raise InputError(f"input is '{source}'; use {' or '.join(SOURCES)}.")
     if draws < 1 or (processes is not None and processes < 1):
         raise InputError(f"draws is {draws} and processes is {processes}; both must be at least 1.")
     settings = Settings(model, sampler, seed, draws)
@@ -200,7 +202,7 @@ def _asked(path: Path, scenes: tuple[int, int] | None) -> dict[str, list[Questio
 def _tasks(
     folder: Path,
     asked: Mapping[str, Sequence[Question]],
-    source: Source | None,
+    source: str | None,
     camera: CameraChoice,
     settings: Settings,
 ) -> list[Task]:
@@ -228,7 +230,7 @@ def _some(folder: Path, tasks: list[Task]) -> list[Task]:
     return tasks
 
 
-def _facts(folder: Path, questions: Path, source: Source | None, settings: Settings) -> dict[str, str]:
+def _facts(folder: Path, questions: Path, source: str | None, settings: Settings) -> dict[str, str]:
     """What the results depend on: another evaluation must not go on from them."""
     model = settings.model or default_model()
     table = folder / "tracks.csv"

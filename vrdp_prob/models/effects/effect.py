@@ -187,7 +187,7 @@ class Effect:
         """Impulse in kg m/s on the second body along the tangent of a contact."""
         return 0.0
 
-    def obstacles(self, parameters: Mapping[str, Float[Tensor, "world"]]) -> Sequence[Obstacle]:
+    def obstacles(self, parameters: Mapping[str, Float[Tensor, "..."]]) -> Sequence[Obstacle]:
         """Fixed discs and straight walls that the effect adds to a scene."""
         return ()
 

@@ -35,7 +35,7 @@ class HiddenObstacle(Effect):
     source: ClassVar = "contact with a body of infinite mass"
     parameters: ClassVar = (OBSTACLE_X, OBSTACLE_Y, OBSTACLE_RADIUS, OBSTACLE_RESTITUTION)
 
-    def obstacles(self, parameters: Mapping[str, Float[Tensor, "world"]]) -> Sequence[Obstacle]:
+    def obstacles(self, parameters: Mapping[str, Float[Tensor, "..."]]) -> Sequence[Obstacle]:
         """The disc."""
         names = ("obstacle_x", "obstacle_y", "obstacle_radius", "obstacle_restitution")
         return (Obstacle.disc(*(parameters[name] for name in names)),)

@@ -1,0 +1,183 @@
+"""A folder of videos and a question file from end to end: scores, documents, interruption, a cluster."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from importlib import resources
+from pathlib import Path
+
+import jsonschema
+import pytest
+from videos import SPEEDS, write_videos
+
+from vrdp_prob import InputError
+from vrdp_prob.evaluation import evaluate
+from vrdp_prob.evaluation.document import table, to_document, write_evaluation
+from vrdp_prob.evaluation.evaluate import Evaluation
+
+DRAWS = 100
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("videos")
+    write_videos(path)
+    return path
+
+
+@pytest.fixture(scope="module")
+def evaluation(folder: Path) -> Evaluation:
+    return evaluate(folder, folder / "questions.json", scenes=(10, 12), draws=DRAWS, processes=2)
+
+
+def without_times(evaluation: Evaluation) -> list[dict[str, object]]:
+    return [{**result.to_document(), "seconds": 0.0} for result in evaluation.results]
+
+
+def test_scores_of_known_answers(evaluation: Evaluation) -> None:
+    scores = evaluation.scores["posterior"]
+    assert [result.scene for result in evaluation.results] == ["video_00000", "video_00001"]
+    assert scores["descriptive"].accuracy_per_question == 0.5  # one stated answer is wrong on purpose
+    for group in ("explanatory", "predictive", "counterfactual_mass", "counterfactual"):
+        assert scores[group].accuracy_per_question == 1.0
+        assert scores[group].accuracy_per_option == 1.0
+    assert scores["counterfactual_removal"].questions == 0
+    assert evaluation.failed == ()
+
+
+def test_the_best_fit_has_no_doubt(evaluation: Evaluation) -> None:
+    assert {judgement.confidence for judgement in evaluation.judgements("map")} == {1.0}
+    assert {share for judgement in evaluation.judgements("map") for share, _ in judgement.choices} <= {0.0, 1.0}
+
+
+def test_the_document_keeps_the_contract(evaluation: Evaluation, tmp_path: Path) -> None:
+    schema = json.loads((resources.files("vrdp_prob.report") / "schemas" / "evaluation.schema.json").read_text())
+    page, file = write_evaluation(evaluation, tmp_path)
+    document = json.loads(file.read_text(), parse_constant=lambda name: pytest.fail(f"{name} is not strict JSON"))
+    jsonschema.validate(document, schema)
+    assert document == json.loads(json.dumps(to_document(evaluation)))
+    text = page.read_text()
+    assert "What is the shape of the red object?" in text  # the wrong answer is listed
+    assert "2 videos" in text
+    assert any(line.startswith("descriptive") for line in table(evaluation))
+
+
+def test_a_video_that_fails_counts_as_wrong(folder: Path, tmp_path: Path) -> None:
+    for name in ("tracks.csv", "objects.csv", "questions.json"):
+        (tmp_path / name).write_text((folder / name).read_text())
+    rows = (tmp_path / "tracks.csv").read_text().splitlines()
+    still = [
+        ",".join([*row.split(",")[:3], "0.0" if row.split(",")[1] == "1" else "1.0", "0.0"])
+        if row.startswith("video_00001")
+        else row
+        for row in rows
+    ]
+    (tmp_path / "tracks.csv").write_text("\n".join(still) + "\n")
+    found = evaluate(tmp_path, tmp_path / "questions.json", scenes=(11, 12), draws=DRAWS, processes=1)
+    document = to_document(found)
+    (failed,) = document["failed"]
+    assert failed["scene"] == "video_00001"
+    assert "moves" in failed["reason"]
+    assert document["posterior"]["descriptive"]["accuracy_per_question"] == 0.0
+    assert document["posterior"]["descriptive"]["questions"] == 2
+
+
+COMMAND = """
+import sys
+from vrdp_prob.cli import run
+if __name__ == "__main__":
+    sys.exit(run(sys.argv[1:]))
+"""
+
+
+def test_a_killed_evaluation_goes_on(folder: Path, tmp_path: Path) -> None:
+    script = tmp_path / "command.py"
+    script.write_text(COMMAND)
+    out = tmp_path / "out"
+    words = ["evaluate", str(folder), "--questions", str(folder / "questions.json"), "--out", str(out), "--json"]
+    command = [sys.executable, str(script), *words, "--processes", "1", "--quiet"]
+    with subprocess.Popen(command, start_new_session=True, stdout=subprocess.DEVNULL) as running:
+        first, deadline = out / "scenes" / "video_00000.json", time.monotonic() + 300
+        while not first.exists() and time.monotonic() < deadline:
+            time.sleep(0.05)
+        os.killpg(running.pid, signal.SIGKILL)
+    done = {file.name: file.read_bytes() for file in (out / "scenes").glob("video_*.json")}
+    assert 1 <= len(done) < len(SPEEDS)
+    finished = subprocess.run(command, stdout=subprocess.PIPE, check=True)
+    again = json.loads(finished.stdout)
+    assert again["scenes"] == len(SPEEDS)
+    for name, content in done.items():
+        assert (out / "scenes" / name).read_bytes() == content  # not made again
+    whole = evaluate(folder, folder / "questions.json", processes=1)
+    assert {**to_document(whole), "seconds_per_video": 0} == {**again, "seconds_per_video": 0}
+
+
+def test_results_of_other_settings_are_not_mixed(folder: Path, tmp_path: Path) -> None:
+    evaluate(folder, folder / "questions.json", scenes=(10, 11), draws=DRAWS, out=tmp_path, processes=1)
+    with pytest.raises(InputError, match=r"another run \(other seed\)"):
+        evaluate(folder, folder / "questions.json", scenes=(10, 11), draws=DRAWS, seed=1, out=tmp_path)
+
+
+@pytest.mark.filterwarnings("ignore")  # of the cluster's own libraries
+def test_a_cluster_gives_the_same_numbers(folder: Path, evaluation: Evaluation) -> None:
+    distributed = pytest.importorskip("distributed", reason="the optional library distributed is not installed")
+    with distributed.LocalCluster(n_workers=1, threads_per_worker=1, dashboard_address=None) as cluster:
+        found = evaluate(
+            folder, folder / "questions.json", scenes=(10, 12), draws=DRAWS, dask=cluster.scheduler_address
+        )
+    assert without_times(found) == without_times(evaluation)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"scenes": (0, 5)}, "which holds 10 to 12"),
+        ({"source": "films"}, "use tracks or videos"),
+        ({"source": "videos"}, "holds no video"),
+        ({"sampler": "gibbs"}, "sampler 'gibbs' is not known"),
+        ({"draws": 0}, "must be at least 1"),
+        ({"dask": "tcp://127.0.0.1:1"}, "no Dask scheduler answers"),
+    ],
+)
+def test_bad_calls_are_refused(
+    folder: Path, change: dict[str, object], message: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("vrdp_prob.evaluation.workers.PATIENCE", 1)
+    with pytest.raises(InputError, match=message):
+        evaluate(folder, folder / "questions.json", **change)  # type: ignore[arg-type]  # wrong on purpose
+
+
+@pytest.mark.parametrize(
+    ("scenes", "message"),
+    [
+        (
+            [
+                {
+                    "video_filename": "other.mp4",
+                    "questions": [{"question": "How many collisions happen?", "answer": "1"}],
+                }
+            ],
+            "none of the videos",
+        ),
+        (
+            [{"video_filename": "video_00000.mp4", "questions": [{"question": "How many collisions happen?"}]}],
+            "nothing to score",
+        ),
+        (
+            [{"video_filename": "video_00000.mp4", "questions": [{"question": "Quo vadis?", "answer": "1"}]}],
+            "question None",
+        ),
+        ([{"video_filename": "video_00000.mp4", "scene_index": "x", "questions": []}], "must be a whole number"),
+        ([{"questions": []}], "not a CLEVRER question file"),
+    ],
+)
+def test_bad_question_files_are_refused(
+    folder: Path, tmp_path: Path, scenes: list[dict[str, object]], message: str
+) -> None:
+    file = tmp_path / "questions.json"
+    file.write_text(json.dumps(scenes))
+    with pytest.raises(InputError, match=message):
+        evaluate(folder, file)

@@ -45,7 +45,7 @@ def questions() -> list[dict[str, object]]:
         {
             "question_id": 1,
             "question": "What is responsible for the collision between the red cylinder and the blue cylinder?",
-            "choices": [{"choice_id": 0, "choice": "the presence of the red cylinder", "answer": "correct"}],
+            "choices": [{"choice_id": 0, "choice": "the presence of the red cylinder", "answer": "wrong"}],
         },
         {"question_id": 2, "question": "What will happen next?", "choices": [{**collide, "answer": "wrong"}]},
         {

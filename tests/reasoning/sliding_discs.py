@@ -85,8 +85,11 @@ class KnownPosterior:
     tracks: Tracks
     discs: tuple[Disc, ...]
     spread: float = 0.02
+    mass_spread: float | None = None
     seed: int = 0
     statuses: tuple[Status, ...] = ()
+    total: int = 400
+    effective: float | None = None
 
     @property
     def model(self) -> PhysicsModel:
@@ -95,7 +98,7 @@ class KnownPosterior:
     @property
     def convergence(self) -> Convergence:
         return Convergence(
-            sampler="laplace", converged=True, r_hat=None, ess_bulk=None, divergences=None, pareto_k=None
+            sampler="laplace", converged=True, r_hat=None, ess_bulk=self.effective, divergences=None, pareto_k=None
         )
 
     @property
@@ -107,30 +110,32 @@ class KnownPosterior:
     def worlds(self, count: int | None = None, *, generator: np.random.Generator | None = None) -> Worlds:
         del generator
         random = np.random.default_rng(self.seed)
-        number, size = count or 50, len(self.discs)
+        number, size = self.total, len(self.discs)
 
         def values(name: str) -> torch.Tensor:
             array = np.array([getattr(disc, name) for disc in self.discs], dtype=float)
             return torch.from_numpy(np.broadcast_to(array, (number, *array.shape)).copy())
 
-        def spread() -> torch.Tensor:
-            return torch.from_numpy(np.exp(self.spread * random.standard_normal((number, size))))
+        def spread(size_of_it: float) -> torch.Tensor:
+            return torch.from_numpy(np.exp(size_of_it * random.standard_normal((number, size))))
 
         zero = torch.zeros(number, size, dtype=torch.float64)
         shared = {"sliding_friction": FRICTION, "rolling_resistance": 0.01, "air_drag": 1e-6, "angular_drag": 0.1}
-        return Worlds(
+        chosen = np.linspace(0, number - 1, min(count or number, number)).round().astype(int)
+        everything = Worlds(
             shapes=(Shape.CYLINDER,) * size,
             position=values("position"),
             velocity=values("velocity"),
             angle=zero,
             spin=zero,
             release_time=values("release"),
-            mass=values("mass") * spread(),
-            restitution=torch.clamp(values("restitution") * spread(), max=1.0),
+            mass=values("mass") * spread(self.spread if self.mass_spread is None else self.mass_spread),
+            restitution=torch.clamp(values("restitution") * spread(self.spread), max=1.0),
             radius=torch.full_like(zero, RADIUS),
             present=torch.ones(number, size, dtype=torch.bool),
             parameters={name: torch.full((number,), value, dtype=torch.float64) for name, value in shared.items()},
         )
+        return everything.select(chosen.tolist())
 
 
 def changed(discs: Sequence[Disc], place: int, *, mass: float) -> list[Disc]:

@@ -8,6 +8,7 @@ from vrdp_prob.reasoning.chance import MostProbable, Seeded
 from vrdp_prob.reasoning.contacts import see
 from vrdp_prob.reasoning.rest import DrawnMotion, possible_rests
 from vrdp_prob.reasoning.seen import SeenVideo
+from vrdp_prob.reasoning.sight import Sight
 from vrdp_prob.reasoning.smoother import BodyTrack, Smoother, body_tracks
 from vrdp_prob.scene import Body, Camera, Shape, Tracks
 
@@ -77,12 +78,12 @@ def test_contacts_are_found_and_nothing_else() -> None:
 @pytest.mark.parametrize("gap", [0.05, 0.1, 0.5])
 def test_a_near_miss_is_no_contact(gap: float) -> None:
     tracks = tracks_of([Disc((-1.5, 0.0), (1.5, 0.0)), Disc((0.0, 0.4 + gap))])
-    seen = SeenVideo(tracks, 200)
+    seen = SeenVideo(Sight(tracks), 200)
     assert not seen.events.happens[:, seen.universe.collisions].mean() > 0.2
 
 
 def test_a_resting_disc_rests_and_a_sliding_one_moves() -> None:
-    seen = SeenVideo(tracks_of([Disc((-1.5, 0.0), (1.5, 0.0)), Disc((1.5, 1.0))]), 200)
+    seen = SeenVideo(Sight(tracks_of([Disc((-1.5, 0.0), (1.5, 0.0)), Disc((1.5, 1.0))])), 200)
     motion = seen.motion
     stops = round(1.5 / (FRICTION * GRAVITY) / FRAME)
     assert motion.moving[:, : stops - 5, 0].mean() > 0.98
@@ -99,7 +100,7 @@ def test_a_slow_disc_is_not_taken_for_a_resting_one() -> None:
     )
     smoother = Smoother(track)
     rests = possible_rests(smoother, until=4.0)
-    drawn = DrawnMotion(smoother, rests, 100, np.random.default_rng(0))
+    drawn = DrawnMotion(smoother, rests, 100, doubt=np.random.default_rng(1), numbers=np.random.default_rng(0))
     assert np.linalg.norm(drawn.state(times)[1], axis=-1).min(axis=1).mean() > 0.1
 
 
@@ -113,7 +114,7 @@ def test_entrances_and_exits_are_crossings_of_the_edge() -> None:
     positions[60:64, 2] = np.nan
     bodies = tuple(Body(name, Shape.SPHERE, radius=0.2) for name in "abc")
     tracks = Tracks.from_arrays("v", bodies, times, positions, camera=still_camera())
-    seen = SeenVideo(tracks, 3)
+    seen = SeenVideo(Sight(tracks), 3)
     table, universe = seen.events, seen.universe
     assert table.happens[0, universe.entrances].tolist() == [True, False, False]
     assert table.happens[0, universe.exits].tolist() == [True, False, False]
@@ -124,21 +125,21 @@ def test_entrances_and_exits_are_crossings_of_the_edge() -> None:
 
 def test_without_a_camera_being_seen_late_is_entering() -> None:
     discs = (Disc((0.0, 0.0), (0.3, 0.0)), Disc((1.5, 1.5), (-0.5, 0.0), release=1.0))
-    seen = SeenVideo(tracks_of(discs), 2)
+    seen = SeenVideo(Sight(tracks_of(discs)), 2)
     assert seen.events.happens[0, seen.universe.entrances].tolist() == [False, True]
     assert seen.events.time[0, seen.universe.entrances][1] == pytest.approx(1.0, abs=FRAME)
 
 
 def test_the_same_seed_gives_the_same_draws() -> None:
     tracks = tracks_of(CHAIN)
-    one, other = SeenVideo(tracks, 20, Seeded(5)), SeenVideo(tracks, 20, Seeded(5))
+    one, other = SeenVideo(Sight(tracks), 20, Seeded(5)), SeenVideo(Sight(tracks), 20, Seeded(5))
     assert np.array_equal(one.events.time, other.events.time, equal_nan=True)
     assert np.array_equal(one.motion.moving, other.motion.moving)
 
 
 def test_without_chance_everything_is_as_is_most_probable() -> None:
     tracks = tracks_of(CHAIN)
-    drawn, best = SeenVideo(tracks, 400, Seeded(0)), SeenVideo(tracks, 1, MostProbable())
+    drawn, best = SeenVideo(Sight(tracks), 400, Seeded(0)), SeenVideo(Sight(tracks), 1, MostProbable())
     assert np.array_equal(best.events.happens[0], drawn.events.happens.mean(axis=0) > 0.5)
     happened = best.events.happens[0]
     middle = np.nanmedian(drawn.events.time[:, happened], axis=0)

@@ -32,7 +32,7 @@ from vrdp_prob.models import model_file
 from vrdp_prob.models.physics import PhysicsModel
 from vrdp_prob.models.simulator.rollout import compile_model
 from vrdp_prob.progress import ProgressDisplay, SilentProgress
-from vrdp_prob.reasoning.executor import prepare
+from vrdp_prob.reasoning.prepared import prepare
 from vrdp_prob.reasoning.worlds import DRAWS
 from vrdp_prob.scene import Question
 

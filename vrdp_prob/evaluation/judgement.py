@@ -7,8 +7,8 @@ from typing import Any
 
 from vrdp_prob.errors import InputError
 from vrdp_prob.reasoning import Answer, ask
-from vrdp_prob.reasoning.executor import prepare
 from vrdp_prob.reasoning.facts import Facts
+from vrdp_prob.reasoning.prepared import prepare
 from vrdp_prob.scene import Question, QuestionType
 
 RIGHT_CHOICE = "correct"

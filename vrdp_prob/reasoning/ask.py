@@ -6,13 +6,17 @@ from functools import cached_property, wraps
 from typing import ParamSpec
 
 from vrdp_prob import inference
+from vrdp_prob.errors import InputError
 from vrdp_prob.inference import Posterior
 from vrdp_prob.progress import ProgressDisplay
+from vrdp_prob.reasoning.adaptive import answer_within
 from vrdp_prob.reasoning.answer import Answer
 from vrdp_prob.reasoning.defaults import Defaults
-from vrdp_prob.reasoning.executor import ChoiceInput, answer_question
+from vrdp_prob.reasoning.executor import answer_question
 from vrdp_prob.reasoning.facts import Facts
-from vrdp_prob.reasoning.worlds import DRAWS, PosteriorLike, PosteriorWorlds
+from vrdp_prob.reasoning.posterior_like import PosteriorLike
+from vrdp_prob.reasoning.prepared import ChoiceInput
+from vrdp_prob.reasoning.worlds import DRAWS, PosteriorWorlds
 from vrdp_prob.scene import Question
 
 Options = ParamSpec("Options")
@@ -24,6 +28,7 @@ def ask(
     *,
     choices: Sequence[ChoiceInput] = (),
     draws: int = DRAWS,
+    mc_error: float | None = None,
     defaults: Defaults = "fixed",
     progress: ProgressDisplay | None = None,
 ) -> Answer:
@@ -39,6 +44,9 @@ def ask(
         Options of a multiple-choice question, in English or as programs.
     draws
         Number of posterior draws to use, where `known` is a posterior.
+    mc_error
+        Monte Carlo error to reach: so many draws are added at a time until every probability of the answer is as sure,
+        or the posterior has no more to give, which the answer's notes then say. None takes the draws that there are.
     defaults
         Whether objects that never collided have default mass and restitution (`fixed`) or values drawn from the prior
         (`prior`), where `known` is a posterior.
@@ -57,7 +65,17 @@ def ask(
         facts = PosteriorWorlds(known, draws=draws, defaults=defaults, progress=progress)
     else:
         facts = known
-    return answer_question(facts, question, choices=choices)
+    return _answer(facts, question, choices, mc_error)
+
+
+def _answer(
+    facts: Facts, question: str | Sequence[str] | Question, choices: Sequence[ChoiceInput], mc_error: float | None
+) -> Answer:
+    if mc_error is None:
+        return answer_question(facts, question, choices=choices)
+    if not isinstance(facts, PosteriorWorlds):
+        raise InputError("mc_error needs a posterior, which draws can be taken from; leave it out.")
+    return answer_within(facts, question, choices=choices, mc_error=mc_error)
 
 
 @dataclass(frozen=True)
@@ -74,9 +92,15 @@ class AskablePosterior(Posterior):
         """What was, what will be and what would be, in all draws."""
         return PosteriorWorlds(self)
 
-    def ask(self, question: str | Sequence[str] | Question, *, choices: Sequence[ChoiceInput] = ()) -> Answer:
+    def ask(
+        self,
+        question: str | Sequence[str] | Question,
+        *,
+        choices: Sequence[ChoiceInput] = (),
+        mc_error: float | None = None,
+    ) -> Answer:
         """Answer a question; see `vrdp_prob.reasoning.ask`."""
-        return answer_question(self.all_worlds, question, choices=choices)
+        return _answer(self.all_worlds, question, choices, mc_error)
 
 
 def _askable(infer: Callable[Options, Posterior]) -> Callable[Options, AskablePosterior]:

@@ -1,7 +1,7 @@
 """Where draws of what the tracks leave open come from: a seed, or no chance at all."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import IntEnum
 from typing import Protocol, runtime_checkable
 
@@ -19,6 +19,9 @@ class Purpose(IntEnum):
     ATTRIBUTES = 5
     FRICTION = 6
     DEFAULTS = 7
+    RESTS = 8
+    LAST_FRICTION = 9
+    ORDER = 10
 
 
 @runtime_checkable
@@ -46,6 +49,10 @@ class Chance(Protocol):
         """Random numbers, the same ones each time."""
         ...
 
+    def another(self, batch: int) -> "Chance":
+        """Chance for another batch of draws."""
+        ...
+
 
 @dataclass(frozen=True)
 class Seeded:
@@ -55,13 +62,20 @@ class Seeded:
     ----------
     seed
         The same seed gives the same draws.
+    batch
+        Number of the batch of draws: batches are independent of each other.
     """
 
     seed: int = 0
+    batch: int = 0
 
     def numbers(self, purpose: Purpose) -> np.random.Generator:
         """The stream of a purpose."""
-        return np.random.default_rng((self.seed, int(purpose)))
+        return np.random.default_rng((self.seed, int(purpose), self.batch))
+
+    def another(self, batch: int) -> "Seeded":
+        """The streams of another batch."""
+        return replace(self, batch=batch)
 
 
 class MostProbable:
@@ -73,6 +87,11 @@ class MostProbable:
     def numbers(self, purpose: Purpose) -> "MostProbable":
         """The most probable values, whatever the purpose."""
         del purpose
+        return self
+
+    def another(self, batch: int) -> "MostProbable":
+        """The most probable values once more."""
+        del batch
         return self
 
     def standard_normal(self, size: tuple[int, ...], /) -> Float[np.ndarray, "..."]:

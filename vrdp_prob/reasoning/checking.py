@@ -7,8 +7,8 @@ import numpy as np
 
 from vrdp_prob.reasoning import object_operations
 from vrdp_prob.reasoning.events import EventTable, EventUniverse
-from vrdp_prob.reasoning.executor import ChoiceInput, prepare
 from vrdp_prob.reasoning.facts import Motion, TableFacts
+from vrdp_prob.reasoning.prepared import ChoiceInput, prepare
 from vrdp_prob.reasoning.program import Program
 from vrdp_prob.reasoning.run import Run
 from vrdp_prob.reasoning.values import ObjectSet, Value, Word

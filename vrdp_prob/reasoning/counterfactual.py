@@ -89,7 +89,7 @@ class Counterfactual:
             self._exists,
             self._timeline.table,
             self._timeline.collided | self._touched(),
-            float(self._broke_off.mean()),
+            self._broke_off,
         )
 
     def _touched(self) -> Bool[np.ndarray, "draw body"]:

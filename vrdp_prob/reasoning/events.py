@@ -158,6 +158,14 @@ class EventTable:
                 table.time[:, place] = time
         return table
 
+    @classmethod
+    def joined(cls, parts: "Sequence[EventTable]") -> "EventTable":
+        """The draws of several tables of the same video, one after the other."""
+        if len(parts) == 1:
+            return parts[0]
+        happens, time = (np.concatenate([getattr(part, name) for part in parts]) for name in ("happens", "time"))
+        return cls(parts[0].universe, happens, time)
+
     @property
     def draws(self) -> int:
         """Number of draws."""

@@ -1,6 +1,6 @@
 """What operations may know about a video: who is in it, what happens in each world, and who moves when."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Protocol, runtime_checkable
 
@@ -37,6 +37,14 @@ class Motion:
     times: Float[np.ndarray, "frame"]
     in_view: Bool[np.ndarray, "draw frame body"]
     moving: Bool[np.ndarray, "draw frame body"]
+
+    @classmethod
+    def joined(cls, parts: "Sequence[Motion]") -> "Motion":
+        """The draws of several batches of the same video, one after the other."""
+        if len(parts) == 1:
+            return parts[0]
+        in_view, moving = (np.concatenate([getattr(part, name) for part in parts]) for name in ("in_view", "moving"))
+        return cls(parts[0].times, in_view, moving)
 
     def frame(self, time: Float[np.ndarray, "draw"]) -> np.ndarray:
         """Index of the frame that is nearest to each draw's time; integer array with axis `draw`."""

@@ -9,7 +9,6 @@ from jaxtyping import Bool, Float
 from vrdp_prob.models.effects.body_friction import FRICTION_RATIO
 from vrdp_prob.models.physics import PhysicsModel
 from vrdp_prob.models.simulator.worlds import Worlds
-from vrdp_prob.reasoning.chance import Random
 from vrdp_prob.reasoning.smoother import BodyTrack
 from vrdp_prob.reasoning.stretch import State, advance
 
@@ -26,6 +25,9 @@ LARGEST_MOVE = np.array([0.1, 0.1, 0.5, 0.5, 1.0])
 """Largest change in one Gauss-Newton step."""
 
 LOG_RATIO_LIMIT = 4.0
+
+FRICTION_FIRST = [4, 0, 1, 2, 3]
+"""Order of the unknowns in which they are drawn."""
 
 
 @dataclass(frozen=True)
@@ -75,9 +77,9 @@ class Flight:
         start: Float[np.ndarray, "draw 4"],
         log_ratio: Float[np.ndarray, "draw"],
         log_ratio_sd: float,
-        numbers: Random | None,
+        normal: Float[np.ndarray, "draw 5"] | None,
     ) -> FittedFlight:
-        """Fit by Gauss-Newton steps and draw around the fit; without numbers give the fit itself.
+        """Fit by Gauss-Newton steps and draw around the fit; without random numbers give the fit itself.
 
         Parameters
         ----------
@@ -85,8 +87,8 @@ class Flight:
             Position (m) and velocity (m/s) to set out from, held by `START_SD`.
         log_ratio, log_ratio_sd
             Prior of the logarithm of the friction ratio.
-        numbers
-            Source of the draws.
+        normal
+            Standard normal numbers: the first decides the friction, the others the state given the friction.
         """
         noise, measured = self._track.noise, self._track.positions
         prior_mean = np.concatenate([start, log_ratio[:, None]], axis=1)
@@ -105,9 +107,10 @@ class Flight:
         freedom = max(2 * len(noise) - 5, 1)
         # where the physics does not fit the flight, its state is less certain by as much
         inflation = np.clip((left**2).sum(axis=(1, 2)) / freedom, 1.0, 100.0)
-        if numbers is not None:
-            root = np.linalg.cholesky(np.linalg.inv(data + prior)) * np.sqrt(inflation)[:, None, None]
-            at = at + np.einsum("dij,dj->di", root, numbers.standard_normal(at.shape))
+        if normal is not None:
+            covariance = np.linalg.inv(data + prior)[:, FRICTION_FIRST][:, :, FRICTION_FIRST]
+            root = np.linalg.cholesky(covariance) * np.sqrt(inflation)[:, None, None]
+            at[:, FRICTION_FIRST] += np.einsum("dij,dj->di", root, normal)
         final = end + np.einsum("dsi,di->ds", end_slope, at - base)
         told = np.linalg.inv(np.linalg.inv(data + prior)[:, 4:, 4:])[:, 0, 0] - prior[4, 4]
         return FittedFlight(

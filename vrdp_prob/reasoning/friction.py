@@ -5,6 +5,7 @@ two to twenty, and the tracks show it. What is simulated in an answer therefore 
 times a ratio that its own flights tell.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
@@ -16,10 +17,9 @@ from vrdp_prob.models.effects.body_friction import FRICTION_RATIO, BodyFriction
 from vrdp_prob.models.effects.dry_friction import DryFriction
 from vrdp_prob.models.physics import PhysicsModel
 from vrdp_prob.models.simulator.worlds import Worlds
-from vrdp_prob.reasoning.chance import Purpose
+from vrdp_prob.reasoning.chance import Random
 from vrdp_prob.reasoning.flight import Flight, scaled_friction
-from vrdp_prob.reasoning.seen import SeenVideo
-from vrdp_prob.reasoning.smoother import BodyTrack
+from vrdp_prob.reasoning.smoother import BodyTrack, Smoother
 
 PRIOR_SD = 0.8
 """Standard deviation of the log friction ratio of a body before its flights are looked at."""
@@ -40,18 +40,36 @@ PAUSE = 0.02
 
 @dataclass(frozen=True)
 class OwnFriction:
-    """Friction ratio of each body.
+    """Friction ratio of each body, in every draw.
 
     Parameters
     ----------
     log_ratio
-        Logarithm of its friction over the shared friction, in each draw.
+        Logarithm of its friction over the shared friction.
     sd
         Standard deviation of that, as the flights tell it.
     """
 
     log_ratio: Float[np.ndarray, "draw body"]
     sd: Float[np.ndarray, "body"]
+
+
+@dataclass(frozen=True)
+class ToldFriction:
+    """What the flights tell of the friction ratio of each body.
+
+    Parameters
+    ----------
+    mean, sd
+        Mean and standard deviation of its logarithm.
+    """
+
+    mean: Float[np.ndarray, "body"]
+    sd: Float[np.ndarray, "body"]
+
+    def draw(self, draws: int, numbers: Random) -> OwnFriction:
+        """Draws of the ratios."""
+        return OwnFriction(self.mean + self.sd * numbers.standard_normal((draws, len(self.mean))), self.sd)
 
 
 def with_friction_ratio(worlds: Worlds, model: PhysicsModel) -> tuple[Worlds, PhysicsModel] | None:
@@ -66,29 +84,26 @@ def with_friction_ratio(worlds: Worlds, model: PhysicsModel) -> tuple[Worlds, Ph
     return extended, model.with_effect(BodyFriction())
 
 
-def own_friction(seen: SeenVideo, worlds: Worlds, model: PhysicsModel) -> OwnFriction:
-    """Friction ratio of each body from its free flights, in every draw.
+def told_friction(smoothers: Sequence[Smoother], world: Worlds, model: PhysicsModel) -> ToldFriction:
+    """Friction ratio of each body from its free flights.
 
     Parameters
     ----------
-    seen
-        What the tracks tell.
-    worlds
-        The posterior draws, with a friction ratio.
+    smoothers
+        The motion of each body, with its contacts.
+    world
+        One world in the middle of the posterior, with a friction ratio.
     model
         The physics, with the effect of that ratio.
     """
-    numbers = seen.chance.numbers(Purpose.FRICTION)
-    middle = worlds.select([len(worlds) // 2])
-    mean, sd = np.zeros(len(seen.drawn)), np.full(len(seen.drawn), PRIOR_SD)
-    for body in range(len(seen.drawn)):
-        told = [_one_flight(seen, middle, model, body, track) for track in _flights(seen, body)]
+    mean, sd = np.zeros(len(smoothers)), np.full(len(smoothers), PRIOR_SD)
+    for body, smoother in enumerate(smoothers):
+        told = [_one_flight(smoother, world, model, body, track) for track in _flights(smoother)]
         weights = np.array([1 / (1 / precision + FLIGHT_SPREAD**2) for _, precision in told if precision > 0])
         values = np.array([value for value, precision in told if precision > 0])
         total = weights.sum() + PRIOR_SD**-2
         mean[body], sd[body] = (weights * values).sum() / total, total**-0.5
-    normal = numbers.standard_normal((seen.draws, len(mean)))
-    return OwnFriction(mean + sd * normal, sd)
+    return ToldFriction(mean, sd)
 
 
 def apply_friction(worlds: Worlds, log_ratio: Float[np.ndarray, "draw body"]) -> Worlds:
@@ -98,9 +113,8 @@ def apply_friction(worlds: Worlds, log_ratio: Float[np.ndarray, "draw body"]) ->
     return worlds
 
 
-def _flights(seen: SeenVideo, body: int) -> list[BodyTrack]:
+def _flights(smoother: Smoother) -> list[BodyTrack]:
     """Parts of a track between contacts, in which the body moves."""
-    smoother = seen.seen.smoothers[body]
     track = smoother.track
     bounds = [float(track.times[0]) - PAUSE, *smoother.kicks, float(track.times[-1]) + PAUSE]
     flights = []
@@ -115,12 +129,12 @@ def _flights(seen: SeenVideo, body: int) -> list[BodyTrack]:
 
 
 def _one_flight(
-    seen: SeenVideo, worlds: Worlds, model: PhysicsModel, body: int, track: BodyTrack
+    smoother: Smoother, world: Worlds, model: PhysicsModel, body: int, track: BodyTrack
 ) -> tuple[float, float]:
     """Log friction ratio that a flight tells, prior aside, and its precision."""
     begin = float(track.times[0])
-    state = np.concatenate([array[0] for array in seen.seen.smoothers[body].state(np.array([begin]))])
-    flight = Flight(worlds, model, body, track=track, begin=begin)
+    state = np.concatenate([array[0] for array in smoother.state(np.array([begin]))])
+    flight = Flight(world, model, body, track=track, begin=begin)
     fitted = flight.fit(state[None], np.zeros(1), PRIOR_SD, None)
     precision = float(fitted.precision[0])
     # the fit is pulled to the prior's zero: undo it

@@ -61,7 +61,13 @@ def state_at_end(
     state = State(
         np.zeros((*shape, 2)), np.zeros((*shape, 2)), zero.copy(), zero.copy(), zero.copy(), np.ones(shape, dtype=bool)
     )
-    numbers = seen.chance.numbers(Purpose.LAST_FLIGHT)
+    normal = np.concatenate(
+        [
+            seen.chance.numbers(Purpose.LAST_FRICTION).standard_normal((*shape, 1)),
+            seen.chance.numbers(Purpose.LAST_FLIGHT).standard_normal((*shape, 4)),
+        ],
+        axis=2,
+    )
     for body, drawn in enumerate(seen.drawn):
         track = seen.seen.smoothers[body].track
         last = float(track.times[-1])
@@ -78,7 +84,7 @@ def state_at_end(
         start = np.concatenate([array[:, 0] for array in drawn.state(np.array([begin]))], axis=1)
         flight = Flight(worlds, model, body, track=window, begin=begin)
         prior_sd = float(np.hypot(friction.sd[body], CHANGE_SD[worlds.shapes[body] is Shape.SPHERE]))
-        fitted = flight.fit(start, np.full(seen.draws, log_ratio[:, body].mean()), prior_sd, numbers)
+        fitted = flight.fit(start, np.full(seen.draws, log_ratio[:, body].mean()), prior_sd, normal[:, body])
         moves = ~still
         state.position[moves, body], state.velocity[moves, body] = fitted.position[moves], fitted.velocity[moves]
         log_ratio[moves, body] = fitted.log_ratio[moves]

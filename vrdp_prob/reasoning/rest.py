@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 from scipy.special import expit, logsumexp
 
 from vrdp_prob.reasoning.chance import Random
@@ -67,21 +67,25 @@ class DrawnMotion:
         Where it may lie still.
     draws
         Number of draws.
+    doubt
+        Source of the draws of where it lies still.
     numbers
-        Source of the draws.
+        Source of the draws of its motion.
     """
 
-    def __init__(self, smoother: Smoother, rests: tuple[Rest, ...], draws: int, numbers: Random) -> None:
+    def __init__(
+        self, smoother: Smoother, rests: tuple[Rest, ...], draws: int, *, doubt: Random, numbers: Random
+    ) -> None:
         chance = np.array([rest.probability for rest in rests])
-        has_rest = numbers.random((draws, len(rests))) < chance
+        self.has_rest: Bool[np.ndarray, "draw rest"] = doubt.random((draws, len(rests))) < chance
         self._end = float(smoother.track.times[-1])
-        self.rests_at_end = np.zeros(draws, dtype=bool)
+        self.rests_at_end: Bool[np.ndarray, "draw"] = np.zeros(draws, dtype=bool)
         self._smoother = smoother
-        self._weights = np.empty((draws, smoother.weight_count, 2))
-        for pattern in np.unique(has_rest, axis=0):
-            own = np.flatnonzero((has_rest == pattern).all(axis=1))
+        self._weights = numbers.standard_normal((draws, smoother.weight_count, 2))
+        for pattern in np.unique(self.has_rest, axis=0):
+            own = np.flatnonzero((self.has_rest == pattern).all(axis=1))
             chosen = tuple((rest.start, rest.stop) for rest, taken in zip(rests, pattern, strict=True) if taken)
-            self._weights[own] = smoother.with_rests(chosen).draw_weights(len(own), numbers)
+            self._weights[own] = smoother.with_rests(chosen).weights(self._weights[own])
             self.rests_at_end[own] = any(stop >= self._end - 2 * MARGIN for _, stop in chosen)
 
     def state(

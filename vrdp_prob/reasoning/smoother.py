@@ -13,7 +13,6 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from vrdp_prob.inference.free_flight import noise_scale
-from vrdp_prob.reasoning.chance import Random
 from vrdp_prob.scene import Tracks
 
 POSITION_SD = 10.0
@@ -161,9 +160,8 @@ class Smoother:
         covariance: Float[np.ndarray, "2 2"] = features @ self._root @ (features @ self._root).T
         return covariance
 
-    def draw_weights(self, draws: int, numbers: Random) -> Float[np.ndarray, "draw weight 2"]:
-        """Draws of the weights; with `features` each is one smooth motion."""
-        normal = numbers.standard_normal((draws, self._root.shape[1], 2))
+    def weights(self, normal: Float[np.ndarray, "draw weight 2"]) -> Float[np.ndarray, "draw weight 2"]:
+        """Draws of the weights from standard normal numbers; with `features` each is one smooth motion."""
         return np.asarray(self._mean + np.einsum("wk,dka->dwa", self._root, normal))
 
     def one_more(self, times: Float[np.ndarray, "time"]) -> "OneMoreKick":

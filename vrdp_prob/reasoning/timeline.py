@@ -1,5 +1,6 @@
 """What happens in a simulated world, noted while it is simulated."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -103,7 +104,7 @@ class WorldDraws:
     collided
         Bodies whose course was decided by a simulated contact.
     broke_off
-        Share of the draws whose simulation broke off.
+        Whether its simulation broke off.
     """
 
     times: Float[np.ndarray, "frame"]
@@ -111,4 +112,18 @@ class WorldDraws:
     exists: Bool[np.ndarray, "draw frame body"]
     events: EventTable
     collided: Bool[np.ndarray, "draw body"]
-    broke_off: float
+    broke_off: Bool[np.ndarray, "draw"]
+
+    @classmethod
+    def joined(cls, parts: "Sequence[WorldDraws]") -> "WorldDraws":
+        """The draws of several batches, one after the other."""
+        if len(parts) == 1:
+            return parts[0]
+        return cls(
+            parts[0].times,
+            np.concatenate([part.trajectory for part in parts]),
+            np.concatenate([part.exists for part in parts]),
+            EventTable.joined([part.events for part in parts]),
+            np.concatenate([part.collided for part in parts]),
+            np.concatenate([part.broke_off for part in parts]),
+        )

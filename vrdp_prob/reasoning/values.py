@@ -1,5 +1,6 @@
 """What operations take and give: values that hold one entry for each posterior draw."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 
@@ -94,6 +95,11 @@ class Label:
 
     index: Int[np.ndarray, "draw"]
     names: tuple[str, ...]
+
+    @classmethod
+    def joined(cls, parts: "Sequence[Label]") -> "Label":
+        """The draws of several batches, one after the other."""
+        return cls(np.concatenate([part.index for part in parts]), parts[0].names)
 
 
 Value = Word | ObjectSet | ObjectRef | EventSet | EventRef | Moment | Truth | Count | Label

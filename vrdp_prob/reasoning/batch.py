@@ -1,0 +1,181 @@
+"""A batch of draws with its worlds: as it was, as it goes on, and with one object changed; each simulated once."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import torch
+from jaxtyping import Float
+
+from vrdp_prob.models.physics import PhysicsModel
+from vrdp_prob.models.simulator.rollout import Rollout, simulate
+from vrdp_prob.models.simulator.worlds import Worlds
+from vrdp_prob.reasoning.chance import Chance, Purpose
+from vrdp_prob.reasoning.counterfactual import Counterfactual
+from vrdp_prob.reasoning.facts import draw_attributes
+from vrdp_prob.reasoning.friction import OwnFriction, ToldFriction, apply_friction, told_friction, with_friction_ratio
+from vrdp_prob.reasoning.refit import state_at_end
+from vrdp_prob.reasoning.seen import SeenVideo
+from vrdp_prob.reasoning.sight import Sight
+from vrdp_prob.reasoning.stretch import State, advance
+from vrdp_prob.reasoning.timeline import Timeline, WorldDraws
+from vrdp_prob.reasoning.values import Change, Label
+
+FUTURE_FRAMES = 58
+"""Frames after the video that predictive questions ask about: 128 to 185 of a CLEVRER video."""
+
+
+@dataclass(frozen=True)
+class Common:
+    """What all batches of draws of a video share.
+
+    Parameters
+    ----------
+    sight
+        What the tracks tell.
+    model
+        The physics.
+    middle
+        One world in the middle of the posterior.
+    """
+
+    sight: Sight
+    model: PhysicsModel
+    middle: Worlds
+
+    @cached_property
+    def friction(self) -> ToldFriction | None:
+        """Friction of each body by its own flights; None for a model without dry friction."""
+        extended = with_friction_ratio(self.middle, self.model)
+        return None if extended is None else told_friction(self.sight.seen.smoothers, *extended)
+
+
+@dataclass(frozen=True)
+class Released:
+    """Posterior draws and their rollouts from the release on.
+
+    Parameters
+    ----------
+    worlds
+        The posterior draws.
+    times
+        Times in s of the frames of the video.
+    model
+        The physics.
+    """
+
+    worlds: Worlds
+    times: Float[np.ndarray, "frame"]
+    model: PhysicsModel
+
+    @cached_property
+    def rollout(self) -> Rollout:
+        """What happened in the video if nothing but the draws is asked."""
+        with torch.no_grad():
+            return simulate(self.worlds, torch.from_numpy(self.times.copy()), self.model)
+
+
+class Batch:
+    """Posterior draws, what the tracks leave open drawn to each of them, and the worlds that follow.
+
+    Parameters
+    ----------
+    common
+        What it shares with other batches.
+    released
+        The posterior draws.
+    chance
+        Where draws of what the tracks leave open come from.
+    """
+
+    def __init__(self, common: Common, released: Released, chance: Chance) -> None:
+        self.common, self.released, self.chance = common, released, chance
+        self.seen = SeenVideo(common.sight, len(released.worlds), chance)
+        self._extended = with_friction_ratio(self.drawn, common.model) or (self.drawn, common.model)
+        self._changed: dict[tuple[Change, int], WorldDraws] = {}
+
+    def __len__(self) -> int:
+        return len(self.drawn)
+
+    @property
+    def drawn(self) -> Worlds:
+        """The posterior draws."""
+        return self.released.worlds
+
+    def coupled(self, chance: Chance) -> "Batch":
+        """The same posterior draws with what the tracks leave open drawn otherwise."""
+        return Batch(self.common, self.released, chance)
+
+    @cached_property
+    def attributes(self) -> dict[str, tuple[Label, ...]]:
+        """Attributes by name, one entry for each object."""
+        return draw_attributes(self.common.sight.tracks.bodies, len(self), self.chance.numbers(Purpose.ATTRIBUTES))
+
+    @cached_property
+    def friction(self) -> OwnFriction | None:
+        """Friction of each body by its own flights; None for a model without dry friction."""
+        told = self.common.friction
+        return None if told is None else told.draw(len(self), self.chance.numbers(Purpose.FRICTION))
+
+    @cached_property
+    def end(self) -> tuple[State, Float[np.ndarray, "draw body"]]:
+        """State of all bodies when each was last seen, and the logarithm of its friction ratio then."""
+        return state_at_end(self.seen, *self._extended, self.turning, self.friction)
+
+    @cached_property
+    def future(self) -> WorldDraws:
+        """What happens after the video, at frames after its last one."""
+        seen, (worlds, model) = self.seen, self._extended
+        state, log_ratio = self.end
+        state = state.copy()
+        if self.friction is not None:
+            worlds = apply_friction(worlds, log_ratio)
+        end = float(seen.tracks.times[-1])
+        times = end + np.arange(FUTURE_FRAMES + 1) / seen.tracks.frame_rate
+        # in view of the last frame, bodies are held to start there; those that left are on their way since they did
+        here = seen.presence[:, 1] >= len(seen.tracks.times)
+        unseen = np.where(here, end - state.release[0], 0.0)
+        state.position += state.velocity * unseen[:, None]
+        state.release[:, here] = end
+        stretch = advance(worlds, state, times[1:], model)
+        timeline = Timeline(seen.universe, seen.draws, seen.tracks.camera)
+        timeline.met[:, seen.universe.collisions] = seen.events.happens[:, seen.universe.collisions]
+        for meeting in stretch.meetings():
+            timeline.note_meeting(meeting, meeting.time > end)
+        timeline.note_crossings(stretch.times, stretch.position, stretch.exists, np.ones_like(timeline.collided))
+        trajectory = np.concatenate([stretch.position, stretch.angle[..., None]], axis=-1)
+        return WorldDraws(
+            stretch.times, trajectory, stretch.exists, timeline.table, timeline.collided, stretch.broke_off
+        )
+
+    def counterfactual(self, change: Change, body: int) -> WorldDraws:
+        """What happens when one object (by its place) is changed from the beginning."""
+        if (change, body) not in self._changed:
+            counterfactual = Counterfactual(
+                self.seen, self._acting, self._extended[1], self.turning, change=change, body=body
+            )
+            self._changed[change, body] = counterfactual.run()
+        return self._changed[change, body]
+
+    def turning(self, body: int, time: float) -> tuple[Float[np.ndarray, "draw"], Float[np.ndarray, "draw"]]:
+        """Angle (rad) and spin (rad/s) of a body in every draw.
+
+        From the rollouts of the draws; where the angle was measured, the measured turning is followed instead, from the
+        angle that the rollout has when the body is first seen: the measured angle's zero is arbitrary.
+        """
+        times = self.seen.tracks.times
+        frame = int(np.abs(times - time).argmin())
+        turned = self.released.rollout.trajectory[:, :, body, 2].numpy()
+        angle, spin = turned[:, frame], self.released.rollout.velocity[:, frame, body, 2].numpy()
+        measured = self.seen.tracks.angles
+        if measured is None or np.isfinite(measured[:, body]).sum() < 2:
+            return angle, spin
+        known = np.flatnonzero(np.isfinite(measured[:, body]))
+        rate = np.gradient(np.interp(times, times[known], measured[known, body]), times)
+        passed = np.interp(times[frame], times[known], measured[known, body]) - measured[known[0], body]
+        return turned[:, known[0]] + passed, np.full(len(self), rate[frame])
+
+    @cached_property
+    def _acting(self) -> Worlds:
+        """The draws with each body's own friction: what counterfactuals are simulated with."""
+        return self.drawn if self.friction is None else apply_friction(self._extended[0], self.friction.log_ratio)

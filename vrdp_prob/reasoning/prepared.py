@@ -1,0 +1,65 @@
+"""A question as it was stated, made ready to be answered: programs that are type-checked."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from vrdp_prob.errors import InputError
+from vrdp_prob.reasoning.language import parse_choice, parse_question
+from vrdp_prob.reasoning.program import ENTRIES, Program, check, needs_choices, question_type
+from vrdp_prob.reasoning.values import Truth
+from vrdp_prob.scene import Choice, Question, QuestionType
+
+ChoiceInput = str | Sequence[str] | Choice
+
+
+@dataclass(frozen=True)
+class PreparedQuestion:
+    """A question and its choices as checked programs; an open question has a program, a choice question options."""
+
+    question: Question
+    kind: QuestionType
+    program: Program | None
+    options: tuple[tuple[Choice, Program], ...]
+
+
+def prepare(question: str | Sequence[str] | Question, choices: Sequence[ChoiceInput]) -> PreparedQuestion:
+    """Understand a question and its choices; raises `InputError` as `answer_question` does."""
+    stated = _as_question(question)
+    program = stated.program if stated.program is not None else parse_question(stated.text)
+    kind = stated.question_type or question_type(program)
+    given = [_as_choice(number, choice) for number, choice in enumerate(choices)] or list(stated.choices)
+    if not needs_choices(program):
+        if given:
+            raise InputError(f"'{stated.text}' is answered without choices; leave them out.")
+        return PreparedQuestion(stated, kind, check(program), ())
+    if not given:
+        raise InputError(f"'{stated.text}' needs choices to judge; give at least one (--choice TEXT).")
+    return PreparedQuestion(stated, kind, None, tuple(_option(choice, program, kind) for choice in given))
+
+
+def _option(choice: Choice, question_program: Sequence[str], kind: QuestionType) -> tuple[Choice, Program]:
+    program = choice.program if choice.program is not None else parse_choice(choice.text, kind)
+    try:
+        check(program, ends_in=ENTRIES)
+        whole = check((*program, *question_program), ends_in=(Truth,))
+    except InputError as error:
+        raise InputError(f"choice '{choice.text}': {error}") from error
+    return choice, whole
+
+
+def _as_question(question: str | Sequence[str] | Question) -> Question:
+    if isinstance(question, Question):
+        return question
+    if isinstance(question, str):
+        return Question(text=question)
+    program = tuple(question)
+    return Question(text=" ".join(program), program=program)
+
+
+def _as_choice(number: int, choice: ChoiceInput) -> Choice:
+    if isinstance(choice, Choice):
+        return choice
+    if isinstance(choice, str):
+        return Choice(number, choice)
+    program = tuple(choice)
+    return Choice(number, " ".join(program), program)

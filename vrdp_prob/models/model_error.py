@@ -17,11 +17,6 @@ from torch import Tensor
 
 from vrdp_prob.models.observation import Observations
 
-GRID_STEPS = 3.0
-"""Steps of the numerical integral per duration of the acceleration."""
-FINEST_STEPS = 4
-"""At most so many steps per frame."""
-
 
 @dataclass(frozen=True)
 class ModelError:
@@ -53,15 +48,23 @@ class ModelError:
 
 
 def straying(times: Float[np.ndarray, "time"], release: float, duration: float) -> Float[np.ndarray, "time time"]:
-    """Covariance (s^4) of the double integral, from a release time on, of an acceleration of unit variance."""
-    since = times - release
-    steps = np.diff(np.unique(since))
-    step = float(np.median(steps)) if len(steps) else 1.0
-    step = max(min(step, duration / GRID_STEPS), step / FINEST_STEPS)
-    middles = np.arange(0.0, max(float(since.max()), step), step) + step / 2
-    weights = step * np.clip(since[:, None] - middles, 0.0, None)
-    alike = np.exp(-np.abs(middles[:, None] - middles) / duration)
-    covariance: np.ndarray = weights @ alike @ weights.T
+    """Covariance (s^4) of the double integral, from a release time on, of an acceleration of unit variance.
+
+    With the acceleration's correlation exp(-|u - v| / duration) the integrals over u and v have a closed form.
+    """
+    since = (times - release) / duration
+    early, late = np.minimum(since[:, None], since), np.maximum(since[:, None], since)
+    between = late - early
+    fade = np.exp(-since)
+    fade = np.maximum(fade[:, None], fade)
+    forgotten = 1 - (1 + early) * fade
+    together = (
+        2 * (early**3 / 3 + between * early**2 / 2)
+        - (1 + early) * (late * (1 - fade) - forgotten)
+        + (between + 1 - fade * (late + 1))
+    )
+    afterwards = forgotten * (between - 1 + np.exp(-between))
+    covariance: np.ndarray = duration**4 * (together + afterwards)
     return covariance
 
 
@@ -93,6 +96,8 @@ class Strand:
         self, size: float, duration: float, variance: Float[np.ndarray, "all_numbers"]
     ) -> Float[np.ndarray, "number number"]:
         """Covariance of the residuals in units of the noise: independent noise plus straying of a size."""
+        if not size:
+            return np.diag(variance[self.places])
         numbers = len(self.places) // len(self.times)
         paths = straying(self.times, self.release, duration)
         if numbers > 1:

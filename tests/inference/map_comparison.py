@@ -75,8 +75,10 @@ def compare(truth: Truth, fit: MapFit) -> Comparison:
 def full_likelihood(fit: MapFit) -> Likelihood:
     """The fit's likelihood with the motion and the matter of every body among the unknowns."""
     bodies = frozenset(range(len(fit.likelihood.tracks.bodies)))
-    coordinates = unknowns(fit.likelihood.tracks, fit.likelihood.model, Structure(bodies, bodies))
-    return replace(fit.likelihood, coordinates=coordinates)
+    fitted = fit.likelihood
+    structure = Structure(bodies, bodies)
+    coordinates = unknowns(fitted.tracks, fitted.model, structure, fitted.noise, model_error=fitted.model_error)
+    return replace(fitted, coordinates=coordinates)
 
 
 def lift(fit: MapFit, everything: Likelihood) -> np.ndarray:

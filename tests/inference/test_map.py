@@ -4,14 +4,22 @@ from functools import cache
 
 import numpy as np
 import pytest
+import torch
 
+from tests.inference.generator import states
 from tests.inference.map_comparison import Comparison, compare
-from tests.inference.random_scenes import random_truth
+from tests.inference.prior_scenes import prior_scene
+from tests.inference.random_scenes import Truth, random_truth
 from vrdp_prob.inference import default_model
+from vrdp_prob.inference.encounters import CROWDED, crowded
+from vrdp_prob.inference.events import courses
 from vrdp_prob.inference.hypothesis import distances, yaw_places
 from vrdp_prob.inference.map_fit import MapFit, fit_map
 from vrdp_prob.inference.mode_search import ModeSearch
 from vrdp_prob.inference.plan import CURRICULUM, GROWING, FitPlan, Optimiser
+from vrdp_prob.models.likelihood import Likelihood
+from vrdp_prob.models.simulator.events import RolloutEventKind
+from vrdp_prob.models.unknowns import Structure, unknowns
 
 SCENES, GOAL = 300, 0.99
 TOLERANCE = 3 * np.sqrt(GOAL * (1 - GOAL) / SCENES)
@@ -30,6 +38,7 @@ def fitted(seed: int, plan: FitPlan | None = None) -> tuple[MapFit, Comparison]:
     [
         pytest.param(4, id="one contact of spheres or cylinders"),
         pytest.param(13, id="two cubes, one hit"),
+        pytest.param(16, id="a hit that hardly moves a heavy body at rest"),
     ],
 )
 def test_the_map_is_as_probable_as_the_truth(seed: int) -> None:
@@ -46,6 +55,35 @@ def test_alternatives_find_a_contact_that_one_start_misses() -> None:
     assert greedy.cause == "collisions missed 0-1"
     _, comparison = fitted(1)
     assert comparison.succeeded
+
+
+def test_a_contact_before_the_second_frame_is_found() -> None:
+    scene = prior_scene(125)
+    assert scene is not None
+    times = scene.tracks.times
+    assert [time < times[1] for time, *_ in scene.scene.contacts] == [True, False]
+    true = states(scene.scene, times)
+    truth = Truth(scene.scene, scene.tracks, true, scene.noise, scene.shared, scene.friction_ratio)
+    comparison = compare(truth, fit_map(truth.tracks, default_model(), np.random.default_rng(0)))
+    assert comparison.succeeded, comparison.cause
+    assert comparison.fitted_pairs == ((1, 2), (0, 2))
+
+
+def test_contacts_in_quick_succession_are_crowded() -> None:
+    bounces = [(0.1 * k, 0, 1) for k in range(CROWDED)]
+    assert crowded(bounces)
+    assert not crowded(bounces[1:])
+    assert not crowded([(10 * time, *pair) for time, *pair in bounces])
+    assert not crowded([(0.1 * k, 2 * k, 2 * k + 1) for k in range(CROWDED)])
+
+
+def test_a_course_counts_a_pair_that_bounces_on_the_spot_twice() -> None:
+    truth, model, bodies = random_truth(144), default_model(), frozenset(range(4))
+    likelihood = Likelihood(truth.tracks, model, unknowns(truth.tracks, model, Structure(bodies, bodies)))
+    with torch.no_grad():
+        rollout = likelihood.rollout(torch.from_numpy(truth.point(likelihood)[None]))
+    assert len(rollout.events.of_kind(RolloutEventKind.COLLISION).time) > 4
+    assert courses(rollout) == [((0, 2), (1, 2), (0, 1), (0, 1))]
 
 
 def test_lbfgs_reaches_the_same_maximum_in_stages() -> None:

@@ -6,26 +6,33 @@ the best and most different of those in all.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
+import torch
 from jaxtyping import Bool, Float
 
 from vrdp_prob.inference.descent import Descent
+from vrdp_prob.inference.events import Pairs, courses
 from vrdp_prob.inference.free_flight import SeenContact
 from vrdp_prob.inference.hypothesis import QUARTER, Hypothesis, distances, owned, yaw_places
 from vrdp_prob.inference.least_squares import Minimum, robust_cost
+from vrdp_prob.inference.release_contact import strike_before
 from vrdp_prob.inference.samples import Gaussian
 from vrdp_prob.models.likelihood import Likelihood
 
 DRAWS = (96, 256)
 """Worlds drawn where at most one yaw is open, and where more are."""
-SPREADS = (0.0, 0.5, 1.0, 2.0, 4.0)
+FEW_DRAWS = 64
+"""...and where nothing is puzzling."""
+SPREADS = (0.1, 0.5, 1.0, 2.0, 4.0)
 """States are drawn from the Gaussian of the fit so far, wider by these factors."""
 WIDEST = 2.0
 """...but no coordinate wanders further than so many prior standard deviations."""
 FIRST_REFINED, FIRST_ITERATIONS = 10, 3
 """Draws that are refined in the coordinates of the bodies that meet, and in how many steps."""
+OTHER_COURSES = 5
+"""...of which so many are the best of other courses of events."""
 THEN_REFINED, THEN_ITERATIONS = 4, 5
 """Results that are refined in all coordinates."""
 HOPELESS = 40.0
@@ -48,12 +55,18 @@ class Encounter:
         What local fits say about contacts among them.
     first_contact
         Time (s) of the first contact that each body is known to have had, where it has met something before.
+    puzzling
+        Whether a yaw is open or what followed is not explained; where not, only other courses of events are tried.
+    at_release
+        Pairs that may have met before their motion was seen.
     """
 
     bodies: frozenset[int]
     begin: float
-    contacts: tuple[SeenContact, ...]
-    first_contact: dict[int, float]
+    contacts: tuple[SeenContact, ...] = ()
+    first_contact: dict[int, float] = field(default_factory=dict)
+    puzzling: bool = False
+    at_release: tuple[tuple[int, int], ...] = ()
 
 
 def alternatives(
@@ -71,10 +84,16 @@ def alternatives(
     local = owned(likelihood.coordinates, encounter.bodies) & active
     yaws = [place for place in yaw_places(likelihood, encounter.bodies) if active[place]]
     drawn = _drawn(likelihood, hypothesis, encounter, np.flatnonzero(local), generator)
-    order = np.argsort(robust_cost(likelihood.residuals(drawn, frame_count), threshold))
-    starts = drawn[_spread(drawn[order], yaws, FIRST_REFINED, order)]
+    drawn = drawn[np.argsort(robust_cost(likelihood.residuals(drawn, frame_count), threshold))]
+    with torch.no_grad():
+        found = courses(likelihood.rollout(torch.from_numpy(np.stack([hypothesis.point, *drawn])), frame_count))
+    chosen = _spread(drawn, yaws, found[1:]) if encounter.puzzling else _other_courses(found)
+    if not chosen:
+        return []
+    starts = drawn[chosen]
     first = descent(starts, local, frame_count=frame_count, iterations=FIRST_ITERATIONS, threshold=threshold)
-    kept = _different(likelihood, first, frame_count)
+    hopeless = HOPELESS if encounter.puzzling else HOPELESS / 2
+    kept = _different(likelihood, [one for one in first if one.cost < hypothesis.cost + hopeless], frame_count)
     if not kept:
         return []
     return descent(
@@ -97,7 +116,7 @@ def _drawn(
     """Worlds in which the bodies of an encounter have other states, half of them from before the encounter."""
     coordinates = likelihood.coordinates
     yaws = [place for place in yaw_places(likelihood, encounter.bodies) if place in places]
-    count = DRAWS[len(yaws) > 1]
+    count = DRAWS[len(yaws) > 1] if encounter.puzzling else FEW_DRAWS
     draws = np.tile(hypothesis.point, (count, 1))
     spreads = np.resize(np.repeat(SPREADS, 2), count)[:, None]
     widest = WIDEST * coordinates.prior_sd[places]
@@ -110,6 +129,8 @@ def _drawn(
     for contact in encounter.contacts:
         suggest(draws[::3], contact, likelihood, 1 / np.diag(hypothesis.precision))
     _turn(draws, likelihood, encounter, yaws, generator)
+    for pair in encounter.at_release:
+        strike_before(draws[1::2], pair, likelihood, generator)
     return draws
 
 
@@ -146,11 +167,11 @@ def suggest(
     variance: Float[np.ndarray, "dimension"],
 ) -> None:
     """Move masses and restitutions towards what momentum balance says of a contact, in place."""
-    for field, sign, target in (
+    for name, sign, target in (
         ("mass", -1.0, np.log(contact.mass_ratio)),
         ("restitution", 1.0, np.log(contact.restitution)),
     ):
-        first, second = (likelihood.coordinates.places.get((field, body)) for body in (contact.first, contact.second))
+        first, second = (likelihood.coordinates.places.get((name, body)) for body in (contact.first, contact.second))
         if first is None or second is None:
             continue
         missing = target - (draws[:, first] + sign * draws[:, second])
@@ -160,21 +181,30 @@ def suggest(
 
 
 def _spread(
-    ordered: Float[np.ndarray, "draw dimension"], yaws: Sequence[int], count: int, order: np.ndarray
+    ordered: Float[np.ndarray, "draw dimension"], yaws: Sequence[int], drawn_courses: Sequence[Pairs]
 ) -> list[int]:
-    """Indices of the best draws whose yaws differ."""
-    chosen: list[int] = []
-    for rank in range(len(ordered)):
-        if all(_apart(ordered[rank], ordered[other], yaws) for other in chosen):
-            chosen.append(rank)
-        if len(chosen) == count:
-            break
-    return [int(order[rank]) for rank in chosen]
+    """Indices of draws to refine: the best whose yaws differ, the best of every other course of events, then the next.
+
+    The draw that leaves all as it is bends to what it does not explain, and so is better than any draw in which what
+    really happened does, before these are refined; what differs from it in its events must not compete with it.
+    """
+    by_yaw: list[int] = []
+    for rank in range(len(ordered) if yaws else 1):
+        if all(_apart(ordered[rank], ordered[other], yaws) for other in by_yaw):
+            by_yaw.append(rank)
+    by_course = [drawn_courses.index(course) for course in dict.fromkeys(drawn_courses)]
+    rest = range(len(ordered))
+    chosen = dict.fromkeys([*by_yaw[: FIRST_REFINED - OTHER_COURSES], *by_course[:OTHER_COURSES], *by_yaw, *rest])
+    return list(chosen)[:FIRST_REFINED]
+
+
+def _other_courses(found: Sequence[Pairs]) -> list[int]:
+    """Indices of the best draws of courses of events other than the first one, which is that of the explanation."""
+    own, drawn = found[0], found[1:]
+    return [drawn.index(course) for course in dict.fromkeys(drawn) if course != own][:OTHER_COURSES]
 
 
 def _apart(first: Float[np.ndarray, "dimension"], second: Float[np.ndarray, "dimension"], yaws: Sequence[int]) -> bool:
-    if not yaws:
-        return True
     turn = first[list(yaws)] - second[list(yaws)]
     return bool((np.abs(turn - QUARTER * np.round(turn / QUARTER)) > DIFFERENT).any())
 

@@ -14,12 +14,16 @@ from vrdp_prob.models.simulator.events import RolloutEventKind
 
 SETTLED = 0.4
 """Time (s) after a contact at which other explanations of it are tried."""
-SUSPICIOUS = 3.0
+SUSPICIOUS = 2.0
 """The motion of a body needs another explanation if its squared residuals exceed their number by so many sd."""
 LOOK = 2 * SETTLED
 """Time (s) over which they are added up."""
 LATEST = 3 * SETTLED
 """Time (s) after which a motion that is not explained is no longer put down to an approach."""
+CROWDED = 4
+"""So many contacts of one body in the time after which explanations are tried make any explanation doubtful."""
+UNSEEN = 2
+"""Frames before an approach from which on the velocities before it are known."""
 MOST_TRIED = 2
 """Times that an approach is looked at."""
 
@@ -51,24 +55,26 @@ class EncounterFinder:
         ready = [one for one in self._clues.approaches if one.time <= latest and self._tried.get(one, 0) < MOST_TRIED]
         if not ready:
             return []
-        contacts = _contacts(self._likelihood, hypothesis, frame_count)
+        contacts = contacts_in(self._likelihood, hypothesis, frame_count)
         suspects = _suspects(self._likelihood, hypothesis, frame_count)
         met = {(i, j) for _, i, j in contacts} | {(seen.first, seen.second) for seen in self._clues.contacts}
-        chosen = []
+        chosen, puzzling = [], set()
         for one in ready:
             pair, fresh = (one.first, one.second), one not in self._tried
             open_yaw = pair in met and any(place not in self._turned for place in yaw_places(self._likelihood, pair))
-            odd = bool(suspects & set(pair))
-            if (fresh and open_yaw) or (odd and now - one.time < LATEST):
+            odd = bool(suspects & set(pair)) and now - one.time < LATEST
+            if fresh or odd:
                 chosen.append(one)
-            elif fresh and not odd and now - one.time > LOOK:
-                self._tried[one] = 1
+            if (fresh and open_yaw) or odd:
+                puzzling.add(one)
         for one in chosen:
             self._tried[one] = self._tried.get(one, 0) + 1
+        for one in puzzling:
             self._turned.update(yaw_places(self._likelihood, (one.first, one.second)))
-        return [self._encounter(group, contacts) for group in _groups(chosen)]
+        groups = _groups(chosen)
+        return [self._encounter(group, contacts, puzzling=bool(puzzling & set(group))) for group in groups]
 
-    def _encounter(self, group: Sequence[Approach], contacts: Sequence[Contact]) -> Encounter:
+    def _encounter(self, group: Sequence[Approach], contacts: Sequence[Contact], *, puzzling: bool) -> Encounter:
         bodies = frozenset(body for one in group for body in (one.first, one.second))
         pairs = {(one.first, one.second) for one in group}
         begin = min(one.time for one in group)
@@ -82,10 +88,25 @@ class EncounterFinder:
             for body in {i, j} & bodies:
                 if time < begin - SETTLED / 2:
                     first.setdefault(body, time)
-        return Encounter(bodies, begin, seen, first)
+        return Encounter(bodies, begin, seen, first, puzzling, self._at_release(pairs, begin))
+
+    def _at_release(self, pairs: set[tuple[int, int]], begin: float) -> tuple[tuple[int, int], ...]:
+        """Pairs that meet so soon that hardly a frame shows how they came."""
+        tracks = self._likelihood.tracks
+        seen = [int((tracks.seen[:, [*pair]].all(axis=1) & (tracks.times <= begin)).sum()) for pair in sorted(pairs)]
+        return tuple(pair for pair, frames in zip(sorted(pairs), seen, strict=True) if frames <= UNSEEN)
 
 
-def _contacts(likelihood: Likelihood, hypothesis: Hypothesis, frame_count: int) -> list[Contact]:
+def crowded(contacts: Sequence[Contact]) -> bool:
+    """Whether a body has so many contacts in quick succession that their number and order are hard to find."""
+    for body in {one for contact in contacts for one in contact[1:]}:
+        times = np.array([time for time, *pair in contacts if body in pair])
+        if (times[CROWDED - 1 :] - times[: len(times) - CROWDED + 1] < SETTLED).any():
+            return True
+    return False
+
+
+def contacts_in(likelihood: Likelihood, hypothesis: Hypothesis, frame_count: int) -> list[Contact]:
     """Contacts of bodies in an explanation, in order."""
     with torch.no_grad():
         rollout = likelihood.rollout(torch.from_numpy(hypothesis.point[None]), frame_count)

@@ -24,3 +24,16 @@ def wall_contacts(rollout: Rollout, world: int) -> Pairs:
     """Pairs of a body and a wall that meet in a world."""
     events = rollout.events.of_world(world).of_kind(RolloutEventKind.WALL)
     return tuple(sorted(set(zip(events.first.tolist(), events.second.tolist(), strict=True))))
+
+
+def courses(rollout: Rollout) -> list[Pairs]:
+    """For every world its contacts in order; of a pair that meets again and again without others only the first two.
+
+    Within one course the world changes smoothly with the unknowns; descents do not find their way from one to another.
+    """
+    found: list[list[tuple[int, int]]] = [[] for _ in range(len(rollout.outcome))]
+    events = rollout.events.of_kind(RolloutEventKind.COLLISION)
+    for world, first, second in zip(events.world.tolist(), events.first.tolist(), events.second.tolist(), strict=True):
+        if found[world][-2:] != [(first, second)] * 2:
+            found[world].append((first, second))
+    return [tuple(pairs) for pairs in found]

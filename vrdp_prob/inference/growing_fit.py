@@ -12,10 +12,10 @@ import numpy as np
 import torch
 from jaxtyping import Bool, Float
 
-from vrdp_prob.inference.alternatives import alternatives, suggest
+from vrdp_prob.inference.alternatives import Encounter, alternatives, suggest
 from vrdp_prob.inference.clues import Clues
 from vrdp_prob.inference.descent import Descent
-from vrdp_prob.inference.encounters import EncounterFinder
+from vrdp_prob.inference.encounters import EncounterFinder, contacts_in, crowded
 from vrdp_prob.inference.events import first_contacts
 from vrdp_prob.inference.hypothesis import Hypothesis, distances, turned_least, yaw_places
 from vrdp_prob.inference.least_squares import Minimum, robust_cost
@@ -55,7 +55,8 @@ CONTACT_FIELDS = ("angle", "mass", "restitution")
 class GrowingFit:
     """Explanations of the first frames, the best one first.
 
-    `doubtful` says whether several cubes with open yaws met, where the search may well have gone astray.
+    `doubtful` says whether several cubes with open yaws met, or contacts follow on each other quickly, where the
+    search may well have gone astray.
 
     Parameters
     ----------
@@ -127,22 +128,21 @@ class GrowingFit:
         self._keep([self._followed(one, frame_count, previous) for one in self.hypotheses], frame_count)
         if not self._plan.alternatives:
             return
+        for encounter in self._finder.due(self.hypotheses[0], frame_count):
+            self.doubtful |= encounter.puzzling and len(yaw_places(self.likelihood, encounter.bodies)) > 1
+            self._explain_otherwise(encounter, frame_count)
+        if frame_count == len(self.likelihood.tracks.times):
+            self.doubtful |= crowded(contacts_in(self.likelihood, self.hypotheses[0], frame_count))
+
+    def _explain_otherwise(self, encounter: Encounter, frame_count: int) -> None:
+        """Look for other explanations of an encounter, beside the best one so far."""
         best = self.hypotheses[0]
-        for encounter in self._finder.due(best, frame_count):
-            self.doubtful |= len(yaw_places(self.likelihood, encounter.bodies)) > 1
-            active = self._active(frame_count, encounter.bodies)
-            found = alternatives(
-                self._descent,
-                best,
-                encounter,
-                frame_count,
-                active,
-                threshold=HUBER,
-                generator=self._generator,
-            )
-            self.evaluations += sum(one.evaluations for one in found)
-            others = [self._refined(best, one, active, frame_count) for one in found]
-            self._keep([*self.hypotheses, *others], frame_count)
+        active = self._active(frame_count, encounter.bodies)
+        found = alternatives(
+            self._descent, best, encounter, frame_count, active, threshold=HUBER, generator=self._generator
+        )
+        self.evaluations += sum(one.evaluations for one in found)
+        self._keep([*self.hypotheses, *(self._refined(best, one, active, frame_count) for one in found)], frame_count)
 
     def _keep(self, hypotheses: Sequence[Hypothesis], frame_count: int) -> None:
         """Keep the best explanations that differ, with their yaws near zero."""

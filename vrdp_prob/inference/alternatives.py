@@ -6,7 +6,7 @@ the best and most different of those in all.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 import torch
@@ -63,10 +63,10 @@ class Encounter:
 
     bodies: frozenset[int]
     begin: float
-    contacts: tuple[SeenContact, ...] = ()
-    first_contact: dict[int, float] = field(default_factory=dict)
-    puzzling: bool = False
-    at_release: tuple[tuple[int, int], ...] = ()
+    contacts: tuple[SeenContact, ...]
+    first_contact: dict[int, float]
+    puzzling: bool
+    at_release: tuple[tuple[int, int], ...]
 
 
 def alternatives(

@@ -2,59 +2,93 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import count, islice
 
 import numpy as np
+from _clock import processor_seconds
 from arviz_stats.base.array import array_stats
 
-from tests.inference.generator import observe, random_scene
+from tests.inference.prior_scenes import prior_scene
 from vrdp_prob.inference import SAMPLERS, default_model
 from vrdp_prob.inference.diagnostics import Reported
 from vrdp_prob.inference.map_fit import MapFit, fit_map
+from vrdp_prob.inference.mixture import Mixture
 from vrdp_prob.inference.proposals import proposals
-from vrdp_prob.inference.samples import Samples, assess
+from vrdp_prob.inference.samples import Convergence, Samples, assess
+from vrdp_prob.inference.straightening import Rates
 
-DRAWS = 2000
+DRAWS = 1000
 SEEDS = {"emcee": 11, "nuts": 12, "laplace": 13}
+ALONE = {"laplace": {"hand_on": False}}
+"""Options by which a sampler is compared as itself."""
 
 
 @dataclass(frozen=True)
 class Compared:
     """A quantity of a scene by two samplers: the difference of their means, or sds, over its standard error."""
 
-    scene: int
     quantity: str
     what: str
     samplers: tuple[str, str]
     difference: float
 
 
-def agreement(count: int, *, most_gradients: int | None = None) -> Iterator[tuple[int, dict[str, str], list[Compared]]]:
-    """For each of some synthetic scenes what every sampler says of itself, and all comparisons of pairs of them."""
-    for seed in range(count):
-        fit = _fit(seed)
-        reported = Reported.of(fit.likelihood.coordinates, fit.contacts)
-        moments, verdicts = {}, {}
+@dataclass(frozen=True)
+class SceneAgreement:
+    """What the samplers say of one scene.
+
+    Parameters
+    ----------
+    seed
+        The scene.
+    verdicts
+        What every sampler says of itself.
+    seconds
+        Processor time of each.
+    compared
+        All comparisons of pairs of those that say that they have converged.
+    """
+
+    seed: int
+    verdicts: dict[str, Convergence]
+    seconds: dict[str, float]
+    compared: tuple[Compared, ...]
+
+
+def agreement(scenes: int) -> Iterator[SceneAgreement]:
+    """What every sampler says of the first scenes from the prior (2 or 3 bodies, cubes among them)."""
+    accepted = ((seed, scene) for seed in count() if (scene := prior_scene(seed)) is not None)
+    for seed, scene in islice(accepted, scenes):
+        fit = fit_map(scene.tracks, default_model(), np.random.default_rng(seed))
+        reported, start = Reported.of(fit.likelihood.coordinates, fit.contacts), start_of(fit)
+        moments, verdicts, seconds = {}, {}, {}
         for name, sampler in SAMPLERS.items():
-            options = {"most_gradients": most_gradients} if name == "nuts" and most_gradients else {}
+            begin = processor_seconds()
             samples = sampler(
                 fit.likelihood.log_density,
-                proposals(fit.modes, fit.likelihood.residuals),
+                start,
                 draws=DRAWS,
-                generator=np.random.default_rng(SEEDS[name]),
+                generator=np.random.default_rng([seed, SEEDS[name]]),
                 reported=reported,
-                **options,
+                **ALONE.get(name, {}),
             )
-            moments[name] = _moments(samples, reported)
-            verdicts[name] = assess(name, samples, reported).sentence
-        yield seed, verdicts, list(_comparisons(seed, reported.names, moments))
+            seconds[name] = processor_seconds() - begin
+            verdicts[name] = assess(name, samples, reported)
+            if verdicts[name].converged:
+                moments[name] = _moments(samples, reported)
+        yield SceneAgreement(seed, verdicts, seconds, tuple(_comparisons(reported.names, moments)))
 
 
-def _fit(seed: int) -> MapFit:
-    scene = random_scene(np.random.default_rng(500 + seed), bodies=3 + seed % 2, squares=False)
-    return fit_map(observe(scene, noise=0.01, dropout=0.03, seed=seed), default_model(), np.random.default_rng(seed))
+def start_of(fit: MapFit) -> Mixture:
+    """What the samplers set out from."""
+    rates = Rates.of(fit.likelihood.tracks, fit.likelihood.coordinates)
+    return proposals(fit.modes, fit.likelihood.residuals, rates)
 
 
-def _moments(samples: Samples, reported: Reported) -> dict[str, tuple[np.ndarray, np.ndarray]]:
+Moments = dict[str, tuple[np.ndarray, np.ndarray]]
+
+
+def _moments(samples: Samples, reported: Reported) -> Moments:
     """Mean and sd of every quantity, each with its standard error."""
     values = reported.values(samples.points)
     flat = values.reshape(-1, values.shape[-1])
@@ -70,13 +104,11 @@ def _moments(samples: Samples, reported: Reported) -> dict[str, tuple[np.ndarray
     }
 
 
-def _comparisons(
-    scene: int, names: Sequence[str], moments: dict[str, dict[str, tuple[np.ndarray, np.ndarray]]]
-) -> Iterator[Compared]:
+def _comparisons(names: Sequence[str], moments: dict[str, Moments]) -> Iterator[Compared]:
     samplers = list(moments)
     for index, first in enumerate(samplers):
         for second in samplers[index + 1 :]:
             for what in ("mean", "sd"):
                 (one, error), (other, other_error) = moments[first][what], moments[second][what]
                 for name, difference in zip(names, (one - other) / np.hypot(error, other_error), strict=True):
-                    yield Compared(scene, name, what, (first, second), float(difference))
+                    yield Compared(name, what, (first, second), float(difference))

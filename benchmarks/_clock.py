@@ -1,6 +1,7 @@
 """Processor times of functions that are measured side by side."""
 
 import math
+import resource
 import time
 from collections.abc import Callable, Mapping
 
@@ -16,6 +17,12 @@ def seconds(function: Callable[[], object]) -> float:
     start = time.process_time()
     function()
     return time.process_time() - start
+
+
+def processor_seconds() -> float:
+    """Processor time of this process and of those it started that have ended."""
+    children = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return time.process_time() + children.ru_utime + children.ru_stime
 
 
 def interleaved(functions: Mapping[str, Callable[[], object]], budget: float) -> dict[str, float]:

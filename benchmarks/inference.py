@@ -13,9 +13,7 @@ reported quantities between samplers, on synthetic scenes of an integrator that 
 
 import argparse
 import json
-import resource
 import sys
-import time
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -24,7 +22,8 @@ import torch
 
 sys.path.insert(0, str(Path(__file__).parents[1]))  # the scenes of the tests
 
-from _agreement import Compared, agreement
+from _agreement import Compared, agreement, start_of
+from _clock import processor_seconds
 from _fixed_step_posterior import FixedStepPosterior
 
 from tests.inference.generator import observe, random_scene
@@ -33,7 +32,6 @@ from vrdp_prob.inference import SAMPLERS, default_model
 from vrdp_prob.inference.diagnostics import Reported
 from vrdp_prob.inference.map_fit import fit_map
 from vrdp_prob.inference.nuts_chain import Task, make
-from vrdp_prob.inference.proposals import proposals
 from vrdp_prob.inference.samples import ESS_GOAL, assess
 from vrdp_prob.models.physics import PhysicsModel
 from vrdp_prob.models.simulator.rollout import compile_model
@@ -79,12 +77,6 @@ def check(title: str, value: float | str | None, goal: float | str, *, met: bool
     return {"name": title, "value": value, "goal": goal, "ok": met}
 
 
-def processor_seconds() -> float:
-    """Processor time of this process and of those it started that have ended."""
-    children = resource.getrusage(resource.RUSAGE_CHILDREN)
-    return time.process_time() + children.ru_utime + children.ru_stime
-
-
 def samplers(videos: Sequence[Tracks], names: Sequence[str]) -> list[Check]:
     """Run every sampler from the same modes."""
     results: dict[str, list[tuple[float, float]]] = {key: [] for key in names}
@@ -96,7 +88,7 @@ def samplers(videos: Sequence[Tracks], names: Sequence[str]) -> list[Check]:
             begin = processor_seconds()
             samples = SAMPLERS[key](
                 fit.likelihood.log_density,
-                proposals(fit.modes, fit.likelihood.residuals),
+                start_of(fit),
                 draws=DRAWS,
                 generator=np.random.default_rng(1),
                 reported=reported,
@@ -133,8 +125,7 @@ def peer(most_gradients: int) -> list[Check]:
     """Pyro's NUTS on our simulator and on the fixed-step one, for the same tracks of three discs."""
     scene = random_scene(np.random.default_rng(500), bodies=3, squares=False)
     fit = fit_map(observe(scene, noise=0.01, seed=0), PhysicsModel.base(), np.random.default_rng(0))
-    reported = Reported.of(fit.likelihood.coordinates, fit.contacts)
-    start = proposals(fit.modes, fit.likelihood.residuals)
+    reported, start = Reported.of(fit.likelihood.coordinates, fit.contacts), start_of(fit)
     begin = processor_seconds()
     generator = np.random.default_rng(1)
     samples = SAMPLERS["nuts"](
@@ -144,9 +135,8 @@ def peer(most_gradients: int) -> list[Check]:
     found = assess("nuts", samples, reported)
     effective = min(found.ess_bulk or 0.0, found.ess_tail or 0.0)
     needed = samples.gradients * ESS_GOAL / max(effective, 1.0)
-    task = Task(
-        FixedStepPosterior(fit.likelihood), start.components[0], np.zeros(len(fit.point)), 0.3, transitions=1, seed=0
-    )
+    slow, place = FixedStepPosterior(fit.likelihood), np.zeros((1, len(fit.point)))
+    task = Task(slow, start.components[0], place, np.array([0.3]), transitions=1, seeds=(0,))
     begin, gradients = processor_seconds(), 0
     while gradients < most_gradients:
         piece = make(task)
@@ -162,15 +152,24 @@ def peer(most_gradients: int) -> list[Check]:
 def agree(count: int) -> list[Check]:
     """Compare the samplers' means and standard deviations of every quantity."""
     every: list[Compared] = []
-    print("scene  compared  beyond 3  largest  samplers")
-    for seed, verdicts, compared in agreement(count):
-        every += compared
-        sizes = np.abs([one.difference for one in compared])
-        print(f"{seed:5d}  {len(sizes):8d}  {int((sizes > FAR).sum()):8d}  {sizes.max():7.2f}", flush=True)
-        for verdict in verdicts.values():
-            print(f"       {verdict}")
-        for one in (one for one in compared if abs(one.difference) > FAR):
+    converged: dict[str, int] = dict.fromkeys(SAMPLERS, 0)
+    print("scene  " + "  ".join(f"{name:>13s}" for name in SAMPLERS) + "  compared  beyond 3  largest")
+    for scene in agreement(count):
+        every += scene.compared
+        sizes = np.abs([one.difference for one in scene.compared] or [0.0])
+        said = []
+        for name, verdict in scene.verdicts.items():
+            converged[name] += verdict.converged
+            said.append(f"{scene.seconds[name]:7.1f} s {'good ' if verdict.converged else 'poor '}")
+        beyond = int((sizes > FAR).sum())
+        print(
+            f"{scene.seed:5d}  {'  '.join(said)}  {len(scene.compared):8d}  {beyond:8d}  {sizes.max():7.2f}", flush=True
+        )
+        for verdict in (verdict for verdict in scene.verdicts.values() if not verdict.converged):
+            print(f"       {verdict.sentence}")
+        for one in (one for one in scene.compared if abs(one.difference) > FAR):
             print(f"       {one.what} of {one.quantity}, {' and '.join(one.samplers)}: {one.difference:.1f}")
+    print("say that they have converged: " + ", ".join(f"{name} {number}" for name, number in converged.items()))
     sizes = np.abs([one.difference for one in every])
     share, largest = float((sizes > FAR).mean()), float(sizes.max())
     print(f"all: {len(sizes)} compared, {100 * share:.2f} % beyond {FAR:g} standard errors, largest {largest:.2f}")

@@ -23,7 +23,7 @@ FACTS = {"seed": "3"}
 ROOT = Path(__file__).parents[2]
 PATIENCE = 120.0
 """Seconds."""
-ENOUGH = {"emcee": "ensemble_3.h5", "nuts": "chain_0_1_piece_1.npz"}
+ENOUGH = {"emcee": "ensemble_3.h5", "nuts": "mode_0_group_1_piece_1.npz"}
 """File that is there when a run is about half way."""
 
 

@@ -63,6 +63,25 @@ def test_weights_tell_what_draws_are_worth() -> None:
     assert spoiled.ess_tail < 300
 
 
+def test_tails_of_weighted_draws_are_those_of_what_they_stand_for() -> None:
+    draws = np.random.default_rng(3).standard_normal(40_000)
+    weights = np.exp(1.5 * draws)  # those of a standard normal density around 1.5
+    weights /= weights.sum()
+    expected = []
+    for edge in 1.5 + np.array([-1.645, 1.645]):
+        squares = ((draws <= edge) - weights @ (draws <= edge)) ** 2
+        expected.append((weights @ squares) / (weights**2 @ squares))
+    assert weighted_statistics(draws[:, None], weights).ess_tail == pytest.approx(min(expected), rel=0.1)
+
+
+def test_a_few_transitions_that_end_at_a_cliff_do_no_harm() -> None:
+    draws = np.random.default_rng(4).standard_normal((4, 500, 1))
+    few, many = (assess("nuts", Samples(draws, np.zeros((4, 500)), divergences=count)) for count in (20, 21))
+    assert few.converged
+    assert not many.converged
+    assert "21 divergences" in many.sentence
+
+
 def test_what_is_reported_of_a_video_holds_its_ratios_and_products() -> None:
     bodies = tuple(Body(str(body), Shape.SPHERE, 0.2, mass=1.5 if body == 2 else None) for body in range(3))
     positions = np.random.default_rng(0).standard_normal((5, 3, 2))

@@ -9,7 +9,7 @@ from vrdp_prob.inference.curved_gaussian import CurvedGaussian
 from vrdp_prob.inference.emcee_sampler import sample_emcee
 from vrdp_prob.inference.laplace import sample_laplace
 from vrdp_prob.inference.mixture import Mixture
-from vrdp_prob.inference.nuts_sampler import sample_nuts
+from vrdp_prob.inference.nuts_sampler import CHAINS, CHUNK, RESULTS, sample_nuts
 from vrdp_prob.inference.samples import Gaussian, Samples, assess
 
 SAMPLERS = {"emcee": sample_emcee, "nuts": sample_nuts, "laplace": sample_laplace}
@@ -95,4 +95,4 @@ def test_a_density_that_cannot_be_sent_is_sampled_here() -> None:
         return target(points)
 
     samples = sample_nuts(within, start, generator=np.random.default_rng(3), **options)
-    assert samples.points.shape == (4, 50, 2)
+    assert samples.points.shape == (RESULTS, CHAINS // RESULTS * CHUNK, 2)

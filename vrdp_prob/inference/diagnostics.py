@@ -94,6 +94,19 @@ def chain_statistics(draws: Float[np.ndarray, "chain draw dimension"], reported:
     return _worst(shown.names, r_hat, bulk, tail)
 
 
+def joined(draws: Float[np.ndarray, "group chain draw axis"]) -> Float[np.ndarray, "group several axis"]:
+    """Each group of chains as one, chain after chain, so that autocorrelation within a chain shows.
+
+    R-hat of many short chains is large by chance alone: about 100 effective draws of each are needed for 1.01.
+    """
+    return draws.reshape(len(draws), -1, draws.shape[-1])
+
+
+def drift(draws: Float[np.ndarray, "group chain draw axis"], reported: Reported | None = None) -> float:
+    """Largest R-hat of groups of chains, each group split into its earlier and its later draws."""
+    return chain_statistics(joined(np.swapaxes(draws, 1, 2)), reported).r_hat
+
+
 def weighted_statistics(
     points: Float[np.ndarray, "draw dimension"], weights: Float[np.ndarray, "draw"], reported: Reported | None = None
 ) -> Statistics:
@@ -101,9 +114,9 @@ def weighted_statistics(
     shown = reported or Reported.coordinates(points.shape[-1])
     values = shown.values(points)
     order = np.argsort(values, axis=0)
-    share = np.cumsum(weights[order], axis=0)
+    share, ranked = np.cumsum(weights[order], axis=0), np.take_along_axis(values, order, 0)
     bulk = _effective(values, weights)
-    below = np.stack([np.take_along_axis(values, np.argmax(share >= tail, axis=0)[None], 0) for tail in TAILS])
+    below = np.stack([np.take_along_axis(ranked, np.argmax(share >= tail, axis=0)[None], 0) for tail in TAILS])
     tail = np.min([_effective((values <= edge).astype(float), weights) for edge in below], axis=0)
     return _worst(shown.names, np.ones(len(bulk)), bulk, tail)
 

@@ -17,7 +17,7 @@ import numpy as np
 from jaxtyping import Float
 
 from vrdp_prob.inference.checkpoint import Checkpoint, kept
-from vrdp_prob.inference.diagnostics import Reported, chain_statistics
+from vrdp_prob.inference.diagnostics import Reported, chain_statistics, drift, joined
 from vrdp_prob.inference.emcee_ensemble import Ensemble
 from vrdp_prob.inference.mixture import Mixture
 from vrdp_prob.inference.mode_weights import doubts, weights_from_chains
@@ -28,9 +28,9 @@ from vrdp_prob.progress import Advance, ProgressDisplay, SilentProgress
 
 ENSEMBLES = 4
 FEWEST_WALKERS = 40
-WARM_UP = 16
+WARM_UP = 8
 """Steps that tune the Hamiltonian move and are thrown away."""
-ROUND = 16
+ROUND = 8
 """Steps after which the draws are judged and kept on disk."""
 STEPS_TOGETHER = 2
 """Steps after which the ensembles, one thread each, wait for one another, so that an interruption is soon noticed."""
@@ -101,15 +101,15 @@ def sample_emcee(
     with (progress or SilentProgress()).stage("Sampling (emcee)", total=WARM_UP + most_steps) as advance:
         stopped = _run(ensembles, form.mixture, reported, advance, most_steps=most_steps, work_limit=work_limit)
     points = _points(form.mixture, ensembles)
-    by_walker = _by_walker(points)
+    by_walker = joined(points)
     log_density = np.stack([ensemble.log_density(WARM_UP) for ensemble in ensembles])
     acceptance = [np.full(log_density[0].size, ensemble.acceptance) for ensemble in ensembles]
     modes = weights_from_chains(form.mixture, by_walker)
     return Samples(
         by_walker,
-        _by_walker(log_density[..., None])[..., 0],
+        np.swapaxes(log_density, 1, 2).reshape(len(log_density), -1),
         {"acceptance_rate": np.stack(acceptance)},
-        r_hat=_drift(points, reported),
+        r_hat=drift(points, reported),
         evaluations=form.evaluations + sum(ensemble.evaluations for ensemble in ensembles),
         gradients=form.gradients + sum(ensemble.gradients for ensemble in ensembles),
         work=meter.rows + sum(ensemble.work for ensemble in ensembles),
@@ -146,8 +146,8 @@ def _run(
         while True:
             run_to(end, tune=False)
             points = _points(mixture, ensembles)
-            found = chain_statistics(_by_walker(points), reported)
-            r_hat = max(found.r_hat, _drift(points, reported))
+            found = chain_statistics(joined(points), reported)
+            r_hat = max(found.r_hat, drift(points, reported))
             if r_hat <= R_HAT_GOAL and min(found.ess_bulk, found.ess_tail) >= MARGIN * ESS_GOAL:
                 return ()
             work = sum(ensemble.work for ensemble in ensembles)
@@ -167,15 +167,6 @@ def _kept_form(
     return Shaped.of_arrays(kept(checkpoint, "form", generator, compute), start)
 
 
-def _points(mixture: Mixture, ensembles: list[Ensemble]) -> Float[np.ndarray, "chain step walker dimension"]:
-    return mixture.components[0].points(np.stack([ensemble.chain(WARM_UP) for ensemble in ensembles]))
-
-
-def _by_walker(values: Float[np.ndarray, "chain step walker axis"]) -> Float[np.ndarray, "chain draw axis"]:
-    """Ensembles as chains, walker after walker."""
-    return np.swapaxes(values, 1, 2).reshape(len(values), -1, values.shape[-1])
-
-
-def _drift(points: Float[np.ndarray, "chain step walker dimension"], reported: Reported | None) -> float:
-    """Largest R-hat of the ensembles, each split into its earlier and its later steps."""
-    return chain_statistics(points.reshape(len(points), -1, points.shape[-1]), reported).r_hat
+def _points(mixture: Mixture, ensembles: list[Ensemble]) -> Float[np.ndarray, "ensemble walker step dimension"]:
+    whitened = np.stack([ensemble.chain(WARM_UP) for ensemble in ensembles])
+    return np.swapaxes(mixture.components[0].points(whitened), 1, 2)

@@ -3,6 +3,8 @@
 Source: Vehtari, Simpson, Gelman, Yao and Gabry, Pareto smoothed importance sampling, JMLR 25 (2024).
 """
 
+import os
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,9 +13,12 @@ from jaxtyping import Float, Int
 
 from vrdp_prob.inference.mixture import Mixture
 from vrdp_prob.inference.samples import LogDensity, evaluate
+from vrdp_prob.models.simulator.work import metered, record_work
 from vrdp_prob.progress import Advance
 
 BATCH = 500
+THREADS = 2
+"""Batches that are simulated at once, where there are as many cores."""
 
 
 @dataclass(frozen=True)
@@ -40,11 +45,19 @@ class Weighted:
     ) -> "Weighted":
         """So many points of a mixture."""
         points, _ = proposal.draws(count, generator)
-        log_density = np.empty(count)
-        for begin in range(0, count, BATCH):
-            chosen = slice(begin, min(begin + BATCH, count))
-            log_density[chosen] = evaluate(density, points[chosen])
-            advance(chosen.stop - chosen.start)
+
+        def evaluated(begin: int) -> tuple[Float[np.ndarray, "point"], int]:
+            with metered() as meter:  # the meter of the calling thread is not that of this one
+                values = evaluate(density, points[begin : begin + BATCH])
+            return values, meter.rows
+
+        found = []
+        with ThreadPoolExecutor(min(THREADS, os.cpu_count() or 1)) as threads:
+            for values, rows in threads.map(evaluated, range(0, count, BATCH)):
+                record_work(rows)
+                advance(len(values))
+                found.append(values)
+        log_density = np.concatenate(found)
         return cls(points, log_density, log_density - proposal.log_density(points))
 
     def joined(self, other: "Weighted") -> "Weighted":

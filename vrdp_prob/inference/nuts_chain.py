@@ -1,10 +1,12 @@
-"""Pieces of a NUTS chain, each with a seed of its own, so that a chain can be broken off and gone on with anywhere.
+"""Pieces of several NUTS chains with a seed each, so that they can be broken off and gone on with anywhere.
 
 Source: Hoffman and Gelman, The No-U-Turn Sampler, JMLR 15 (2014); Bingham et al., Pyro, JMLR 20 (2019).
 """
 
 import warnings
 from dataclasses import dataclass
+from functools import partial
+from typing import Any
 
 import numpy as np
 import torch
@@ -13,7 +15,8 @@ from pyro.infer.mcmc import NUTS
 from torch import Tensor
 
 from vrdp_prob.inference.curved_gaussian import CurvedGaussian
-from vrdp_prob.inference.samples import LogDensity
+from vrdp_prob.inference.nuts_lockstep import Ask, in_lockstep
+from vrdp_prob.inference.samples import LogDensity, evaluate_with_gradient
 from vrdp_prob.models.simulator.work import metered
 
 TREE_DEPTH = 6
@@ -24,7 +27,7 @@ OUT_OF_SUPPORT = 1e10
 
 @dataclass(frozen=True)
 class Task:
-    """A piece of a chain that is to be made.
+    """A piece of some chains of one mode that is to be made.
 
     Parameters
     ----------
@@ -32,30 +35,30 @@ class Task:
         The log posterior, differentiable.
     cloud
         Whitens its coordinates.
-    place
-        Whitened coordinates from which the chain goes on.
-    step_size
-        Length of a leapfrog step; None where it is to be found, which uses the transitions up.
+    places
+        Whitened coordinates from which each chain goes on.
+    step_sizes
+        Length of a leapfrog step of each; None where they are to be found, which uses the transitions up.
     transitions
         How many there are to be.
-    seed
-        Seed of the piece.
+    seeds
+        Seed of each chain's piece.
     """
 
     density: LogDensity
     cloud: CurvedGaussian
-    place: Float[np.ndarray, "dimension"]
-    step_size: float | None
+    places: Float[np.ndarray, "chain dimension"]
+    step_sizes: Float[np.ndarray, "chain"] | None
     transitions: int
-    seed: int
+    seeds: tuple[int, ...]
 
 
 @dataclass(frozen=True)
 class Piece:
-    """What a task gave: the places after every transition in whitened coordinates, and what they cost."""
+    """What a task gave: the places after every transition in whitened coordinates, and what they cost together."""
 
-    whitened: Float[np.ndarray, "draw dimension"]
-    step_size: float
+    whitened: Float[np.ndarray, "chain draw dimension"]
+    step_sizes: Float[np.ndarray, "chain"]
     divergences: int
     gradients: int
     work: int
@@ -63,52 +66,78 @@ class Piece:
     def arrays(self) -> dict[str, np.ndarray]:
         """The same as arrays."""
         costs = np.array([self.divergences, self.gradients, self.work])
-        return {"whitened": self.whitened, "step_size": np.array(self.step_size), "costs": costs}
+        return {"whitened": self.whitened, "step_sizes": self.step_sizes, "costs": costs}
 
     @classmethod
     def of_arrays(cls, arrays: dict[str, np.ndarray]) -> "Piece":
         """What `arrays` was made of."""
         divergences, gradients, work = (int(cost) for cost in arrays["costs"])
-        return cls(arrays["whitened"], float(arrays["step_size"]), divergences, gradients, work)
+        return cls(arrays["whitened"], arrays["step_sizes"], divergences, gradients, work)
 
 
-class _Potential:
-    """Negative log density in whitened coordinates, as Pyro wants it; counts its calls."""
+class _Answered(torch.autograd.Function):
+    """A log density that was computed elsewhere, with its gradient."""
 
-    def __init__(self, density: LogDensity, cloud: CurvedGaussian) -> None:
-        self._density, self._cloud = density, cloud
-        self.gradients = 0
+    @staticmethod
+    def forward(ctx: Any, place: Tensor, value: float, gradient: Tensor) -> Tensor:
+        del place
+        ctx.save_for_backward(gradient)
+        return gradient.new_tensor(value)
 
-    def __call__(self, parameters: dict[str, Tensor]) -> Tensor:
-        self.gradients += 1
-        value = -self._density(self._cloud.mapped(parameters["whitened"][None]))[0]
-        if bool(torch.isfinite(value)):
-            return value
-        return OUT_OF_SUPPORT + 0.0 * parameters["whitened"].sum()
+    @staticmethod
+    def backward(ctx: Any, *outer: Tensor) -> tuple[Tensor, None, None]:
+        (gradient,) = ctx.saved_tensors
+        return outer[0] * gradient, None, None
 
 
 def make(task: Task) -> Piece:
-    """Make a piece of a chain."""
-    potential = _Potential(task.density, task.cloud)
-    finding = task.step_size is None
+    """Make a piece of some chains."""
+    gradients = 0
+
+    def density_and_gradient(
+        whitened: Float[np.ndarray, "chain dimension"],
+    ) -> tuple[Float[np.ndarray, "chain"], Float[np.ndarray, "chain dimension"]]:
+        nonlocal gradients
+        gradients += len(whitened)
+        return evaluate_with_gradient(lambda places: task.density(task.cloud.mapped(places)), whitened)
+
+    sizes = [None] * len(task.places) if task.step_sizes is None else [float(size) for size in task.step_sizes]
+    functions = [partial(_run, place, size, task.transitions) for place, size in zip(task.places, sizes, strict=True)]
+    with warnings.catch_warnings(), metered() as meter:
+        warnings.simplefilter("ignore")
+        made = in_lockstep(functions, task.seeds, density_and_gradient)
+    whitened, found, diverged = zip(*made, strict=True)
+    return Piece(np.stack(whitened), np.array(found), sum(diverged), gradients, meter.rows)
+
+
+def _run(
+    place: Float[np.ndarray, "dimension"], step_size: float | None, transitions: int, ask: Ask
+) -> tuple[Float[np.ndarray, "draw dimension"], float, int]:
+    """Places, step size and number of divergences of one chain."""
+    finding = step_size is None
+
+    def potential(parameters: dict[str, Tensor]) -> Tensor:
+        there = parameters["whitened"]
+        value, gradient = ask(there.detach().numpy().copy())
+        # torch's stubs leave `apply` untyped
+        answered: Tensor = _Answered.apply(there, value, torch.from_numpy(gradient))  # type: ignore[no-untyped-call]
+        return -answered if np.isfinite(value) else OUT_OF_SUPPORT + 0.0 * there.sum()
+
     kernel = NUTS(
         potential_fn=potential,
-        step_size=task.step_size or 1.0,
+        step_size=step_size or 1.0,
         adapt_step_size=finding,
         adapt_mass_matrix=False,
         full_mass=False,
         max_tree_depth=TREE_DEPTH,
         target_accept_prob=ACCEPTANCE,
     )
+    parameters = {"whitened": torch.from_numpy(place.copy())}
+    kernel.initial_params = parameters
+    kernel.setup(warmup_steps=transitions if finding else 0)
     places = []
-    with torch.random.fork_rng(devices=[]), warnings.catch_warnings(), metered() as meter:
-        warnings.simplefilter("ignore")
-        torch.manual_seed(task.seed)
-        parameters = {"whitened": torch.from_numpy(task.place.copy())}
-        kernel.initial_params = parameters
-        kernel.setup(warmup_steps=task.transitions if finding else 0)
-        for _ in range(task.transitions):
-            parameters = kernel.sample(parameters)
-            places.append(parameters["whitened"].detach().numpy().copy())
-        diverged = 0 if finding else len(kernel.diagnostics()["divergences"])
-    return Piece(np.array(places), float(kernel.step_size), diverged, potential.gradients, meter.rows)
+    for _ in range(transitions):
+        parameters = kernel.sample(parameters)
+        places.append(parameters["whitened"].detach().numpy().copy())
+    diverged = 0 if finding else len(kernel.diagnostics()["divergences"])
+    return np.array(places), float(kernel.step_size), diverged

@@ -1,7 +1,7 @@
 """Sampling with Pyro's NUTS on the log posterior, whitened: several chains in every mode, weighted by its evidence.
 
 A chain that follows gradients hardly ever finds its way from one mode to another. So each mode has chains of its own,
-and importance sampling says what it weighs.
+and importance sampling says what it weighs. Chains come in groups whose gradients are computed in one batch.
 """
 
 import os
@@ -13,7 +13,7 @@ from jaxtyping import Float
 
 from vrdp_prob.inference.checkpoint import Checkpoint, kept
 from vrdp_prob.inference.curved_gaussian import CurvedGaussian
-from vrdp_prob.inference.diagnostics import Reported, Statistics, chain_statistics
+from vrdp_prob.inference.diagnostics import Reported, chain_statistics, drift, joined
 from vrdp_prob.inference.importance import Weighted, smoothed_weights
 from vrdp_prob.inference.mixture import Mixture
 from vrdp_prob.inference.mode_weights import doubts, weights_from_importance
@@ -32,11 +32,16 @@ from vrdp_prob.inference.shaping import Shaped, shaped, starting_places
 from vrdp_prob.models.simulator.work import metered
 from vrdp_prob.progress import Advance, ProgressDisplay, SilentProgress
 
-CHAINS = 4
-"""Chains per mode."""
-WARM_UP = 60
+GROUPS = 2
+"""Groups of chains per mode, one process each..."""
+TOGETHER = 8
+"""...and chains per group, whose gradients are computed together."""
+CHAINS = GROUPS * TOGETHER
+RESULTS = 4
+"""Chains that are handed back, each of several that are joined."""
+WARM_UP = 30
 """Transitions that only adapt the step size: the mass matrix is the whitening, which other draws have shaped."""
-CHUNK = 50
+CHUNK = 25
 """Transitions per chain after which the draws are judged and kept on disk."""
 MOST_GRADIENTS = 150_000
 """Gradients of all chains after which sampling stops; a minute on two cores of 2020."""
@@ -49,7 +54,7 @@ FEWEST_IN_MODE = 4
 """Draws of every chain that must be in a mode for it to count among the modes."""
 HARDLY_ANY = 0.01
 """Weight below which a mode gets no chains."""
-MOST_PROCESSES = 4
+MOST_PROCESSES = GROUPS
 
 
 def sample_nuts(
@@ -89,32 +94,33 @@ def sample_nuts(
     most_gradients, work_limit
         Gradients and work of all chains after which sampling stops even if it has not converged.
     processes
-        How many processes to use; as many as there are cores, at most 4, where None. The draws do not depend on it.
+        How many processes to use; as many as there are cores, at most 2, where None. The draws do not depend on it.
 
     Returns
     -------
-    Four chains, of the chains of all modes in proportion to the modes' weights, with the number of divergences.
+    Four chains, each of several one after another, from all modes in proportion to the modes' weights, with the number
+    of divergences. The R-hat that goes with them compares earlier with later draws.
     """
     with metered() as meter:
         form, places = _kept_start(density, start, generator, checkpoint)
         modes, doubtful = _kept_weights(density, form.mixture, generator, checkpoint)
     seed = int(generator.integers(2**31))
     inhabited = [index for index in range(len(places)) if len(places) == 1 or modes[index].weight >= HARDLY_ANY]
-    chains = [
-        _Chain(form.mixture.components[mode], mode, places[mode, number], (seed, mode, number))
+    groups = [
+        _Group(form.mixture.components[mode], mode, number, places[mode, number * TOGETHER :][:TOGETHER], seed)
         for mode in inhabited
-        for number in range(CHAINS)
+        for number in range(GROUPS)
     ]
     count = min(os.cpu_count() or 1, MOST_PROCESSES) if processes is None else processes
     stage = (progress or SilentProgress()).stage("Sampling (NUTS)", total=most_gradients)
     with stage as advance, workers(count) as pool:
-        run = _Run(density, form.mixture, chains, checkpoint, pool, advance)
+        run = _Run(density, form.mixture, groups, checkpoint, pool, advance)
         run.further(warm_up, adapt=True)
         while True:
             run.further(CHUNK, adapt=False)
-            whitened = _joined(run, inhabited, modes, np.random.default_rng(seed))
-            found = chain_statistics(whitened, reported)
-            if whitened.shape[0] * whitened.shape[1] >= draws and _good(found):
+            points = _in_proportion(run, inhabited, modes, np.random.default_rng(seed))
+            chains = points.reshape(RESULTS, -1, *points.shape[1:])
+            if points[..., 0].size >= draws and _good(chains, reported):
                 stopped: tuple[str, ...] = ()
                 break
             if run.gradients >= most_gradients:
@@ -127,8 +133,9 @@ def sample_nuts(
                 break
     evaluations = form.evaluations + (EVIDENCE_DRAWS if len(places) > 1 else 0)
     return Samples(
-        whitened,
-        np.stack([evaluate(density, chain) for chain in whitened]),
+        joined(chains),
+        np.stack([evaluate(density, chain) for chain in joined(chains)]),
+        r_hat=drift(chains, reported),
         divergences=run.divergences,
         evaluations=evaluations + run.gradients,
         gradients=form.gradients + run.gradients,
@@ -138,84 +145,92 @@ def sample_nuts(
     )
 
 
-def _good(found: Statistics) -> bool:
-    return found.r_hat <= R_HAT_GOAL and min(found.ess_bulk, found.ess_tail) >= MARGIN * ESS_GOAL
+def _good(chains: Float[np.ndarray, "result chain draw dimension"], reported: Reported | None) -> bool:
+    found = chain_statistics(joined(chains), reported)
+    r_hat = max(found.r_hat, drift(chains, reported))
+    return r_hat <= R_HAT_GOAL and min(found.ess_bulk, found.ess_tail) >= MARGIN * ESS_GOAL
 
 
 @dataclass
-class _Chain:
-    """A chain in one mode, in the coordinates of its cloud."""
+class _Group:
+    """Chains in one mode, in the coordinates of its cloud."""
 
     cloud: CurvedGaussian
     mode: int
-    place: Float[np.ndarray, "dimension"]
-    seed: tuple[int, int, int]
+    number: int
+    places: Float[np.ndarray, "chain dimension"]
+    seed: int
     pieces: list[Piece] = field(default_factory=list)
 
     @property
     def name(self) -> str:
         """Name of the piece that comes next."""
-        return f"chain_{self.seed[1]}_{self.seed[2]}_piece_{len(self.pieces)}"
+        return f"mode_{self.mode}_group_{self.number}_piece_{len(self.pieces)}"
 
     def task(self, density: LogDensity, transitions: int, *, adapt: bool) -> Task:
-        """The piece that comes next."""
-        place = self.pieces[-1].whitened[-1] if self.pieces else self.cloud.whitened(self.place)
-        seed = int(np.random.SeedSequence([*self.seed, len(self.pieces)]).generate_state(1)[0])
-        step_size = None if adapt else self.pieces[-1].step_size
-        return Task(density, self.cloud, place, step_size, transitions, seed)
+        """The piece that comes next; a step length is shared, since a chain alone finds it in few transitions badly."""
+        places = self.pieces[-1].whitened[:, -1] if self.pieces else self.cloud.whitened(self.places)
+        own = np.random.SeedSequence([self.seed, self.mode, self.number, len(self.pieces)])
+        seeds = tuple(int(one) for one in own.generate_state(len(places)))
+        sizes = None if adapt else np.full(len(places), np.median(self.pieces[-1].step_sizes))
+        return Task(density, self.cloud, places, sizes, transitions, seeds)
 
     @property
-    def points(self) -> Float[np.ndarray, "draw dimension"]:
+    def points(self) -> Float[np.ndarray, "chain draw dimension"]:
         """All draws after adaptation."""
-        return self.cloud.points(np.concatenate([piece.whitened for piece in self.pieces[1:]]))
+        return self.cloud.points(np.concatenate([piece.whitened for piece in self.pieces[1:]], axis=1))
 
 
 @dataclass
 class _Run:
-    """All chains, and what they have cost."""
+    """All groups of chains, and what they have cost."""
 
     density: LogDensity
     mixture: Mixture
-    chains: list[_Chain]
+    groups: list[_Group]
     checkpoint: Checkpoint | None
     pool: Workers
     advance: Advance
 
     def further(self, transitions: int, *, adapt: bool) -> None:
-        """One more piece of every chain: those that were kept, and the others made now, a few at a time."""
+        """One more piece of every group: those that were kept, and the others made now, a few at a time."""
         wanting = []
-        for chain in self.chains:
-            found = self.checkpoint.arrays(chain.name) if self.checkpoint is not None else None
+        for group in self.groups:
+            found = self.checkpoint.arrays(group.name) if self.checkpoint is not None else None
             if found is None:
-                wanting.append(chain)
+                wanting.append(group)
             else:
-                chain.pieces.append(Piece.of_arrays(found))
-        for begin in range(0, len(wanting), CHAINS):
-            several = wanting[begin : begin + CHAINS]
-            made = self.pool.make([chain.task(self.density, transitions, adapt=adapt) for chain in several])
-            for chain, piece in zip(several, made, strict=True):
+                group.pieces.append(Piece.of_arrays(found))
+        for begin in range(0, len(wanting), GROUPS):
+            several = wanting[begin : begin + GROUPS]
+            made = self.pool.make([group.task(self.density, transitions, adapt=adapt) for group in several])
+            for group, piece in zip(several, made, strict=True):
                 if self.checkpoint is not None:
-                    self.checkpoint.keep(chain.name, piece.arrays())
-                chain.pieces.append(piece)
+                    self.checkpoint.keep(group.name, piece.arrays())
+                group.pieces.append(piece)
                 self.advance(piece.gradients)
+
+    def points(self, mode: int) -> Float[np.ndarray, "chain draw dimension"]:
+        """All draws of the chains of a mode."""
+        return np.concatenate([group.points for group in self.groups if group.mode == mode])
 
     @property
     def gradients(self) -> int:
         """Gradients of all chains."""
-        return sum(piece.gradients for chain in self.chains for piece in chain.pieces)
+        return sum(piece.gradients for group in self.groups for piece in group.pieces)
 
     @property
     def work(self) -> int:
         """Work of all chains."""
-        return sum(piece.work for chain in self.chains for piece in chain.pieces)
+        return sum(piece.work for group in self.groups for piece in group.pieces)
 
     @property
     def divergences(self) -> int:
         """Divergent transitions of all chains."""
-        return sum(piece.divergences for chain in self.chains for piece in chain.pieces)
+        return sum(piece.divergences for group in self.groups for piece in group.pieces)
 
 
-def _joined(
+def _in_proportion(
     run: _Run, inhabited: list[int], modes: tuple[ModeWeight, ...], generator: np.random.Generator
 ) -> Float[np.ndarray, "chain draw dimension"]:
     """As many chains as a mode has, each of one chain from every mode, in proportion to the modes' weights.
@@ -223,11 +238,12 @@ def _joined(
     A draw counts for the mode that it is in, whichever its chain set out from: chains are restricted, not trusted to
     stay. A mode in which hardly any chain stays is left to what the others find of it.
     """
+    chains = [run.points(mode) for mode in inhabited]
     if len(inhabited) == 1:
-        return np.stack([chain.points for chain in run.chains])
+        return chains[0]
     own: list[list[np.ndarray]] = []
     for number in range(CHAINS):
-        points = np.concatenate([chain.points for chain in run.chains if chain.seed[2] == number])
+        points = np.concatenate([several[number] for several in chains])
         member = run.mixture.memberships(points).argmax(axis=1)
         own.append([points[member == mode] for mode in inhabited])
     counts = np.array([[len(points) for points in several] for several in own]).min(axis=0)

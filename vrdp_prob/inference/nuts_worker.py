@@ -1,6 +1,6 @@
-"""A process that makes pieces of NUTS chains for another one: tasks come in as pickles, pieces go out.
+"""Processes that make pieces of NUTS chains for another one: tasks come in as pickles, pieces go out.
 
-It is a fresh interpreter, neither a fork (threads of torch do not survive one) nor a child of multiprocessing (which
+Each is a fresh interpreter, neither a fork (threads of torch do not survive one) nor a child of multiprocessing (which
 would run the user's script again), and ends when the one who started it is gone.
 """
 
@@ -53,7 +53,7 @@ class _Worker:
 
 
 class Workers:
-    """Makes several pieces at once, in processes where there are any, else one after the other.
+    """Makes several pieces at once, one here and one in each process, or one after the other where there are none.
 
     Parameters
     ----------
@@ -69,11 +69,13 @@ class Workers:
 
     def make(self, tasks: Sequence[Task]) -> list[Piece]:
         """What each task gives, in order."""
-        pickled = [_pickled(task) for task in tasks] if self._count else [None]
-        if any(one is None for one in pickled):
+        pickled = [one for task in tasks[1:] if (one := _pickled(task)) is not None] if self._count else []
+        if not pickled or len(pickled) < len(tasks) - 1:
             return [make(task) for task in tasks]
         with ThreadPoolExecutor(self._count) as threads:
-            pieces = list(threads.map(self._made, pickled))
+            coming = [threads.submit(self._made, one) for one in pickled]
+            pieces = [make(tasks[0]), *(one.result() for one in coming)]
+        # A process that is gone has made nothing.
         return [make(task) if piece is None else piece for task, piece in zip(tasks, pieces, strict=True)]
 
     def _made(self, pickled: bytes) -> Piece | None:
@@ -86,9 +88,9 @@ class Workers:
 
 @contextmanager
 def workers(count: int) -> Iterator[Workers]:
-    """So many processes, or none if that is less than 2; they end with the block."""
+    """So many processes, this one among them; they end with the block."""
     with ExitStack() as stack:
-        yield Workers([stack.enter_context(_Worker()) for _ in range(count if count > 1 else 0)])
+        yield Workers([stack.enter_context(_Worker()) for _ in range(count - 1)])
 
 
 def _pickled(task: Task) -> bytes | None:

@@ -15,6 +15,9 @@ R_HAT_GOAL = 1.01
 ESS_GOAL = 400.0
 PARETO_K_GOAL = 0.7
 """Above it importance weights have no usable variance (Vehtari et al., Pareto smoothed importance sampling, 2024)."""
+DIVERGENT_GOAL = 0.01
+"""Share of NUTS transitions that may end at a cliff: where a contact comes or goes the log density falls by thousands
+within no distance, so what is behind has no mass. More of them mean a neck that is not explored."""
 
 
 LogDensity = Callable[[Float[Tensor, "point dimension"]], Float[Tensor, "point"]]
@@ -190,7 +193,7 @@ class Convergence:
             tail = "" if self.ess_tail is None else f" and {self.ess_tail:.0f} in the tails"
             facts.append(f"effective sample size {self.ess_bulk:.0f}{tail} (goal {ESS_GOAL:g})")
         if self.divergences is not None:
-            facts.append(f"{self.divergences} divergences")
+            facts.append(f"{self.divergences} divergences (goal 1 % of the transitions or less)")
         if self.pareto_k is not None:
             facts.append(f"Pareto k {self.pareto_k:.2f} (goal {PARETO_K_GOAL:g} or less)")
         verdict = "has converged" if self.converged else "has not converged, so take its intervals with care"
@@ -220,9 +223,10 @@ def assess(
     r_hat = max(found.r_hat, samples.r_hat or 0.0)
     enough = min(found.ess_bulk, found.ess_tail) >= ESS_GOAL
     trusted = samples.pareto_k <= PARETO_K_GOAL if samples.pareto_k is not None else r_hat <= R_HAT_GOAL
+    few = (samples.divergences or 0) <= DIVERGENT_GOAL * samples.log_density.size
     return Convergence(
         sampler=samples.sampler or sampler,
-        converged=bool(trusted and enough and not samples.divergences),
+        converged=bool(trusted and enough and few),
         r_hat=None if weighted else r_hat,
         ess_bulk=found.ess_bulk,
         divergences=samples.divergences,

@@ -17,7 +17,8 @@ from vrdp_prob.inference.proposals import proposals
 from vrdp_prob.inference.samples import Convergence, Samples, assess
 from vrdp_prob.inference.straightening import Rates
 
-DRAWS = 1000
+DRAWS = {"emcee": 1000, "nuts": 1000, "laplace": 8000}
+"""Many of the weighted ones, since they are resampled."""
 SEEDS = {"emcee": 11, "nuts": 12, "laplace": 13}
 ALONE = {"laplace": {"hand_on": False}}
 """Options by which a sampler is compared as itself."""
@@ -67,7 +68,7 @@ def agreement(scenes: int) -> Iterator[SceneAgreement]:
             samples = sampler(
                 fit.likelihood.log_density,
                 start,
-                draws=DRAWS,
+                draws=DRAWS[name],
                 generator=np.random.default_rng([seed, SEEDS[name]]),
                 reported=reported,
                 **ALONE.get(name, {}),
@@ -93,15 +94,29 @@ def _moments(samples: Samples, reported: Reported) -> Moments:
     values = reported.values(samples.points)
     flat = values.reshape(-1, values.shape[-1])
     mean, sd = flat.mean(axis=0), flat.std(axis=0)
-    if samples.known is not None and samples.known.each is not None:
-        effective = 1 / (1 / samples.known.each + 1 / len(flat))
-        square_sd = ((flat - mean) ** 2).std(axis=0)
-        return {"mean": (mean, sd / effective**0.5), "sd": (sd, square_sd / effective**0.5 / (2 * sd))}
+    if "log_weight" in samples.statistics:
+        weights = np.exp(samples.statistics["log_weight"].reshape(-1, 1))
+        squares = (flat - mean) ** 2
+        return {
+            "mean": (mean, _weighted_error(flat, weights)),
+            "sd": (sd, _weighted_error(squares, weights) / (2 * sd)),
+        }
     series = np.moveaxis(values, -1, 0)
     return {
         "mean": (mean, array_stats.mcse(series, method="mean")),
         "sd": (sd, array_stats.mcse(series, method="sd")),
     }
+
+
+def _weighted_error(values: np.ndarray, weights: np.ndarray) -> np.ndarray:
+    """Standard error of the mean of values that were resampled by normalised weights.
+
+    The variance of a weighted mean, the sum of the squared weights times the squared deviations, is an expectation over
+    the resampled values; resampling adds its own.
+    """
+    squares = (values - values.mean(axis=0)) ** 2
+    error: np.ndarray = np.sqrt((weights * squares).mean(axis=0) + squares.mean(axis=0) / len(values))
+    return error
 
 
 def _comparisons(names: Sequence[str], moments: dict[str, Moments]) -> Iterator[Compared]:

@@ -153,14 +153,15 @@ def agree(count: int) -> list[Check]:
     """Compare the samplers' means and standard deviations of every quantity."""
     every: list[Compared] = []
     converged: dict[str, int] = dict.fromkeys(SAMPLERS, 0)
-    print("scene  " + "  ".join(f"{name:>13s}" for name in SAMPLERS) + "  compared  beyond 3  largest")
+    print("scene  " + "  ".join(f"{name:>24s}" for name in SAMPLERS) + "  compared  beyond 3  largest")
     for scene in agreement(count):
         every += scene.compared
         sizes = np.abs([one.difference for one in scene.compared] or [0.0])
         said = []
         for name, verdict in scene.verdicts.items():
             converged[name] += verdict.converged
-            said.append(f"{scene.seconds[name]:7.1f} s {'good ' if verdict.converged else 'poor '}")
+            state = "converged" if verdict.converged else "not converged"
+            said.append(f"{scene.seconds[name]:7.1f} s, {state:13s}")
         beyond = int((sizes > FAR).sum())
         print(
             f"{scene.seed:5d}  {'  '.join(said)}  {len(scene.compared):8d}  {beyond:8d}  {sizes.max():7.2f}", flush=True

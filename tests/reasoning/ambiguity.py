@@ -6,7 +6,7 @@ FRAMES = 26
 MASS_SPREAD = 0.3
 """Standard deviation of the logarithm of each mass."""
 
-DISCS = (Disc((-1.0, 0.0), (1.5, 0.0)), Disc((0.968, 0.0)), Disc((2.42, 0.0)))
+DISCS = (Disc((-1.96, 0.0), (2.2, 0.0)), Disc((0.0, 0.0), (0.9, 0.0)), Disc((3.65, 0.0)))
 """After the video disc 0 hits disc 1 for sure, which reaches disc 2 if it is not too heavy."""
 
 QUESTION = "What will happen next?"

@@ -14,7 +14,8 @@ from jsonschema import validate
 
 from vrdp_prob.errors import InputError
 from vrdp_prob.reasoning import ask
-from vrdp_prob.reasoning.answer import entropy, monte_carlo_error
+from vrdp_prob.reasoning.answer import monte_carlo_error
+from vrdp_prob.reasoning.entropy import entropy
 from vrdp_prob.reasoning.facts import TableFacts
 from vrdp_prob.reasoning.values import Change
 from vrdp_prob.scene import Body, Choice, Event, Question, QuestionType, Shape

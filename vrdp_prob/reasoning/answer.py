@@ -1,10 +1,12 @@
 """Answers: the distribution over draws, in words that a report can print."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
 
+from vrdp_prob.errors import InputError
+from vrdp_prob.reasoning.explanation.explanation import Explanation
 from vrdp_prob.scene import QuestionType
 
 
@@ -56,6 +58,8 @@ class Answer:
         What else limits the answer, in sentences.
     valid_share
         Share of the draws that the answer is from: those in which the question makes sense, with all its choices.
+    explainer
+        Explains it; see `explain`.
     """
 
     question_id: int | str | None
@@ -70,6 +74,19 @@ class Answer:
     relies_on_default: tuple[str, ...] = ()
     notes: tuple[str, ...] = field(default=())
     valid_share: float = 1.0
+    explainer: Callable[[], Explanation] | None = field(default=None, repr=False, compare=False)
+
+    def explain(self) -> Explanation:
+        """What the answer hangs on, where its doubt comes from, and what would settle it.
+
+        Raises
+        ------
+        InputError
+            If the answer was not given by `ask`.
+        """
+        if self.explainer is None:
+            raise InputError("this answer does not know where it comes from; explain one that `ask` gave.")
+        return self.explainer()
 
     def to_document(self) -> dict[str, object]:
         """The answer as an item of `answers` in report.json."""
@@ -115,9 +132,3 @@ def monte_carlo_error(probability: float, draws: float) -> float:
         return 0.0
     alpha, beta = probability * draws + 0.5, (1 - probability) * draws + 0.5
     return float(np.sqrt(alpha * beta / ((alpha + beta) ** 2 * (alpha + beta + 1))))
-
-
-def entropy(probabilities: np.ndarray) -> float:
-    """Entropy in nats of a distribution given as an array of probabilities."""
-    positive = probabilities[probabilities > 0]
-    return float(max(0.0, -(positive * np.log(positive)).sum()))

@@ -22,6 +22,7 @@ class Purpose(IntEnum):
     RESTS = 8
     LAST_FRICTION = 9
     ORDER = 10
+    EXPLANATION = 11
 
 
 @runtime_checkable

@@ -1,12 +1,15 @@
 """From a question to an answer: parse where it is English, type-check, run for all draws, summarise the draws."""
 
 from collections.abc import Mapping, Sequence
+from functools import partial
 
 import numpy as np
 from jaxtyping import Bool
 
 from vrdp_prob.errors import InputError
-from vrdp_prob.reasoning.answer import Answer, ChoiceAnswer, entropy, monte_carlo_error
+from vrdp_prob.reasoning.answer import Answer, ChoiceAnswer, monte_carlo_error
+from vrdp_prob.reasoning.entropy import entropy
+from vrdp_prob.reasoning.explanation.explain import explain
 from vrdp_prob.reasoning.facts import Facts
 from vrdp_prob.reasoning.notes import gap_notes
 from vrdp_prob.reasoning.prepared import ChoiceInput, PreparedQuestion, prepare
@@ -55,6 +58,7 @@ def _open_answer(facts: Facts, asked: PreparedQuestion) -> Answer:
         relies_on_default=_relies_on_default(facts, [verdict]),
         notes=_notes(facts, [verdict]),
         valid_share=float(valid.mean()),
+        explainer=partial(explain, facts, asked),
     )
 
 
@@ -84,6 +88,7 @@ def _choice_answer(facts: Facts, asked: PreparedQuestion) -> Answer:
         relies_on_default=_relies_on_default(facts, judged),
         notes=_notes(facts, judged, [choice.text for choice, _ in asked.options]),
         valid_share=float(valid.mean()),
+        explainer=partial(explain, facts, asked),
     )
 
 

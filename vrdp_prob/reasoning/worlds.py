@@ -5,14 +5,15 @@ next and `counterfactual` for what if). Draws come in batches (see `stock`), so 
 gets more, and no other world has to be simulated for it.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import cached_property
 
 from vrdp_prob.errors import InputError
 from vrdp_prob.models.simulator.rollout import Rollout
 from vrdp_prob.progress import ProgressDisplay, SilentProgress
 from vrdp_prob.reasoning.batch import Batch
-from vrdp_prob.reasoning.chance import Chance, Seeded
+from vrdp_prob.reasoning.chance import Chance, Purpose, Seeded
+from vrdp_prob.reasoning.coupled import Coupled
 from vrdp_prob.reasoning.defaults import DEFAULT, Defaults
 from vrdp_prob.reasoning.events import EventTable
 from vrdp_prob.reasoning.facts import Motion
@@ -86,6 +87,14 @@ class PosteriorWorlds:
             return None
         batch = self._stock.batch(len(self._batches))
         return None if batch is None else self._of(self, (*self._batches, batch))
+
+    def coupled(self, kept: Mapping[Purpose, float]) -> "PosteriorWorlds":
+        """The same posterior draws with what the tracks leave open drawn anew, but for what is kept (see `Coupled`)."""
+        key = frozenset(kept.items())
+        if key not in self._coupled:
+            twins = [batch.coupled(Coupled(batch.chance, place, kept)) for place, batch in enumerate(self._batches)]
+            self._coupled[key] = self._of(self, twins)
+        return self._coupled[key]
 
     @property
     def exhausted(self) -> str:
@@ -178,6 +187,10 @@ class PosteriorWorlds:
     def world(self, key: str | tuple[Change, int]) -> WorldDraws:
         """What happens after the video (`future`), or with a change."""
         return self.future if isinstance(key, str) else self.counterfactual(*key)
+
+    @cached_property
+    def _coupled(self) -> dict[frozenset[tuple[Purpose, float]], "PosteriorWorlds"]:
+        return {}
 
     @cached_property
     def _changed(self) -> dict[tuple[Change, int], WorldDraws]:

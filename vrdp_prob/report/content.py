@@ -16,6 +16,7 @@ from vrdp_prob.inference.prior_sensitivity import Sensitivity
 from vrdp_prob.inference.samples import Convergence
 from vrdp_prob.inference.summaries import ObjectSummary, PairSummary
 from vrdp_prob.reasoning.answer import Answer
+from vrdp_prob.reasoning.explanation.explanation import Explanation
 from vrdp_prob.scene import Tracks
 
 
@@ -29,10 +30,26 @@ class AnswerContent:
         Question and answer.
     world
         Key of the world (`WorldContent.key`) that the question is about, None where no world shows it.
+    explanation
+        Why the answer is uncertain, None where it is not or nobody can say.
     """
 
     answer: Answer
     world: str | None = None
+    explanation: Explanation | None = None
+
+    @classmethod
+    def of(cls, answer: Answer, world: str | None) -> "AnswerContent":
+        """A question with its answer, explained where that is uncertain."""
+        explanation = answer.explain() if answer.explainer is not None else None
+        return cls(answer, world, explanation if explanation is not None and explanation.parts else None)
+
+    def to_document(self) -> dict[str, object]:
+        """As an item of `answers` in report.json."""
+        return {
+            **self.answer.to_document(),
+            "explanation": None if self.explanation is None else self.explanation.to_document(),
+        }
 
 
 class WorldKind(StrEnum):

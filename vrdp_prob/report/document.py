@@ -53,7 +53,7 @@ def to_document(content: ReportContent) -> dict[str, Any]:
         "misfit": None if content.misfit is None else {**asdict(content.misfit), "fits": content.misfit.fits},
         "collision_groups": [asdict(group) for group in content.groups],
         "prior_sensitivity": [one.to_document() for one in content.sensitivities],
-        "answers": [item.answer.to_document() for item in content.answers],
+        "answers": [item.to_document() for item in content.answers],
         "warnings": list(content.warnings),
     }
 

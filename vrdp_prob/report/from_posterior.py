@@ -47,7 +47,7 @@ def build(
         Told how far the work is.
     """
     tracks = posterior.tracks
-    asked = tuple(AnswerContent(answer, world_of(answer, tracks.bodies)) for answer in answers)
+    asked = tuple(AnswerContent.of(answer, world_of(answer, tracks.bodies)) for answer in answers)
     few = PosteriorWorlds(posterior, draws=draws, progress=progress)
     return ReportContent(
         tracks=tracks,

@@ -27,7 +27,6 @@ from vrdp_prob.report.wording import (
     interval_words,
     listed,
     mass_status,
-    names,
     percent,
     percent_error,
     restitution_status,
@@ -38,6 +37,7 @@ from vrdp_prob.report.wording import (
     with_names,
     world_label,
 )
+from vrdp_prob.scene.naming import names
 
 SCRIPTS = ("worlds.js", "views.js", "scene.js", "player.js")
 """The player's sources, in the order they go into the page."""
@@ -164,9 +164,17 @@ def _question(item: AnswerContent, content: ReportContent) -> dict[str, Any]:
         "base": f"from {percent(answer.valid_share)} of the draws" if answer.valid_share < 1 else "",
         "bars": _bars(answer),
         "notes": notes,
+        "reasons": _reasons(item, content),
         "world": None if world is None else world.key,
         "world_label": f"Show {label[:1].lower()}{label[1:]}",
     }
+
+
+def _reasons(item: AnswerContent, content: ReportContent) -> list[str]:
+    """Why the answer is uncertain, in sentences."""
+    if item.explanation is None:
+        return []
+    return [with_names(reason, content.tracks.bodies) for reason in item.explanation.sentences]
 
 
 def _bars(answer: Answer) -> list[dict[str, Any]]:

@@ -14,8 +14,9 @@ from jaxtyping import Float, Int
 
 from vrdp_prob.report.content import ReportContent, WorldContent
 from vrdp_prob.report.footage import film_data
-from vrdp_prob.report.wording import color_of, names, percent, percent_error, tags, world_group, world_label
+from vrdp_prob.report.wording import color_of, percent, percent_error, tags, world_group, world_label
 from vrdp_prob.scene import Camera
+from vrdp_prob.scene.naming import names
 
 _STEPS = 16000
 """Steps of length on each side of the origin."""

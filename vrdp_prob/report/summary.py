@@ -2,8 +2,9 @@
 
 from vrdp_prob.reasoning.answer import Answer
 from vrdp_prob.report.content import AnswerContent, ReportContent, WorldKind
-from vrdp_prob.report.wording import counted, listed, names, number_word, percent, seconds, sentence
+from vrdp_prob.report.wording import counted, listed, number_word, percent, seconds, sentence
 from vrdp_prob.scene import QuestionType
+from vrdp_prob.scene.naming import names
 
 CERTAIN_SHARE = 0.95
 """Share of the draws from which on a collision is told as a fact."""

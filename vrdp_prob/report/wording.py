@@ -3,39 +3,16 @@
 import math
 import re
 import string
-from collections import Counter
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 from vrdp_prob.inference.summaries import ParameterSummary, Summary
 from vrdp_prob.report.content import WorldContent, WorldKind
-from vrdp_prob.scene import Body, Shape, Tracks
+from vrdp_prob.scene import Body, Tracks
 from vrdp_prob.scene.body import COLORS
+from vrdp_prob.scene.naming import names
 
 NEUTRAL_COLORS = ("ink1", "ink2", "ink3", "ink4", "ink5", "ink6", "ink7")
 """Colours for objects whose own colour is not known; their values stand in the page's style sheet."""
-
-
-def names(bodies: Sequence[Body]) -> dict[str, str]:
-    """Name in words of each body by id: the shortest description that fits it alone, else its shape and id."""
-    ways: tuple[Callable[[Body], tuple[str | None, ...]], ...] = (
-        lambda body: (body.color, str(body.shape)),
-        lambda body: (body.material, str(body.shape)),
-        lambda body: (body.color, body.material, str(body.shape)),
-    )
-    found: dict[str, str] = {}
-    for way in ways:
-        count = Counter(way(body) for body in bodies)
-        for body in bodies:
-            description = way(body)
-            if body.id not in found and None not in description and count[description] == 1:
-                found[body.id] = " ".join(part for part in description if part)
-    return {body.id: found.get(body.id, _by_id(body)) for body in bodies}
-
-
-def _by_id(body: Body) -> str:
-    if body.id.isdigit():
-        return " ".join(part for part in (body.color, str(body.shape), body.id) if part)
-    return f"{body.shape} “{body.id}”" if body.shape is not Shape.CYLINDER else f"“{body.id}”"
 
 
 def tags(bodies: Sequence[Body]) -> dict[str, str]:

@@ -1,0 +1,1 @@
+"""Why an answer is uncertain: what it hangs on, where the doubt comes from, what would settle it."""

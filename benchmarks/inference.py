@@ -67,7 +67,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if options.peer:
         checks += peer(options.peer)
     if options.agreement:
-        checks += agree(options.agreement)
+        checks += agree(options.agreement, options.samplers.split(","))
     if options.json:
         options.json.write_text(json.dumps({"checks": checks}, indent=1) + "\n", encoding="utf-8")
     return 0
@@ -149,12 +149,12 @@ def peer(most_gradients: int) -> list[Check]:
     return [check("NUTS: fixed-step over event-driven seconds per gradient", ratio, 10.0, met=ratio >= 10)]
 
 
-def agree(count: int) -> list[Check]:
+def agree(count: int, names: Sequence[str]) -> list[Check]:
     """Compare the samplers' means and standard deviations of every quantity."""
     every: list[Compared] = []
-    converged: dict[str, int] = dict.fromkeys(SAMPLERS, 0)
-    print("scene  " + "  ".join(f"{name:>24s}" for name in SAMPLERS) + "  compared  beyond 3  largest")
-    for scene in agreement(count):
+    converged: dict[str, int] = dict.fromkeys(names, 0)
+    print("scene  " + "  ".join(f"{name:>24s}" for name in names) + "  compared  beyond 3  largest")
+    for scene in agreement(count, names):
         every += scene.compared
         sizes = np.abs([one.difference for one in scene.compared] or [0.0])
         said = []

@@ -63,6 +63,17 @@ def test_weights_tell_what_draws_are_worth() -> None:
     assert spoiled.ess_tail < 300
 
 
+def test_weights_that_are_large_in_one_tail_are_worth_what_the_spread_repeats_to() -> None:
+    draws = np.random.default_rng(5).standard_normal((400, 2000))
+    weights = np.where(draws > 2, 8.0, 1.0)
+    weights /= weights.sum(axis=1, keepdims=True)
+    mean = (weights * draws).sum(axis=1, keepdims=True)
+    variance = (weights * (draws - mean) ** 2).sum(axis=1)
+    fourth = (weights * ((draws - mean) ** 2 - variance[:, None]) ** 2).sum(axis=1)
+    worth = [weighted_statistics(one[:, None], own).ess_bulk for one, own in zip(draws, weights, strict=True)]
+    assert np.median(fourth / worth) == pytest.approx(variance.var(), rel=0.2)
+
+
 def test_tails_of_weighted_draws_are_those_of_what_they_stand_for() -> None:
     draws = np.random.default_rng(3).standard_normal(40_000)
     weights = np.exp(1.5 * draws)  # those of a standard normal density around 1.5

@@ -110,12 +110,16 @@ def drift(draws: Float[np.ndarray, "group chain draw axis"], reported: Reported 
 def weighted_statistics(
     points: Float[np.ndarray, "draw dimension"], weights: Float[np.ndarray, "draw"], reported: Reported | None = None
 ) -> Statistics:
-    """Statistics of independent draws with normalised importance weights."""
+    """Statistics of independent draws with normalised importance weights.
+
+    Weights that are large in one tail alone leave the mean nearly as it is and make the spread uncertain, so the bulk
+    counts what stands behind the mean and the standard deviation.
+    """
     shown = reported or Reported.coordinates(points.shape[-1])
     values = shown.values(points)
     order = np.argsort(values, axis=0)
     share, ranked = np.cumsum(weights[order], axis=0), np.take_along_axis(values, order, 0)
-    bulk = _effective(values, weights)
+    bulk = np.minimum(_effective(values, weights), _effective((values - weights @ values) ** 2, weights))
     below = np.stack([np.take_along_axis(ranked, np.argmax(share >= tail, axis=0)[None], 0) for tail in TAILS])
     tail = np.min([_effective((values <= edge).astype(float), weights) for edge in below], axis=0)
     return _worst(shown.names, np.ones(len(bulk)), bulk, tail)

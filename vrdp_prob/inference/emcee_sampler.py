@@ -28,9 +28,9 @@ from vrdp_prob.progress import Advance, ProgressDisplay, SilentProgress
 
 ENSEMBLES = 4
 FEWEST_WALKERS = 40
-WARM_UP = 8
+WARM_UP = 16
 """Steps that tune the Hamiltonian move and are thrown away."""
-ROUND = 8
+ROUND = 16
 """Steps after which the draws are judged and kept on disk."""
 STEPS_TOGETHER = 2
 """Steps after which the ensembles, one thread each, wait for one another, so that an interruption is soon noticed."""

@@ -188,6 +188,15 @@ def test_a_single_best_fit_has_no_doubt_to_explain() -> None:
     assert not asked(best).explain().parts
 
 
+@pytest.mark.parametrize("draws", [2, 7, 30])
+def test_few_draws_tell_little_and_break_nothing(draws: int) -> None:
+    answer = asked(PosteriorWorlds(posterior(), draws=draws))
+    for told in answer.explain().parts:
+        assert told.shares is None or draws >= 20
+        assert all(0 <= hinge.inside <= 1 and 0 <= hinge.outside <= 1 for hinge in told.hinges)
+        assert "nan" not in " ".join(told.sentences)
+
+
 def test_hand_written_events_are_explained_without_shares() -> None:
     random = np.random.default_rng(0)
     first = random.random(300) < 0.5

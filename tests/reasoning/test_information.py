@@ -98,3 +98,14 @@ def test_a_simulated_event_that_is_the_answer_is_no_hinge_and_an_observed_one_is
     )
     (hinge,) = hinges([simulated, observed], event.astype(int), 1, generator)
     assert hinge.sentence == "whether c touches d: 1.00 if it does, else 0.00"
+
+
+def test_a_quantity_that_most_draws_share_is_split_below_its_largest_value() -> None:
+    generator = np.random.default_rng(7)
+    friction = np.where(generator.random(300) < 0.85, 0.5, 0.3 + 0.01 * generator.standard_normal(300))
+    quantity = Quantity(Kind.PARAMETER, "friction", friction)
+    (hinge,) = hinges([quantity], (friction > 0.4).astype(int), 1, generator)
+    assert (hinge.inside, hinge.outside) == (pytest.approx(1.0, abs=0.03), pytest.approx(0.0, abs=0.03))
+    assert 0.29 < (hinge.threshold or 0.0) < 0.5
+    top = Quantity(Kind.PARAMETER, "friction", np.where(np.arange(300) < 5, 0.3, 0.5))
+    assert hinges([top], (np.arange(300) >= 5).astype(int), 1, generator) == ()

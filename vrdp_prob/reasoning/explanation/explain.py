@@ -1,6 +1,7 @@
 """From an answer to what it hangs on, where its doubt comes from, and what would settle it."""
 
 import numpy as np
+from jaxtyping import Int
 
 from vrdp_prob.reasoning.chance import Purpose, Seeded
 from vrdp_prob.reasoning.event_operations import FUTURE
@@ -10,7 +11,7 @@ from vrdp_prob.reasoning.explanation.hinges import hinges
 from vrdp_prob.reasoning.explanation.information import answer_entropy
 from vrdp_prob.reasoning.explanation.motions import FILMED_FRAMES, filmed, motion_quantities
 from vrdp_prob.reasoning.explanation.observations import Film, observations
-from vrdp_prob.reasoning.explanation.parameters import parameter_quantities
+from vrdp_prob.reasoning.explanation.parameters import parameter_quantities, relevant_bodies
 from vrdp_prob.reasoning.explanation.quantities import Quantity
 from vrdp_prob.reasoning.explanation.shares import Twins
 from vrdp_prob.reasoning.facts import Facts
@@ -62,9 +63,6 @@ def _part(facts: Facts, asked: PreparedQuestion, place: int, verdict: Verdict, t
     )
     quantities = [quantity.of_draws(chosen) for quantity in _quantities(facts, worlds)]
     varying = [quantity for quantity in quantities if quantity.varies]
-    films = []
-    if isinstance(facts, PosteriorWorlds) and FUTURE in worlds:
-        films.append(Film(f"filming {FILMED_FRAMES} more frames", filmed(facts, generator)[chosen]))
     return Part(
         choice_id=asked.options[place][0].choice_id if asked.options else None,
         subject=asked.options[place][0].text if asked.options else asked.question.text,
@@ -73,8 +71,17 @@ def _part(facts: Facts, asked: PreparedQuestion, place: int, verdict: Verdict, t
         entropy=answer_entropy(everything),
         hinges=hinges(varying, codes, wanted, generator),
         shares=None if twins is None else twins.shares(place, verdict.codes, verdict.valid),
-        observations=observations(varying, films, codes, generator),
+        observations=observations(varying, _films(facts, worlds, chosen, generator), codes, generator),
     )
+
+
+def _films(
+    facts: Facts, worlds: list[World], chosen: Int[np.ndarray, "chosen"], generator: np.random.Generator
+) -> list[Film]:
+    """The film that goes on, for answers about what comes next."""
+    if not isinstance(facts, PosteriorWorlds) or FUTURE not in worlds or not relevant_bodies(facts, FUTURE):
+        return []
+    return [Film(f"filming {FILMED_FRAMES} more frames", filmed(facts, generator)[chosen])]
 
 
 def _quantities(facts: Facts, worlds: list[World]) -> list[Quantity]:

@@ -99,20 +99,25 @@ def hinges(
         if told.nats > by_chance.max() and not same:
             found.append(_hinge(quantity, told, codes == wanted))
     bar = float(np.quantile(best_by_chance, SURELY))
-    surely = [hinge for hinge in found if hinge.information > bar]
+    surely = [hinge for hinge in found if hinge is not None and hinge.information > bar]
     return tuple(sorted(surely, key=lambda hinge: -hinge.information)[:MOST])
 
 
-def _hinge(quantity: Quantity, told: Information, yes: Bool[np.ndarray, "draw"]) -> Hinge:
-    condition, threshold, mask = _split(quantity, yes)
+def _hinge(quantity: Quantity, told: Information, yes: Bool[np.ndarray, "draw"]) -> Hinge | None:
+    split = _split(quantity, yes)
+    if split is None:
+        return None
+    condition, threshold, mask = split
     inside, outside = (float(yes[side].mean()) for side in (mask, ~mask))
     return Hinge(
         quantity.kind, quantity.name, quantity.unit, told.nats, told.error, condition, threshold, inside, outside
     )
 
 
-def _split(quantity: Quantity, yes: Bool[np.ndarray, "draw"]) -> tuple[str, float | None, Bool[np.ndarray, "draw"]]:
-    """The condition that tells most, in words, its threshold, and the draws where it holds."""
+def _split(
+    quantity: Quantity, yes: Bool[np.ndarray, "draw"]
+) -> tuple[str, float | None, Bool[np.ndarray, "draw"]] | None:
+    """The condition that tells most, in words, its threshold, and the draws where it holds; None where none does."""
     if quantity.labels:
         codes = quantity.values.astype(int)
         masks = [codes == code for code in range(len(quantity.labels))]
@@ -122,6 +127,10 @@ def _split(quantity: Quantity, yes: Bool[np.ndarray, "draw"]) -> tuple[str, floa
         best = max(range(len(masks)), key=lambda place: (speaks[place] * told[place], place))
         return quantity.labels[best], None, masks[best]
     edges = np.unique(np.quantile(quantity.values, np.linspace(SMALLEST_SIDE, 1 - SMALLEST_SIDE, 61)))
+    # where many draws share the largest value no draw is above it
+    edges = edges[edges < quantity.values.max()]
+    if not len(edges):
+        return None
     told = [_told(quantity.values > edge, yes) for edge in edges]
     threshold = float(edges[int(np.argmax(told))])
     unit = "" if quantity.unit == "" else quantity.unit if quantity.unit == "°" else f" {quantity.unit}"

@@ -19,6 +19,9 @@ from vrdp_prob.reasoning.entropy import entropy
 WIDTHS = (0.05, 0.1, 0.2, 0.4, 0.8)
 """Widths of the kernel, in standard deviations of the quantity after it was made normal by its ranks."""
 
+COMMON = 0.05
+"""A value that this share of the draws have is no draw taken again, but a limit or a rest, say."""
+
 PRIOR_DRAWS = 1.0
 """Draws that the answer's share among all draws counts as in each prediction."""
 
@@ -42,11 +45,14 @@ class Information:
 def smooth_weights(values: Float[np.ndarray, "draw feature"]) -> Float[np.ndarray, "width draw draw"]:
     """Weights of the neighbours of each draw for several widths, by quantities that vary smoothly.
 
-    Draws of exactly equal values are one draw of the posterior taken twice, and no neighbours.
+    Draws of exactly equal values are one draw of the posterior taken again, and no neighbours, unless so many share
+    the value (`COMMON`) that it is one that the quantity often has.
     """
     normal = norm.ppf((rankdata(values, axis=0) - 0.5) / len(values))
     squared = ((normal[:, None, :] - normal[None, :, :]) ** 2).sum(axis=2)
-    squared[squared == 0] = np.inf
+    equal = squared == 0
+    squared[equal & (equal.mean(axis=1, keepdims=True) < COMMON)] = np.inf
+    np.fill_diagonal(squared, np.inf)
     return np.stack([np.exp(-0.5 * squared / width**2) for width in WIDTHS])
 
 

@@ -28,6 +28,10 @@ _MOTION: Mapping[Purpose, float] = {
 correlation of 1 - 1/k^2."""
 
 
+FEWEST = 20
+"""Draws that both twins answer, at least."""
+
+
 class Twins:
     """The same worlds with more and more of what twins share; each is simulated when it is looked at.
 
@@ -46,7 +50,7 @@ class Twins:
         ]
 
     def shares(self, place: int, codes: Int[np.ndarray, "draw"], valid: Bool[np.ndarray, "draw"]) -> Shares | None:
-        """Shares of the doubt of an open question (place 0) or of a choice; None where no twin could answer it.
+        """Shares of the doubt of an open question (place 0) or of a choice; None where hardly a twin could answer it.
 
         By pick-freeze (Sobol', Sensitivity estimates for nonlinear mathematical models, 1993; with the pooled mean of
         Janon et al., 2014): the answers of two draws that share one part of their causes and have the rest anew agree
@@ -66,6 +70,8 @@ class Twins:
                 return None
             twin = verdict_of_twins[place]
             both = valid & twin.valid
+            if both.sum() < FEWEST:
+                return None
             found.append(_kappa(codes[both], twin.codes[both]))
         kappa = np.clip([one for one, _ in found], 0, 1)
         shared = np.maximum.accumulate(kappa)

@@ -56,7 +56,7 @@ def _open_answer(facts: Facts, asked: PreparedQuestion) -> Answer:
         entropy=entropy(shares),
         distribution=_distribution(names, shares),
         relies_on_default=_relies_on_default(facts, [verdict]),
-        notes=_notes(facts, [verdict]),
+        notes=(*asked.notes, *_notes(facts, [verdict])),
         valid_share=float(valid.mean()),
         explainer=partial(explain, facts, asked),
     )
@@ -86,7 +86,7 @@ def _choice_answer(facts: Facts, asked: PreparedQuestion) -> Answer:
             _choice_share(facts, choice, verdict) for (choice, _), verdict in zip(asked.options, judged, strict=True)
         ),
         relies_on_default=_relies_on_default(facts, judged),
-        notes=_notes(facts, judged, [choice.text for choice, _ in asked.options]),
+        notes=(*asked.notes, *_notes(facts, judged, [choice.text for choice, _ in asked.options])),
         valid_share=float(valid.mean()),
         explainer=partial(explain, facts, asked),
     )

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from vrdp_prob.errors import InputError
-from vrdp_prob.reasoning.language import parse_choice, parse_question
+from vrdp_prob.reasoning.language import Reading, read_choice, read_question
 from vrdp_prob.reasoning.program import ENTRIES, Program, check, needs_choices, question_type
 from vrdp_prob.reasoning.values import Truth
 from vrdp_prob.scene import Choice, Question, QuestionType
@@ -14,37 +14,60 @@ ChoiceInput = str | Sequence[str] | Choice
 
 @dataclass(frozen=True)
 class PreparedQuestion:
-    """A question and its choices as checked programs; an open question has a program, a choice question options."""
+    """A question and its choices as checked programs; an open question has a program, a choice question options.
+
+    Parameters
+    ----------
+    question, kind
+        What is asked.
+    program
+        Program of an open question, else None.
+    options
+        Choices, each with the program that judges it.
+    notes
+        How wordings were read that the grammar does not know.
+    """
 
     question: Question
     kind: QuestionType
     program: Program | None
     options: tuple[tuple[Choice, Program], ...]
+    notes: tuple[str, ...] = ()
 
 
 def prepare(question: str | Sequence[str] | Question, choices: Sequence[ChoiceInput]) -> PreparedQuestion:
     """Understand a question and its choices; raises `InputError` as `answer_question` does."""
     stated = _as_question(question)
-    program = stated.program if stated.program is not None else parse_question(stated.text)
+    reading = Reading(stated.program) if stated.program is not None else read_question(stated.text)
+    program = reading.program
     kind = stated.question_type or question_type(program)
     given = [_as_choice(number, choice) for number, choice in enumerate(choices)] or list(stated.choices)
     if not needs_choices(program):
         if given:
             raise InputError(f"'{stated.text}' is answered without choices; leave them out.")
-        return PreparedQuestion(stated, kind, check(program), ())
+        return PreparedQuestion(stated, kind, check(program), (), _how_read(reading))
     if not given:
         raise InputError(f"'{stated.text}' needs choices to judge; give at least one (--choice TEXT).")
-    return PreparedQuestion(stated, kind, None, tuple(_option(choice, program, kind) for choice in given))
+    readings = [
+        Reading(choice.program) if choice.program is not None else read_choice(choice.text, kind) for choice in given
+    ]
+    options = tuple(
+        (choice, _judged(choice, option.program, program)) for choice, option in zip(given, readings, strict=True)
+    )
+    return PreparedQuestion(stated, kind, None, options, _how_read(reading, *readings))
 
 
-def _option(choice: Choice, question_program: Sequence[str], kind: QuestionType) -> tuple[Choice, Program]:
-    program = choice.program if choice.program is not None else parse_choice(choice.text, kind)
+def _how_read(*readings: Reading) -> tuple[str, ...]:
+    return tuple(dict.fromkeys(reading.note for reading in readings if reading.note is not None))
+
+
+def _judged(choice: Choice, program: Sequence[str], question_program: Sequence[str]) -> Program:
+    """The program of a choice followed by that of its question."""
     try:
         check(program, ends_in=ENTRIES)
-        whole = check((*program, *question_program), ends_in=(Truth,))
+        return check((*program, *question_program), ends_in=(Truth,))
     except InputError as error:
         raise InputError(f"choice '{choice.text}': {error}") from error
-    return choice, whole
 
 
 def _as_question(question: str | Sequence[str] | Question) -> Question:

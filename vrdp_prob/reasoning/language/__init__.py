@@ -1,6 +1,5 @@
-"""English to programs: CLEVRER's wordings by a grammar that refuses what it does not understand."""
+"""English to programs: CLEVRER's wordings by a grammar, others by a learned parser; refusals name the word."""
 
-from vrdp_prob.reasoning.language.choices import parse_choice
-from vrdp_prob.reasoning.language.questions import parse_question
+from vrdp_prob.reasoning.language.reading import Reading, parse_choice, parse_question, read_choice, read_question
 
-__all__ = ["parse_choice", "parse_question"]
+__all__ = ["Reading", "parse_choice", "parse_question", "read_choice", "read_question"]

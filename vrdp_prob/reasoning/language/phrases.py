@@ -77,12 +77,12 @@ def the_object(reader: Reader) -> Tokens:
     return (*plain_noun(reader, plural=False), "unique")
 
 
-def the_event(reader: Reader, source: str) -> Tokens:
+def the_event(reader: Reader) -> Tokens:
     """One event, as a noun ('the collision between A and B', 'A's exit') or as a clause ('A enters the scene')."""
     return reader.first(
-        lambda: _collision_noun(reader, source),
-        lambda: _ordered_collision(reader, source),
-        lambda: _object_event(reader, source),
+        lambda: _collision_noun(reader),
+        lambda: _ordered_collision(reader),
+        lambda: _object_event(reader),
     )
 
 
@@ -95,7 +95,7 @@ def moment(reader: Reader) -> Tokens:
     if reader.accept("when the video ends", "at the end of the video", "at the end"):
         return ("end", "get_frame")
     reader.expect("when", "during")
-    return (*the_event(reader, "events"), "get_frame")
+    return (*the_event(reader), "get_frame")
 
 
 def moment_or_ever(reader: Reader) -> Tokens:
@@ -108,9 +108,9 @@ def condition(reader: Reader) -> Tokens:
     """'before A enters the scene', 'after A and B collide', or nothing."""
     in_the_video(reader)
     if reader.accept("before"):
-        return (*the_event(reader, "events"), "filter_before")
+        return (*the_event(reader), "filter_before")
     if reader.accept("after"):
-        return (*the_event(reader, "events"), "filter_after")
+        return (*the_event(reader), "filter_after")
     return ()
 
 
@@ -134,31 +134,31 @@ def collision(first: Tokens, second: Tokens, source: str) -> Tokens:
     return (source, *first, "filter_collision", *second, "filter_collision", "unique")
 
 
-def _collision_noun(reader: Reader, source: str) -> Tokens:
+def _collision_noun(reader: Reader) -> Tokens:
     reader.expect("the collision between", "the collision of")
     first = the_object(reader)
     reader.expect("and", "with")
-    return collision(first, the_object(reader), source)
+    return collision(first, the_object(reader), "events")
 
 
-def _ordered_collision(reader: Reader, source: str) -> Tokens:
+def _ordered_collision(reader: Reader) -> Tokens:
     reader.expect("the")
     order = reader.one_of(ORDER_WORDS)
     reader.expect("collision")
-    return (source, "objects", "filter_collision", order, "filter_order")
+    return ("events", "objects", "filter_collision", order, "filter_order")
 
 
-def _object_event(reader: Reader, source: str) -> Tokens:
+def _object_event(reader: Reader) -> Tokens:
     first = the_object(reader)
     if reader.accept("and"):
         second = the_object(reader)
         reader.expect("collide", "collided", "colliding")
-        return collision(first, second, source)
+        return collision(first, second, "events")
     possessive = reader.accept("'s")
     if possessive and reader.accept("collision with"):
-        return collision(first, the_object(reader), source)
+        return collision(first, the_object(reader), "events")
     if reader.accept(*COLLIDE):
-        return collision(first, the_object(reader), source)
+        return collision(first, the_object(reader), "events")
     if possessive and reader.accept("entrance", "entry"):
-        return (source, *first, "filter_in", "unique")
-    return (source, *first, crossing(reader), "unique")
+        return ("events", *first, "filter_in", "unique")
+    return ("events", *first, crossing(reader), "unique")

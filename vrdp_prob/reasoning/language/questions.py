@@ -20,7 +20,7 @@ from vrdp_prob.reasoning.language.words import ATTRIBUTE_WORDS, STATES
 WHICH = ("what", "which event", "which events", "which of the following", "which of these")
 
 
-def parse_question(text: str) -> Tokens:
+def question_by_grammar(text: str) -> Tokens:
     """Program of a question in English.
 
     Parameters
@@ -31,7 +31,9 @@ def parse_question(text: str) -> Tokens:
     Raises
     ------
     InputError
-        If it is empty or not understood; the message names the word.
+        If it is empty.
+    NotUnderstoodError
+        If it is not understood; the message names the word.
     """
     reader = Reader(text)
     rules = (_counting, _existing, _doing, _attribute, _responsible, _next, _changed, _yes_no_prediction)
@@ -123,12 +125,12 @@ def _doing(reader: Reader) -> Tokens:
         phrase = NounPhrase((*plain_noun(reader, plural=False),), plural=False)
         return (*_stated_state(reader, phrase), "exist")
     reader.expect("does", "do", "did")
-    return (*_named_event(reader, "events"), *condition(reader), "exist")
+    return (*_named_event(reader), *condition(reader), "exist")
 
 
-def _named_event(reader: Reader, source: str) -> Tokens:
+def _named_event(reader: Reader) -> Tokens:
     """'the cube enter the scene', 'the cube and the sphere collide': the set of events, empty or of one."""
-    return the_event(reader, source)[:-1]
+    return the_event(reader)[:-1]
 
 
 def _attribute(reader: Reader) -> Tokens:
@@ -218,7 +220,7 @@ def _responsible(reader: Reader) -> Tokens:
     reader.expect("is", "was", "are")
     negated = reader.accept("not")
     reader.expect("responsible for")
-    ancestors = ("events", *the_event(reader, "events"), "filter_ancestor", "belong_to")
+    ancestors = ("events", *the_event(reader), "filter_ancestor", "belong_to")
     return _negated(ancestors, negated)
 
 

@@ -15,6 +15,15 @@ class NoReadingError(Exception):
     """The words do not fit this rule; another may be tried."""
 
 
+class NotUnderstoodError(InputError):
+    """No reading reaches the end of the words; the message names the first one that nothing fits."""
+
+
+def not_understood(text: str, words: tuple[str, ...], place: int) -> NotUnderstoodError:
+    """The refusal of a text at a word, counted from 0."""
+    return NotUnderstoodError(f"'{text}' is not understood at '{words[place]}' (word {place + 1}); {KNOWN_HINT}.")
+
+
 class Reader:
     """Words of one text, read from left to right.
 
@@ -88,7 +97,9 @@ class Reader:
         Raises
         ------
         InputError
-            If there are no words, or no rule reads all of them; the message names the first word that nothing fits.
+            If there are no words.
+        NotUnderstoodError
+            If no rule reads all of them.
         """
         if not self.words:
             raise InputError(f"the {self.kind} is empty; {KNOWN_HINT}.")
@@ -106,10 +117,9 @@ class Reader:
         try:
             return self.first(*(to_the_end(rule) for rule in rules))
         except NoReadingError:
-            raise InputError(self._complaint()) from None
+            raise self._refusal() from None
 
-    def _complaint(self) -> str:
+    def _refusal(self) -> NotUnderstoodError:
         if self._furthest >= len(self.words):
-            return f"'{self.text}' ends too early, after '{self.words[-1]}'; {KNOWN_HINT}."
-        word = self.words[self._furthest]
-        return f"'{self.text}' is not understood at '{word}' (word {self._furthest + 1}); {KNOWN_HINT}."
+            return NotUnderstoodError(f"'{self.text}' ends too early, after '{self.words[-1]}'; {KNOWN_HINT}.")
+        return not_understood(self.text, self.words, self._furthest)

@@ -1,0 +1,1 @@
+"""A learned parser for wordings that the grammar does not know; loaded only when one is met."""

@@ -24,7 +24,7 @@ def world(
     position: Sequence[Sequence[float]],
     velocity: Sequence[Sequence[float]],
     shapes: Sequence[Shape] | None = None,
-    parameters: Mapping[str, float] | None = None,
+    parameters: Mapping[str, float | Sequence[float]] | None = None,
     **fields: object,
 ) -> Worlds:
     """One world; every field may be given per body."""

@@ -1,5 +1,7 @@
 """Laws compile to what they compute, and effects do what they say."""
 
+import ctypes
+
 import numpy as np
 import pytest
 import torch
@@ -11,7 +13,8 @@ from vrdp_prob.models.effects.surface_tilt import SurfaceTilt
 from vrdp_prob.models.model_file import known_effects
 from vrdp_prob.models.physics import PhysicsModel
 from vrdp_prob.models.simulator import mathematics
-from vrdp_prob.models.simulator.formula import Recorder, assignments, vector_jacobian
+from vrdp_prob.models.simulator.formula import Recorder, vector_jacobian
+from vrdp_prob.models.simulator.machine_code import ARRAY, NUMBER, MachineCode, law_function
 
 
 def test_every_effect_describes_itself() -> None:
@@ -33,17 +36,20 @@ def _law(x: object, y: object) -> tuple[object, ...]:
 def test_recorded_derivatives_are_those_of_torch(x: float, y: float) -> None:
     recorder = Recorder()
     inputs = [recorder.input("x"), recorder.input("y")]
-    bars = [recorder.input(f"bar{index}") for index in range(3)]
+    bars = [recorder.input("bar", index) for index in range(3)]
     outputs = _law(*inputs)
-    lines = assignments({f"o{index}": value for index, value in enumerate(outputs)})
-    lines += assignments(dict(zip(("gx", "gy"), vector_jacobian(outputs, bars, inputs), strict=True)))
-    values: dict[str, object] = {"x": x, "y": y, "bar0": 0.7, "bar1": -1.1, "bar2": 0.4, "math": __import__("math")}
-    exec("\n".join(lines), values)
+    arguments = {"x": NUMBER, "y": NUMBER, "bar": ARRAY, "out": ARRAY, "gradient": ARRAY}
+    wanted = {"out": outputs, "gradient": vector_jacobian(outputs, bars, inputs)}
+    code = MachineCode(law_function("law", arguments, wanted, result=outputs[1]))
+    function = ctypes.CFUNCTYPE(ctypes.c_double, ctypes.c_double, ctypes.c_double, *[ctypes.c_void_p] * 3)
+    bar, out, gradient = np.array([0.7, -1.1, 0.4]), np.zeros(3), np.zeros(2)
+    returned = function(code.address("law"))(x, y, *(array.ctypes.data for array in (bar, out, gradient)))
     tensors = [tensor(x).requires_grad_(), tensor(y).requires_grad_()]
     expected = _law(*tensors)
-    assert [values[f"o{index}"] for index in range(3)] == pytest.approx([value.item() for value in expected])
+    assert out == pytest.approx([value.item() for value in expected])
+    assert returned == out[1]
     sum(bar * value for bar, value in zip((0.7, -1.1, 0.4), expected, strict=True)).backward()
-    assert [values["gx"], values["gy"]] == pytest.approx([value.grad.item() for value in tensors])
+    assert gradient == pytest.approx([value.grad.item() for value in tensors])
 
 
 def test_a_law_must_not_branch() -> None:

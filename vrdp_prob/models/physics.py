@@ -4,7 +4,6 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
 from vrdp_prob.errors import InputError
@@ -16,8 +15,8 @@ from vrdp_prob.models.effects.dry_friction import DryFriction
 from vrdp_prob.models.effects.effect import Effect
 from vrdp_prob.models.effects.normal_impact import NormalImpact
 from vrdp_prob.models.parameters import MASS, RESTITUTION, Parameter
+from vrdp_prob.models.simulator.kernel import Kernel, load
 from vrdp_prob.models.simulator.laws import CONSTANTS, STATE, Layout
-from vrdp_prob.models.simulator.source import load
 
 
 @dataclass(frozen=True)
@@ -126,6 +125,6 @@ class PhysicsModel:
         return Layout.of(self.parameters)
 
     @cached_property
-    def kernel(self) -> ModuleType:
+    def kernel(self) -> Kernel:
         """The compiled kernel."""
         return load(self.effects, self.layout)

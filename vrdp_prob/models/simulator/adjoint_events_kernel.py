@@ -22,7 +22,7 @@ from vrdp_prob.models.simulator.adjoint_kernel import (
     read_frames,
     shift_of,
 )
-from vrdp_prob.models.simulator.adjoint_step_kernel import reverse_pieces
+from vrdp_prob.models.simulator.apart_kernel import reverse_event_apart, reverse_pieces_apart
 from vrdp_prob.models.simulator.cluster_kernel import (
     ROOM_RATE,
     cluster_of,
@@ -30,13 +30,13 @@ from vrdp_prob.models.simulator.cluster_kernel import (
     set_constraints,
 )
 from vrdp_prob.models.simulator.laws_kernel import (
-    SLIPS,
+    CONTACT_LAW_VJP,
+    GAP_LAW_VJP,
     STATE_SIZE,
     boundary_rate,
     boundary_vjp,
     compiled,
-    contact_law_vjp,
-    gap_law_vjp,
+    contact_vjp,
     kick_time_vjp,
     kick_vjp,
 )
@@ -77,6 +77,7 @@ from vrdp_prob.models.simulator.world_kernel import (
     REFERENCE_Y,
     RELEASE_TIME,
     SLIPPING,
+    clear_world,
     evaluate,
     share_of,
 )
@@ -101,15 +102,13 @@ def reverse_stop(world, adjoint, body, t):
     """A body stops, or begins to roll: what vanishes sets the time."""
     cluster = cluster_of(world, body)
     phase, bar = world.phase[body], adjoint.state[body]
-    rolls = SLIPS and phase[MOVING] == SLIPPING
+    rolls = phase[MOVING] == SLIPPING
     if rolls:
         for c in range(2):
             both = bar[3 + c] + bar[6 + c]
             bar[3 + c], bar[6 + c] = ROLLING_SHARE * both, (1.0 - ROLLING_SHARE) * both
     else:
-        bar[3], bar[4] = 0.0, 0.0
-        if SLIPS:
-            bar[6], bar[7] = 0.0, 0.0
+        bar[3], bar[4], bar[6], bar[7] = 0.0, 0.0, 0.0, 0.0
     of_time = shift_of(world, adjoint, cluster, t)
     product(world, adjoint, body, bar, t)
     rate = adjoint.local[RATE_A]
@@ -147,10 +146,11 @@ def reverse_cross(world, adjoint, body, which, t):
     of_time = shift_of(world, adjoint, cluster, t)
     product(world, adjoint, body, bar, t)
     evaluate(world.polynomial[body], share_of(world, body, t), y)
-    rate = boundary_rate(which, y, adjoint.local[RATE_A], world.body[body], world.shared)
+    rate = boundary_rate(world.model, which, y, adjoint.local[RATE_A], world.body[body], world.shared)
     if abs(rate) > FLATTEST:
         factor = -of_time / rate
-        boundary_vjp(which, y, world.body[body], world.shared, factor, bar, adjoint.body[body], adjoint.shared)
+        constants, shared = world.body[body], world.shared
+        boundary_vjp(world.model, which, y, constants, shared, factor, bar, adjoint.body[body], adjoint.shared)
     end_legs(world, adjoint, cluster, t)
 
 
@@ -166,9 +166,10 @@ def reverse_kick(world, adjoint, body, which, t):
         bar[c] = adjoint.state[body, 3 + c]
     one = adjoint.local[ONE]
     one[0] = 0.0
-    kick_vjp(which, t, y, world.body[body], world.shared, bar, of_body, adjoint.body[body], adjoint.shared, one)
+    constants, shared = world.body[body], world.shared
+    kick_vjp(world.model, which, t, y, constants, shared, bar, of_body, adjoint.body[body], adjoint.shared, one)
     of_time = one[0] + product(world, adjoint, body, of_body, t) + shift_of(world, adjoint, cluster, t)
-    kick_time_vjp(which, world.shared, of_time, adjoint.shared)
+    kick_time_vjp(world.model, which, world.shared, of_time, adjoint.shared)
     for c in range(STATE_SIZE):
         adjoint.state[body, c] += of_body[c]
     end_legs(world, adjoint, cluster, t)
@@ -224,8 +225,9 @@ def reverse_contact(world, adjoint, kind, a, b, together, numbers, t):
     take_velocities(world, adjoint, a, of_a, bar[0:3])
     take_velocities(world, adjoint, b, of_b, bar[3:6])
     body, shared = adjoint.body, adjoint.shared
-    contact_law_vjp(
-        kind, ya, yb, world.body[a], world.body[b], feature, world.shared, bar, of_a, of_b, body[a], body[b], shared
+    law, gap = world.model[CONTACT_LAW_VJP + kind], world.model[GAP_LAW_VJP + kind]
+    contact_vjp(
+        law, ya, yb, world.body[a], world.body[b], feature, world.shared, bar, of_a, of_b, body[a], body[b], shared
     )
     of_time = product(world, adjoint, a, of_a, t) + product(world, adjoint, b, of_b, t)
     of_first = not world.kind[a, FIXED]
@@ -235,8 +237,8 @@ def reverse_contact(world, adjoint, kind, a, b, together, numbers, t):
     if of_second:
         of_time += shift_of(world, adjoint, cluster_of(world, b), t)
     one[0] = of_time / numbers[CLOSING_SPEED]
-    gap_law_vjp(
-        kind, ya, yb, world.body[a], world.body[b], feature, world.shared, one, of_a, of_b, body[a], body[b], shared
+    contact_vjp(
+        gap, ya, yb, world.body[a], world.body[b], feature, world.shared, one, of_a, of_b, body[a], body[b], shared
     )
     give_back(world, adjoint, a, of_a)
     give_back(world, adjoint, b, of_b)
@@ -247,39 +249,39 @@ def reverse_contact(world, adjoint, kind, a, b, together, numbers, t):
 
 
 @compiled
-def read_unreleased(world, adjoint, times, trajectory_bar, velocity_bar):
+def read_unreleased(world, adjoint, tape):
     """Before its release, or where it is removed, a body shows the state of its release."""
-    for body in range(trajectory_bar.shape[1]):
-        for frame in range(times.shape[0]):
-            if world.kind[body, PRESENT] and times[frame] >= world.start[body, RELEASE_TIME]:
+    for body in range(tape.trajectory.shape[1]):
+        for frame in range(tape.times.shape[0]):
+            if world.kind[body, PRESENT] and tape.times[frame] >= world.start[body, RELEASE_TIME]:
                 break
             for c in range(3):
-                adjoint.start[body, c] += trajectory_bar[frame, body, c]
-                if velocity_bar.shape[0] > 0:
-                    adjoint.start[body, 3 + c] += velocity_bar[frame, body, c]
+                adjoint.start[body, c] += tape.trajectory[frame, body, c]
+                if tape.velocity.shape[0] > 0:
+                    adjoint.start[body, 3 + c] += tape.velocity[frame, body, c]
 
 
 @compiled
-def reverse_world(world, adjoint, integers, numbers, times, trajectory_bar, velocity_bar):
-    """Read the tape of a world backwards."""
-    read_unreleased(world, adjoint, times, trajectory_bar, velocity_bar)
+def reverse_world(world, adjoint, tape, begin, end):
+    """Read the tape of a world, its rows from `begin` to `end`, backwards."""
+    clear_world(world)
+    read_unreleased(world, adjoint, tape)
     clear_adjoint(adjoint)
-    for row in range(integers.shape[0] - 1, -1, -1):
-        entry = integers[row]
+    for row in range(end - 1, begin - 1, -1):
+        entry = tape.integers[row]
         kind, first = entry[KIND], entry[FIRST]
         if kind == PIECE:
-            load(world, adjoint, integers, numbers, row)
-            begin, end = entry[FRAME_BEGIN], entry[FRAME_END]
-            read_frames(world, adjoint, first, begin, end, times, trajectory_bar, velocity_bar)
+            load(world, adjoint, tape, row)
+            read_frames(world, adjoint, tape, first, entry[FRAME_BEGIN], entry[FRAME_END])
             if entry[BLOCK] == row:
-                reverse_pieces(world, adjoint, integers, numbers, row)
+                reverse_pieces_apart(world, adjoint, tape, row)
         elif kind != PRESS:
             before, other = entry[BEFORE_FIRST], entry[BEFORE_SECOND]
             if before >= 0:
-                load(world, adjoint, integers, numbers, before)
+                load(world, adjoint, tape, before)
             if other >= 0:
-                load(world, adjoint, integers, numbers, other)
-            reverse_event(world, adjoint, integers, numbers, row)
+                load(world, adjoint, tape, other)
+            reverse_event_apart(world, adjoint, tape, row)
 
 
 @compiled
@@ -293,10 +295,10 @@ def clear_adjoint(adjoint):
 
 
 @compiled
-def reverse_event(world, adjoint, integers, numbers, row):
+def reverse_event(world, adjoint, tape, row):
     """Pass the adjoints of the states after an event on to those before it; the pieces that it ended are loaded."""
-    entry = integers[row]
-    kind, first, second, t = entry[KIND], entry[FIRST], entry[SECOND], numbers[row, TIME]
+    entry = tape.integers[row]
+    kind, first, second, t = entry[KIND], entry[FIRST], entry[SECOND], tape.numbers[row, TIME]
     before, other = entry[BEFORE_FIRST], entry[BEFORE_SECOND]
     if kind == CONTINUE or (kind == PART and entry[HOLDS] < 0):
         continue_legs(world, adjoint, cluster_of(world, first), t)
@@ -312,10 +314,10 @@ def reverse_event(world, adjoint, integers, numbers, row):
         reverse_kick(world, adjoint, first, second, t)
     elif kind == PART:
         # Takes the contacts of the pieces that end here as those at hand; nothing else reads them until others are.
-        block = integers[before, BLOCK]
-        touches = integers[block, BLOCK_TOUCHES]
-        load_touches(world, integers, numbers, block + integers[block, BLOCK_PIECES], touches)
+        block = tape.integers[before, BLOCK]
+        touches = tape.integers[block, BLOCK_TOUCHES]
+        load_touches(world, tape, block + tape.integers[block, BLOCK_PIECES], touches)
         reverse_slide(world, adjoint, cluster_of(world, first), entry[HOLDS], t)
     elif kind == CONTACT:
-        together = before >= 0 and other >= 0 and integers[before, BLOCK] == integers[other, BLOCK]
-        reverse_contact(world, adjoint, entry[CONTACT_KIND], first, second, together, numbers[row], t)
+        together = before >= 0 and other >= 0 and tape.integers[before, BLOCK] == tape.integers[other, BLOCK]
+        reverse_contact(world, adjoint, entry[CONTACT_KIND], first, second, together, tape.numbers[row], t)

@@ -11,10 +11,8 @@ against its rate when it begins later.
 # mypy: disable-error-code="no-untyped-def"
 # ruff: noqa: PLR0917
 
-from typing import NamedTuple
-
-import numpy as np
-
+from vrdp_prob.models.simulator.apart_kernel import load_block_apart
+from vrdp_prob.models.simulator.bundle import Bundle, floats, integer_room, room
 from vrdp_prob.models.simulator.cluster_kernel import (
     HOLD,
     TOUCH_A,
@@ -25,7 +23,7 @@ from vrdp_prob.models.simulator.cluster_kernel import (
     set_touch_count,
     spread,
 )
-from vrdp_prob.models.simulator.laws_kernel import SLIPS, STATE_SIZE, compiled
+from vrdp_prob.models.simulator.laws_kernel import STATE_SIZE, compiled
 from vrdp_prob.models.simulator.motion_kernel import (
     PARTS_OF_STEP,
     compute_stages,
@@ -33,7 +31,6 @@ from vrdp_prob.models.simulator.motion_kernel import (
     match_velocities,
     set_polynomial,
 )
-from vrdp_prob.models.simulator.tableau import DENSE
 from vrdp_prob.models.simulator.tape_kernel import (
     BLOCK,
     BLOCK_PIECES,
@@ -42,6 +39,7 @@ from vrdp_prob.models.simulator.tape_kernel import (
     FEATURE,
     FIRST,
     HOLDS,
+    PIECE_PHASE,
     SECOND,
     TIME,
 )
@@ -50,8 +48,9 @@ from vrdp_prob.models.simulator.world_kernel import (
     FIXED,
     LENGTH,
     MOVING,
-    PHASE_SIZE,
     SLIPPING,
+    STAGES,
+    TERMS,
     evaluate_rate,
     hold,
     share_of,
@@ -63,53 +62,56 @@ FLATTEST = 1e-12
 """Rate below which the time of a stop has no derivative."""
 
 
-class Adjoint(NamedTuple):
-    """Adjoints of one world while its tape is read backwards."""
-
-    body: np.ndarray  # [body, constant]
-    shared: np.ndarray  # [parameter]
-    start: np.ndarray  # [body, (state, release time)]
-    times: np.ndarray  # [time], or empty where nobody asks for it
-    polynomial: np.ndarray  # [body, power, state]
-    state: np.ndarray  # [body, state], of the state with which the current piece begins
-    leg: np.ndarray  # [body], of the beginning of the current leg
-    loaded: np.ndarray  # [body], row of the piece whose polynomial is at hand
-    stages: np.ndarray  # [stage, body, state], adjoints of the stages
-    before: np.ndarray  # [body, state], of the state at which a stage or the contacts were evaluated
-    frames: np.ndarray  # [power, state], of the polynomial by the frames of one piece
-    constraint: np.ndarray  # [8], of the constraint of one contact
-    local: np.ndarray  # [8, 16]
+Adjoint = Bundle(
+    "Adjoint",
+    body=floats("body", "constant"),
+    shared=floats("parameter"),
+    start=floats("body", STATE_SIZE + 1),  # [body, (state, release time)]
+    times=floats("asked_frame"),  # or empty where nobody asks for it
+    polynomial=room("body", TERMS, STATE_SIZE),
+    state=room("body", STATE_SIZE),  # of the state with which the current piece begins
+    leg=room("body"),  # of the beginning of the current leg
+    loaded=integer_room("body"),  # row of the piece whose polynomial is at hand
+    stages=room(STAGES, "body", STATE_SIZE),
+    before=room("body", STATE_SIZE),  # of the state at which a stage or the contacts were evaluated
+    frames=room(TERMS, STATE_SIZE),  # of the polynomial by the frames of one piece
+    constraint=room(8),  # of the constraint of one contact
+    local=room(7, 16),
+)
+"""Adjoints of one world while its tape is read backwards; those of its output are in the tape."""
 
 
 @compiled
-def load(world, adjoint, integers, numbers, row):
+def load(world, adjoint, tape, row):
     """Compute the polynomials of recorded pieces of a cluster again, where one of them is not at hand."""
-    if adjoint.loaded[integers[row, FIRST]] != row:
-        load_block(world, adjoint, integers, numbers, integers[row, BLOCK])
+    if adjoint.loaded[tape.integers[row, FIRST]] != row:
+        load_block_apart(world, adjoint, tape, tape.integers[row, BLOCK])
 
 
 @compiled
-def load_block(world, adjoint, integers, numbers, block):
+def load_block(world, adjoint, tape, block):
     """Compute the polynomials of the recorded pieces of a cluster, which becomes the one at hand with its contacts."""
-    size, touches = integers[block, BLOCK_PIECES], integers[block, BLOCK_TOUCHES]
-    cluster = integers[block, FIRST]
+    size, touches = tape.integers[block, BLOCK_PIECES], tape.integers[block, BLOCK_TOUCHES]
+    cluster = tape.integers[block, FIRST]
     world.members[world.clock.shape[0] + 1, 0] = 0
     for place in range(size):
-        note_member(world, integers[block + place, FIRST])
+        note_member(world, tape.integers[block + place, FIRST])
     spread(world)
     moving = False
     for row in range(block, block + size):
-        body = integers[row, FIRST]
+        body = tape.integers[row, FIRST]
         adjoint.loaded[body] = row
-        load_state(world, body, numbers[row])
+        load_state(world, body, tape.numbers[row])
         moving = moving or not is_still(world, body)
-    load_touches(world, integers, numbers, block + size, touches)
+    load_touches(world, tape, block + size, touches)
     if moving:
         match_velocities(world, cluster)
-        compute_stages(world, cluster, numbers[block, TIME], numbers[block, 1], PARTS_OF_STEP[0], PARTS_OF_STEP[3])
+        compute_stages(
+            world, cluster, tape.numbers[block, TIME], tape.numbers[block, 1], PARTS_OF_STEP[0], PARTS_OF_STEP[3]
+        )
         for row in range(block, block + size):
-            world.clock[integers[row, FIRST], LENGTH] = numbers[block, 1]
-            set_polynomial(world, integers[row, FIRST], numbers[block, 1])
+            world.clock[tape.integers[row, FIRST], LENGTH] = tape.numbers[block, 1]
+            set_polynomial(world, tape.integers[row, FIRST], tape.numbers[block, 1])
 
 
 @compiled
@@ -117,59 +119,59 @@ def load_state(world, body, numbers):
     """State and phase with which a recorded piece begins."""
     for c in range(STATE_SIZE):
         world.polynomial[body, 0, c] = numbers[2 + c]
-    for c in range(PHASE_SIZE):
-        world.phase[body, c] = numbers[2 + STATE_SIZE + c]
+    for c in range(world.phase.shape[1]):
+        world.phase[body, c] = numbers[PIECE_PHASE + c]
     hold(world, body, numbers[TIME])
 
 
 @compiled
-def load_touches(world, integers, numbers, begin, count):
+def load_touches(world, tape, begin, count):
     """Take the recorded lasting contacts of a cluster as those at hand."""
     set_touch_count(world, count)
     for touch in range(count):
-        row, entry = world.touching[touch], integers[begin + touch]
+        row, entry = world.touching[touch], tape.integers[begin + touch]
         row[TOUCH_A], row[TOUCH_B], row[TOUCH_KIND] = entry[FIRST], entry[SECOND], entry[CONTACT_KIND]
         row[HOLD] = entry[HOLDS]
         for c in range(7):
-            row[TOUCH_FEATURE + c] = numbers[begin + touch, FEATURE + c]
+            row[TOUCH_FEATURE + c] = tape.numbers[begin + touch, FEATURE + c]
 
 
 @compiled
-def read_frames(world, adjoint, body, begin, end, times, trajectory_bar, velocity_bar):
+def read_frames(world, adjoint, tape, body, begin, end):
     """Adjoint of the frames that a piece shows."""
     if begin == end or world.phase[body, ALIVE] == 0.0 or world.kind[body, FIXED]:
         return
     clear(adjoint.frames)
     for frame in range(begin, end):
-        share, factor = share_of(world, body, times[frame]), 1.0
-        for power in range(DENSE.shape[0]):
+        share, factor = share_of(world, body, tape.times[frame]), 1.0
+        for power in range(TERMS):
             for c in range(3):
-                adjoint.frames[power, c] += factor * trajectory_bar[frame, body, c]
-                if velocity_bar.shape[0] > 0:
-                    adjoint.frames[power, 3 + c] += factor * velocity_bar[frame, body, c]
+                adjoint.frames[power, c] += factor * tape.trajectory[frame, body, c]
+                if tape.velocity.shape[0] > 0:
+                    adjoint.frames[power, 3 + c] += factor * tape.velocity[frame, body, c]
             factor *= share
     # What is read at fixed times changes against the rate of the motion when the leg begins later.
     polynomial, total = world.polynomial[body], 0.0
-    for power in range(DENSE.shape[0]):
+    for power in range(TERMS):
         for c in range(6):
             adjoint.polynomial[body, power, c] += adjoint.frames[power, c]
             if power > 0:
                 total += power * polynomial[power, c] * adjoint.frames[power - 1, c]
     adjoint.leg[body] -= total / world.clock[body, LENGTH]
     if adjoint.times.shape[0] > 0:
-        read_times(world, adjoint, body, begin, end, times, trajectory_bar, velocity_bar)
+        read_times(world, adjoint, tape, body, begin, end)
 
 
 @compiled
-def read_times(world, adjoint, body, begin, end, times, trajectory_bar, velocity_bar):
+def read_times(world, adjoint, tape, body, begin, end):
     """Adjoint of the times of the frames that a piece shows."""
     rate = adjoint.local[RATE_A]
     for frame in range(begin, end):
-        evaluate_rate(world.polynomial[body], share_of(world, body, times[frame]), world.clock[body, LENGTH], rate)
+        evaluate_rate(world.polynomial[body], share_of(world, body, tape.times[frame]), world.clock[body, LENGTH], rate)
         for c in range(3):
-            adjoint.times[frame] += trajectory_bar[frame, body, c] * rate[c]
-            if velocity_bar.shape[0] > 0:
-                adjoint.times[frame] += velocity_bar[frame, body, c] * rate[3 + c]
+            adjoint.times[frame] += tape.trajectory[frame, body, c] * rate[c]
+            if tape.velocity.shape[0] > 0:
+                adjoint.times[frame] += tape.velocity[frame, body, c] * rate[3 + c]
 
 
 @compiled
@@ -184,7 +186,7 @@ def clear(values):
 def read(adjoint, body, share, bar):
     """Adjoint of a state that was read from a piece."""
     factor = 1.0
-    for power in range(DENSE.shape[0]):
+    for power in range(TERMS):
         for c in range(STATE_SIZE):
             adjoint.polynomial[body, power, c] += factor * bar[c]
         factor *= share
@@ -193,13 +195,12 @@ def read(adjoint, body, share, bar):
 @compiled
 def fold(world, adjoint, cluster):
     """While a body does not slip, its rolling velocity is its velocity; so are their adjoints before an event."""
-    if SLIPS:
-        for place in range(world.members[cluster, 0]):
-            body = world.members[cluster, 1 + place]
-            bar = adjoint.state[body]
-            if world.phase[body, MOVING] != SLIPPING:
-                bar[3], bar[4] = bar[3] + bar[6], bar[4] + bar[7]
-                bar[6], bar[7] = 0.0, 0.0
+    for place in range(world.members[cluster, 0]):
+        body = world.members[cluster, 1 + place]
+        bar = adjoint.state[body]
+        if world.phase[body, MOVING] != SLIPPING:
+            bar[3], bar[4] = bar[3] + bar[6], bar[4] + bar[7]
+            bar[6], bar[7] = 0.0, 0.0
 
 
 @compiled

@@ -4,17 +4,17 @@
 # mypy: disable-error-code="no-untyped-def"
 # ruff: noqa: PLR0917
 
-from vrdp_prob.models.simulator.adjoint_kernel import clear, load_block, load_state
+from vrdp_prob.models.simulator.adjoint_kernel import clear, load_state
+from vrdp_prob.models.simulator.apart_kernel import load_block_apart
 from vrdp_prob.models.simulator.cluster_kernel import constrain_vjp, is_alone, mobility, presses
 from vrdp_prob.models.simulator.laws_kernel import (
     COUPLED,
     STATE_SIZE,
+    body_stages_vjp,
     compiled,
     dense_output_vjp,
-    motion_vjp,
     pair_force_vjp,
     stage_state,
-    stage_state_vjp,
 )
 from vrdp_prob.models.simulator.motion_kernel import cluster_derivatives, is_still, match_velocities, pair_force_of
 from vrdp_prob.models.simulator.tableau import NODES
@@ -36,7 +36,7 @@ def reverse_step(world, adjoint, cluster, t, h):
     """Adjoints of the states with which the loaded pieces of a cluster begin, from those of their polynomials."""
     for place in range(world.members[cluster, 0]):
         body = world.members[cluster, 1 + place]
-        dense_output_vjp(adjoint.polynomial[body], body, h, adjoint.stages)
+        dense_output_vjp(world.model, adjoint.polynomial[body], body, h, adjoint.stages)
         for c in range(STATE_SIZE):
             adjoint.state[body, c] = adjoint.polynomial[body, 0, c]
     if is_alone(world, cluster):
@@ -47,13 +47,13 @@ def reverse_step(world, adjoint, cluster, t, h):
         time = t + NODES[stage] * h
         for place in range(world.members[cluster, 0]):
             body = world.members[cluster, 1 + place]
-            stage_state(world.polynomial[body, 0], world.stages, body, stage, h, world.stages[WORK, body])
+            stage_state(world.model, world.polynomial[body, 0], world.stages, body, stage, h, world.stages[WORK, body])
         if pressing:
             # Computes the forces of this stage again.
-            cluster_derivatives(world, cluster, time, world.stages[stage])
+            cluster_derivatives(world, cluster, time, stage)
             bars = adjoint.stages[stage]
             constrain_vjp(world, adjoint, cluster, world.stages[stage], bars, adjoint.before, 1.0)
-        if COUPLED:
+        if world.model[COUPLED]:
             pair_forces_vjp(world, adjoint, cluster, time, adjoint.stages[stage])
         for place in range(world.members[cluster, 0]):
             reverse_stages(world, adjoint, world.members[cluster, 1 + place], t, h, stage, stage - 1)
@@ -63,6 +63,7 @@ def reverse_step(world, adjoint, cluster, t, h):
 def reverse_stages(world, adjoint, body, t, h, begin, end):
     """Pass the adjoints of a body's stages, from `begin` down to before `end`, on to its beginning."""
     body_stages_vjp(
+        world.model,
         world.polynomial[body, 0],
         world.stages,
         world.phase[body],
@@ -75,54 +76,13 @@ def reverse_stages(world, adjoint, body, t, h, begin, end):
         adjoint.shared,
         adjoint.leg[body : body + 1],
         body,
+        world.stages[WORK, body],
         t,
         h,
         begin,
         end,
+        is_still(world, body),
     )
-
-
-@compiled
-def body_stages_vjp(
-    y,
-    stages,
-    phase,
-    constants,
-    shared,
-    bars,
-    before,
-    state_bar,
-    constants_bar,
-    shared_bar,
-    leg_bar,
-    body,
-    t,
-    h,
-    begin,
-    end,
-):
-    """Derivative of `body_stages`; `before` holds what forces of other bodies add, and is cleared."""
-    state = stages[WORK, body]
-    still = phase[MOVING] == RESTING and phase[SPIN_SENSE] == 0.0
-    for stage in range(begin, end, -1):
-        stage_state(y, stages, body, stage, h, state)
-        if not still:
-            motion_vjp(
-                t + NODES[stage] * h,
-                state,
-                phase,
-                constants,
-                shared,
-                bars[stage, body],
-                before,
-                constants_bar,
-                shared_bar,
-                leg_bar,
-            )
-        stage_state_vjp(before, bars, body, stage, h)
-        for c in range(STATE_SIZE):
-            state_bar[c] += before[c]
-            before[c] = 0.0
 
 
 @compiled
@@ -140,6 +100,7 @@ def pair_forces_vjp(world, adjoint, cluster, t, bars):
                 adjoint.body[a, INVERSE_MASS] += force[c] * of_a / world.body[a, INVERSE_MASS]
                 adjoint.body[b, INVERSE_MASS] -= force[c] * of_b / world.body[b, INVERSE_MASS]
             pair_force_vjp(
+                world.model,
                 t,
                 work[a],
                 work[b],
@@ -157,28 +118,28 @@ def pair_forces_vjp(world, adjoint, cluster, t, bars):
 
 
 @compiled
-def reverse_pieces(world, adjoint, integers, numbers, block):
+def reverse_pieces(world, adjoint, tape, block):
     """Pass the adjoints of the pieces of a cluster on to the states with which they begin."""
-    cluster = integers[block, FIRST]
-    if integers[block, BLOCK_PIECES] > 1 or integers[block, BLOCK_TOUCHES] > 0:
-        load_block(world, adjoint, integers, numbers, block)
+    cluster = tape.integers[block, FIRST]
+    if tape.integers[block, BLOCK_PIECES] > 1 or tape.integers[block, BLOCK_TOUCHES] > 0:
+        load_block_apart(world, adjoint, tape, block)
     moving = False
     for place in range(world.members[cluster, 0]):
         moving = moving or not is_still(world, world.members[cluster, 1 + place])
     if moving:
         reverse_step(world, adjoint, cluster, world.clock[cluster, ORIGIN], world.clock[cluster, LENGTH])
-        reverse_match(world, adjoint, numbers, block, cluster)
+        reverse_match(world, adjoint, tape, block, cluster)
     for place in range(world.members[cluster, 0]):
         reverse_beginning(world, adjoint, world.members[cluster, 1 + place], moving)
 
 
 @compiled
-def reverse_match(world, adjoint, numbers, block, cluster):
+def reverse_match(world, adjoint, tape, block, cluster):
     """Velocities were matched in the recorded states before the pieces of a cluster began."""
     if not presses(world, cluster):
         return
     for place in range(world.members[cluster, 0]):
-        load_state(world, world.members[cluster, 1 + place], numbers[block + place])
+        load_state(world, world.members[cluster, 1 + place], tape.numbers[block + place])
         adjoint.loaded[world.members[cluster, 1 + place]] = -1
     match_velocities(world, cluster)
     clear(adjoint.before)

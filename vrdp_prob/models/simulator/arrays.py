@@ -107,12 +107,12 @@ def _is_sphere(worlds: Worlds) -> Float[Tensor, "body"]:
 
 def _body_starts(worlds: Worlds, effects: "Sequence[Effect]") -> Float[Tensor, "world body state_and_time"]:
     columns = [worlds.angle[..., None], worlds.velocity, worlds.spin[..., None]]
+    rolling = torch.zeros_like(worlds.velocity)
     if slips(effects):
-        rolling = [effect.rolling_velocity(worlds.velocity, worlds.parameters) for effect in effects]
-        given = [value for value in rolling if value is not None]
-        of_sphere = given[-1] if given else torch.zeros_like(worlds.velocity)
-        columns.append(torch.where(_is_sphere(worlds)[:, None] > 0, of_sphere, worlds.velocity))
-    parts = [worlds.position, *columns, worlds.release_time[..., None]]
+        stated = [effect.rolling_velocity(worlds.velocity, worlds.parameters) for effect in effects]
+        of_spheres = ([rolling] + [value for value in stated if value is not None])[-1]
+        rolling = torch.where(_is_sphere(worlds)[:, None] > 0, of_spheres, worlds.velocity)
+    parts = [worlds.position, *columns, rolling, worlds.release_time[..., None]]
     return torch.cat([part.to(torch.float64) for part in parts], dim=-1)
 
 

@@ -14,7 +14,14 @@ Source: D. Baraff, Fast contact force computation for nonpenetrating rigid bodie
 
 import math
 
-from vrdp_prob.models.simulator.laws_kernel import COUPLED, SLIPS, compiled, constraint_law, constraint_law_vjp
+from vrdp_prob.models.simulator.laws_kernel import (
+    CONSTRAINT_LAW_VJP,
+    COUPLED,
+    SLIPS,
+    compiled,
+    constraint_law,
+    contact_vjp,
+)
 from vrdp_prob.models.simulator.motion import ROLLING_SHARE
 from vrdp_prob.models.simulator.world_kernel import (
     FIXED,
@@ -117,12 +124,12 @@ def split(world, cluster):
 
     The last row gets the new cluster of each body, or -1 for a body that was not in the old one.
     """
-    count = world.clock.shape[0]
+    count, coupled = world.clock.shape[0], world.model[COUPLED] != 0
     labels = world.members[count + 1]
     for body in range(count):
         inside = cluster_of(world, body) == cluster
-        labels[1 + body] = (cluster if COUPLED else body) if inside else -1
-    changed = not COUPLED
+        labels[1 + body] = (cluster if coupled else body) if inside else -1
+    changed = not coupled
     while changed:
         changed = False
         for touch in range(touch_count(world)):
@@ -144,7 +151,8 @@ def split(world, cluster):
 @compiled
 def push_mobility(world, body):
     """Acceleration of a body per force; a sphere that may slip rolls along, which takes part of the force."""
-    rolls = SLIPS and world.body[body, IS_SPHERE] != 0.0 and world.phase[body, MOVING] != SLIPPING
+    slips = world.model[SLIPS] != 0
+    rolls = slips and world.body[body, IS_SPHERE] != 0.0 and world.phase[body, MOVING] != SLIPPING
     return world.body[body, INVERSE_MASS] * (ROLLING_SHARE if rolls else 1.0)
 
 
@@ -171,6 +179,7 @@ def set_constraints(world, cluster):
             continue
         a, b = int(row[TOUCH_A]), int(row[TOUCH_B])
         constraint_law(
+            world.model,
             int(row[TOUCH_KIND]),
             world.stages[WORK, a],
             world.stages[WORK, b],
@@ -320,8 +329,8 @@ def constraint_bar_states(world, adjoint, touch, before):
     """Add the derivative of a constraint, times its adjoint at hand, to states `before` and to constants."""
     row = world.touching[touch]
     a, b = int(row[TOUCH_A]), int(row[TOUCH_B])
-    constraint_law_vjp(
-        int(row[TOUCH_KIND]),
+    contact_vjp(
+        world.model[CONSTRAINT_LAW_VJP + int(row[TOUCH_KIND])],
         world.stages[WORK, a],
         world.stages[WORK, b],
         world.body[a],

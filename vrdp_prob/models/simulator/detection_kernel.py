@@ -13,11 +13,9 @@ body systems, PhD thesis, Berkeley 1996, section 2.3 (conservative advancement),
 # ruff: noqa: PLR0917
 
 import math
-from typing import NamedTuple
 
-import numpy as np
-
-from vrdp_prob.models.simulator.laws_kernel import allocating, compiled
+from vrdp_prob.models.simulator.bundle import Bundle, room
+from vrdp_prob.models.simulator.laws_kernel import compiled
 from vrdp_prob.models.simulator.world_kernel import LENGTH, share_of
 
 TOUCHING = 1e-12
@@ -39,19 +37,13 @@ ANGLE_FIRST, LOOK, LOOK_FEATURE, KNOWN, BOUNDS, CORNER, POWERS = 2, 4, 5, 6, 8, 
 GAP, RATE, CURVATURE, STILL_RATE = 0, 1, 2, 3
 
 
-class Pairs(NamedTuple):
-    """Next contact of each pair, and room for a search."""
-
-    table: (
-        np.ndarray
-    )  # [first, second, (time, kind, owner, overlapping, last contact, features, pressing)] with first < second
-    local: np.ndarray  # [11, 8]
-
-
-@allocating
-def new_pairs(count):
-    """Room for the contacts of `count` bodies."""
-    return Pairs(np.zeros((count, count, 12)), np.zeros((11, 8)))
+Pairs = Bundle(
+    "Pairs",
+    # [first, second, (time, kind, owner, overlapping, last contact, features, pressing)] with first < second
+    table=room("body", "body", 12),
+    local=room(11, 8),
+)
+"""Next contact of each pair, and room for a search."""
 
 
 @compiled

@@ -58,7 +58,7 @@ def coefficient(polynomial, phase, power, of_spin):
     if of_spin != 0.0:
         return polynomial[power, 5] * phase[SPIN_SENSE]
     x, y = polynomial[power, 3], polynomial[power, 4]
-    if SLIPS and phase[MOVING] == SLIPPING:
+    if phase[MOVING] == SLIPPING:
         x, y = x - polynomial[power, 6], y - polynomial[power, 7]
     return x * phase[REFERENCE_X] + y * phase[REFERENCE_Y]
 
@@ -103,7 +103,7 @@ def settle(world, body, t, y):
     if world.kind[body, FIXED]:
         return
     push = world.stages[PUSH, body]
-    if COUPLED:
+    if world.model[COUPLED]:
         take_states(world, cluster_of(world, body), 0.0)
     set_push_at(world, body, t, y)
     # What no friction holds at rest counts as moving with speed 0: its derivative by the velocity does not vanish.
@@ -111,7 +111,7 @@ def settle(world, body, t, y):
         phase[SPIN_SENSE] = math.copysign(1.0, y[5])
     else:
         y[5] = 0.0
-    if SLIPS:
+    if world.model[SLIPS]:
         slip = math.hypot(y[3] - y[6], y[4] - y[7])
         if world.body[body, IS_SPHERE] != 0.0 and slip > SLOWEST:
             phase[MOVING] = SLIPPING
@@ -127,7 +127,7 @@ def settle(world, body, t, y):
         y[3], y[4] = SLOWEST * push[0] / size, SLOWEST * push[1] / size
     elif push[2] > 0.0:
         phase[MOVING] = RESTING
-    if SLIPS:
+    if world.model[SLIPS]:
         y[6], y[7] = y[3], y[4]
 
 
@@ -138,14 +138,14 @@ def set_push_at(world, body, t, y):
     The states of other bodies are those in the work row.
     """
     push = world.stages[PUSH, body]
-    external(t, y, world.phase[body], world.body[body], world.shared, push)
-    if COUPLED:
+    external(world.model, t, y, world.phase[body], world.body[body], world.shared, push)
+    if world.model[COUPLED]:
         force, cluster = world.force[0], cluster_of(world, body)
         for place in range(world.members[cluster, 0]):
             other = world.members[cluster, 1 + place]
             if other != body:
                 state = world.stages[WORK, other]
-                pair_force(t, y, state, world.body[body], world.body[other], world.shared, force)
+                pair_force(world.model, t, y, state, world.body[body], world.body[other], world.shared, force)
                 for c in range(2):
                     push[c] += push_mobility(world, body) * force[c]
 
@@ -157,7 +157,7 @@ def set_references(world, body):
     y = world.polynomial[body, 0]
     if phase[MOVING] != RESTING:
         phase[REFERENCE_X], phase[REFERENCE_Y] = y[3], y[4]
-    if SLIPS and phase[MOVING] == SLIPPING:
+    if phase[MOVING] == SLIPPING:
         phase[REFERENCE_X], phase[REFERENCE_Y] = y[3] - y[6], y[4] - y[7]
 
 
@@ -186,7 +186,7 @@ def cut(world, cluster, share, root, ending, what):
 def rate_of_reference(world, body):
     """Rate of what a piece has as reference direction, the velocity or the slip, where the piece begins."""
     rate = world.stages[0, body]
-    if SLIPS and world.phase[body, MOVING] == SLIPPING:
+    if world.phase[body, MOVING] == SLIPPING:
         return rate[3] - rate[6], rate[4] - rate[7]
     return rate[3], rate[4]
 
@@ -203,7 +203,7 @@ def bends(world, body):
 @compiled
 def lingering(world, body):
     """Speed, or slip, below which a body stops whose direction of motion changes."""
-    return LINGERING_SLIP if SLIPS and world.phase[body, MOVING] == SLIPPING else LINGERING
+    return LINGERING_SLIP if world.phase[body, MOVING] == SLIPPING else LINGERING
 
 
 @compiled
@@ -252,14 +252,14 @@ def find_ending(world, cluster, body, share):
 def find_crossing(world, cluster, body, share):
     """Share of the step, at most `share`, at which a body first crosses a boundary."""
     y, phase = world.stages[WORK, body], world.phase[body]
-    for which in range(BOUNDARIES):
+    for which in range(world.model[BOUNDARIES]):
         side, low = phase[SIDES + which], 0.0
         for index in range(1, CROSSING_LOOKS + 1):
             high = share * index / CROSSING_LOOKS
             evaluate(world.polynomial[body], high, y)
-            if side * boundary(which, y, world.body[body], world.shared) < 0.0:
+            if side * boundary(world.model, which, y, world.body[body], world.shared) < 0.0:
                 root = crossing_share(world, body, which, low, high)
-                share = cut(world, cluster, share, root, CROSSES, body * BOUNDARIES + which)
+                share = cut(world, cluster, share, root, CROSSES, body * world.model[BOUNDARIES] + which)
                 break
             low = high
     return share
@@ -274,7 +274,7 @@ def crossing_share(world, body, which, low, high):
         if middle <= low or middle >= high:
             return high
         evaluate(world.polynomial[body], middle, y)
-        if side * boundary(which, y, world.body[body], world.shared) < 0.0:
+        if side * boundary(world.model, which, y, world.body[body], world.shared) < 0.0:
             high = middle
         else:
             low = middle
@@ -283,8 +283,8 @@ def crossing_share(world, body, which, low, high):
 @compiled
 def set_sides(world, body, y):
     """Note on which side of each boundary a body is."""
-    for which in range(BOUNDARIES):
-        value = boundary(which, y, world.body[body], world.shared)
+    for which in range(world.model[BOUNDARIES]):
+        value = boundary(world.model, which, y, world.body[body], world.shared)
         world.phase[body, SIDES + which] = math.copysign(1.0, value)
 
 
@@ -297,6 +297,6 @@ def really_stops(world, cluster, share):
     y = world.stages[WORK, body]
     vanished = 2.0 * lingering(world, body) if lingers(world, cluster, body) else VANISHED
     evaluate(world.polynomial[body], share, y)
-    if SLIPS and world.phase[body, MOVING] == SLIPPING:
+    if world.phase[body, MOVING] == SLIPPING:
         return math.hypot(y[3] - y[6], y[4] - y[7]) <= vanished
     return math.hypot(y[3], y[4]) <= vanished

@@ -6,6 +6,12 @@
 
 import math
 
+from vrdp_prob.models.simulator.apart_kernel import (
+    begin_clusters_apart,
+    depth_apart,
+    restart_apart,
+    search_pair_apart,
+)
 from vrdp_prob.models.simulator.cluster_kernel import (
     HOLD,
     PARTED,
@@ -35,7 +41,6 @@ from vrdp_prob.models.simulator.laws_kernel import (
     BOUNDARIES,
     COUPLED,
     RUBS,
-    SLIPS,
     STATE_SIZE,
     compiled,
     contact_law,
@@ -43,9 +48,8 @@ from vrdp_prob.models.simulator.laws_kernel import (
 )
 from vrdp_prob.models.simulator.motion import ROLLING_SHARE
 from vrdp_prob.models.simulator.motion_kernel import cluster_derivatives, take_states
-from vrdp_prob.models.simulator.piece_kernel import begin_clusters, forget, leave_piece, leave_pieces, restart
+from vrdp_prob.models.simulator.piece_kernel import forget, leave_piece, leave_pieces
 from vrdp_prob.models.simulator.pressing_kernel import ROOM_COUNTS, gentle_speed, set_push, start, start_spin
-from vrdp_prob.models.simulator.search_kernel import depth, search_pair
 from vrdp_prob.models.simulator.tape_kernel import (
     BEFORE_SECOND,
     CLOSING_SPEED,
@@ -105,7 +109,7 @@ def overlaps(world, pairs, body, t):
         if other == body or world.phase[other, ALIVE] == 0.0 or (world.kind[body, FIXED] and world.kind[other, FIXED]):
             continue
         i, j = min(body, other), max(body, other)
-        if depth(world, pairs, i, j, t) < -SLACK:
+        if depth_apart(world, pairs, i, j, t) < -SLACK:
             pairs.table[i, j, OVERLAPPING] = 1.0
             outcome = OVERLAP
     return outcome
@@ -125,11 +129,11 @@ def release(world, pairs, tape, body, horizon):
     world.clock[body, STEP] = math.inf
     set_sides(world, body, y)
     cluster = body
-    if COUPLED and not world.kind[body, FIXED]:
+    if world.model[COUPLED] and not world.kind[body, FIXED]:
         cluster = join_others(world, tape, row, body, t)
     settle(world, body, t, y)
     outcome = overlaps(world, pairs, body, t)
-    return max(outcome, begin_clusters(world, pairs, tape, cluster, t, horizon))
+    return max(outcome, begin_clusters_apart(world, pairs, tape, cluster, t, horizon))
 
 
 @compiled
@@ -152,7 +156,7 @@ def end_pieces(world, pairs, tape, cluster, horizon):
     if ending == CONTINUES:
         add_row(tape, CONTINUE, cluster, t)
         leave_pieces(world, tape, cluster, t)
-        return begin_clusters(world, pairs, tape, cluster, t, horizon)
+        return begin_clusters_apart(world, pairs, tape, cluster, t, horizon)
     if ending in (STOPS, SPIN_STOPS):
         add_row(tape, STOP if ending == STOPS else SPIN_STOP, what, t)
         tape.counts[EVENTS] += 1
@@ -162,7 +166,7 @@ def end_pieces(world, pairs, tape, cluster, horizon):
         cross(world, tape, cluster, what, t)
     else:
         change_contacts(world, pairs, tape, cluster, t, ending, what)
-    return restart(world, pairs, tape, cluster, t, horizon)
+    return restart_apart(world, pairs, tape, cluster, t, horizon)
 
 
 @compiled
@@ -171,7 +175,7 @@ def stop(world, cluster, body, t, moves):
     y = world.polynomial[body, 0]
     if not moves:
         y[5] = 0.0
-    elif SLIPS and world.phase[body, MOVING] == SLIPPING:
+    elif world.phase[body, MOVING] == SLIPPING:
         begin_rolling(y)
     else:
         rest_at_once(y)
@@ -186,9 +190,7 @@ def stop(world, cluster, body, t, moves):
 @compiled
 def rest_at_once(y):
     """Take the velocity from a state."""
-    y[3], y[4] = 0.0, 0.0
-    if SLIPS:
-        y[6], y[7] = 0.0, 0.0
+    y[3], y[4], y[6], y[7] = 0.0, 0.0, 0.0, 0.0
 
 
 @compiled
@@ -202,8 +204,8 @@ def begin_rolling(y):
 @compiled
 def cross(world, tape, cluster, what, t):
     """Let a body pass to the other side of a boundary."""
-    body = what // max(BOUNDARIES, 1)
-    which = what - body * BOUNDARIES
+    body = what // world.model[BOUNDARIES]
+    which = what - body * world.model[BOUNDARIES]
     row = add_row(tape, CROSS, body, t)
     tape.integers[row, SECOND] = which
     leave_pieces(world, tape, cluster, t)
@@ -224,11 +226,11 @@ def kick_bodies(world, pairs, tape, which, horizon):
         cluster = cluster_of(world, body)
         leave_pieces(world, tape, cluster, t)
         y = world.polynomial[body, 0]
-        kick(which, t, y, world.body[body], world.shared, change)
+        kick(world.model, which, t, y, world.body[body], world.shared, change)
         for c in range(3):
             y[3 + c] += change[c]
         settle(world, body, t, y)
-        outcome = max(outcome, restart(world, pairs, tape, cluster, t, horizon))
+        outcome = max(outcome, restart_apart(world, pairs, tape, cluster, t, horizon))
     return outcome
 
 
@@ -255,7 +257,7 @@ def change_contacts(world, pairs, tape, cluster, t, ending, what):
         forget(world, pairs, cluster, PARTED, t)
         return
     take_states(world, cluster, 0.0)
-    cluster_derivatives(world, cluster, t, world.stages[SPARE])
+    cluster_derivatives(world, cluster, t, SPARE)
     set_push(world, what, t)
     if ending == YIELDS:
         start(world, what)
@@ -296,13 +298,13 @@ def collide(world, pairs, tape, i, j, horizon):
     result, ya, yb = tape.local[RESULT], tape.local[STATE_A], tape.local[STATE_B]
     evaluate_at(world, a, t, ya)
     evaluate_at(world, b, t, yb)
-    contact_law(kind, ya, yb, world.body[a], world.body[b], feature, world.shared, result)
+    contact_law(world.model, kind, ya, yb, world.body[a], world.body[b], feature, world.shared, result)
     if not result[6] > 0.0:
-        search_pair(world, pairs, i, j, t + CRAWL, horizon)
+        search_pair_apart(world, pairs, i, j, t + CRAWL, horizon)
         return OK
-    if feature[6] != 0.0 and not RUBS and result[6] > gentle_speed(world, a, b):
+    if feature[6] != 0.0 and world.model[RUBS] == 0 and result[6] > gentle_speed(world, a, b):
         feature[6] = 0.0
-        contact_law(kind, ya, yb, world.body[a], world.body[b], feature, world.shared, result)
+        contact_law(world.model, kind, ya, yb, world.body[a], world.body[b], feature, world.shared, result)
     pairs.table[i, j, LAST_CONTACT] = t
     row = add_pair(tape, CONTACT, a, b, t)
     tape.counts[EVENTS] += 1
@@ -317,10 +319,10 @@ def collide(world, pairs, tape, i, j, horizon):
     leave_pieces(world, tape, cluster, t)
     if not world.kind[a, FIXED] and not world.kind[b, FIXED]:
         cluster = join(world, a, b)
-    if feature[6] != 0.0 and not RUBS:
+    if feature[6] != 0.0 and world.model[RUBS] == 0:
         hold_contact(world, a, b, kind, feature)
     if not world.kind[a, FIXED]:
         resume(world, a, t, result[0:3])
     if not world.kind[b, FIXED]:
         resume(world, b, t, result[3:6])
-    return restart(world, pairs, tape, cluster, t, horizon)
+    return restart_apart(world, pairs, tape, cluster, t, horizon)

@@ -1,26 +1,25 @@
-"""A physical law is written once, as a plain function of numbers; this module turns it into compiled source.
+"""A physical law is written once, as a plain function of numbers; this module records and differentiates it.
 
 A law calls the mathematics of `vrdp_prob.models.simulator.mathematics` and the ordinary operators. Called with numbers
-or tensors it computes. Called with the symbols of this module it is recorded, and `value_source` and `vjp_source` write
-the recorded steps down as straight-line Python (common steps once): the law's value, and its vector-Jacobian product
-(reverse-mode derivative; A. Griewank and A. Walther, Evaluating Derivatives, 2nd ed. 2008, section 3.2).
+or tensors it computes. Called with the symbols of this module it is recorded, common steps once. `vector_jacobian`
+records its derivative in turn (reverse mode; A. Griewank and A. Walther, Evaluating Derivatives, 2nd ed. 2008,
+section 3.2), and `machine_code.py` turns what was recorded into compiled functions.
 """
 
 import operator
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
 Scalar = Any
 """A number in a law: float, tensor or `Symbol`."""
 
-_COMPARISONS = frozenset({"<", "<=", ">", ">="})
+COMPARISONS = frozenset({"<", "<=", ">", ">="})
 _ARITHMETIC: dict[str, Callable[[float, float], float]] = {
     "+": operator.add,
     "-": operator.sub,
     "*": operator.mul,
     "/": operator.truediv,
 }
-_INFIX = frozenset(_ARITHMETIC) | _COMPARISONS
 _TINY = 1e-300
 """Keeps a derivative finite where a root or a logarithm has none."""
 
@@ -101,9 +100,9 @@ class Recorder:
     def __init__(self) -> None:
         self._steps: dict[tuple[object, ...], Symbol] = {}
 
-    def input(self, text: str) -> Symbol:
-        """An input whose value the compiled source reads from the expression `text`."""
-        return self._intern("input", (), text)
+    def input(self, name: str, place: int | None = None) -> Symbol:
+        """An input: an argument of the compiled function, or a number of an array."""
+        return self._intern("input", (), (name, place))
 
     def constant(self, value: float) -> Symbol:
         """A constant."""
@@ -130,6 +129,8 @@ class Recorder:
             return arguments[1] if arguments[1] is arguments[2] else None
         if operation == "neg":
             return self._negated(arguments[0])
+        if operation == "pow":
+            return self._power(*arguments)
         if operation not in _ARITHMETIC:
             return None
         a, b = arguments[0].constant, arguments[1].constant
@@ -159,12 +160,15 @@ class Recorder:
                 return other if factor.constant == 1 else -other
         return None
 
+    def _power(self, base: Symbol, exponent: Symbol) -> Symbol | None:
+        return base if exponent.constant == 1 else base * base if exponent.constant == 2 else None
+
     def _quotient(self, left: Symbol, right: Symbol) -> Symbol | None:
         return left if right.constant == 1 or left.constant == 0 else None
 
 
-def _ordered(outputs: Iterable[Symbol]) -> list[Symbol]:
-    """Steps that the outputs need, arguments first."""
+def ordered(outputs: Iterable[Symbol]) -> list[Symbol]:
+    """Steps that the outputs need, arguments first, each once."""
     order: list[Symbol] = []
     seen: set[int] = set()
     stack = [(output, False) for output in reversed(list(outputs))]
@@ -224,14 +228,14 @@ _DERIVATIVES: dict[str, Callable[..., tuple[Scalar, ...]]] = {
 
 def vector_jacobian(outputs: Sequence[Scalar], bars: Sequence[Symbol], inputs: Sequence[Symbol]) -> list[Symbol]:
     """Adjoints of the inputs of a recorded law from adjoints (`bars`) of its outputs."""
-    recorder = inputs[0].recorder
+    recorder = bars[0].recorder
     adjoint: dict[int, Symbol] = {}
     symbols = [output if isinstance(output, Symbol) else recorder.constant(output) for output in outputs]
     for output, bar in zip(symbols, bars, strict=True):
         adjoint[output.number] = adjoint.get(output.number, recorder.constant(0)) + bar
-    for symbol in reversed(_ordered(symbols)):
+    for symbol in reversed(ordered(symbols)):
         bar = adjoint.get(symbol.number, recorder.constant(0))
-        if bar.constant == 0 or not symbol.arguments or symbol.operation in _COMPARISONS:
+        if bar.constant == 0 or not symbol.arguments or symbol.operation in COMPARISONS:
             continue
         for argument, part in zip(symbol.arguments, _partials(symbol, bar), strict=True):
             adjoint[argument.number] = adjoint.get(argument.number, recorder.constant(0)) + part
@@ -240,50 +244,4 @@ def vector_jacobian(outputs: Sequence[Scalar], bars: Sequence[Symbol], inputs: S
 
 def depends(outputs: Sequence[Scalar], on: Symbol) -> bool:
     """Whether one of the outputs of a recorded law depends on an input."""
-    return any(step is on for step in _ordered(output for output in outputs if isinstance(output, Symbol)))
-
-
-def assignments(outputs: Mapping[str, Scalar], *, add: bool = False) -> list[str]:
-    """Source lines that compute the outputs and assign them (or add them) to the given targets.
-
-    Outputs that are the constant 0 are left out where they would be added.
-    """
-    wanted = {target: value for target, value in outputs.items() if not (add and _is_zero(value))}
-    names: dict[int, str] = {}
-    lines = []
-    for symbol in _ordered(value for value in wanted.values() if isinstance(value, Symbol)):
-        if symbol.operation == "constant":
-            names[symbol.number] = repr(symbol.value)
-        else:
-            names[symbol.number] = f"v{len(names)}"
-            lines.append(f"{names[symbol.number]} = {_expression(symbol, names)}")
-    sign = "+=" if add else "="
-    for target, value in wanted.items():
-        text = names[value.number] if isinstance(value, Symbol) else repr(float(value))
-        lines.append(f"{target} {sign} {text}")
-    return lines
-
-
-def function_source(name: str, arguments: str, lines: Sequence[str]) -> str:
-    """Source of a compiled function with the given lines as its body."""
-    return "\n".join(["@compiled", f"def {name}({arguments}):", *(f"    {line}" for line in lines or ["pass"]), "\n"])
-
-
-def _is_zero(value: Scalar) -> bool:
-    return (value.constant if isinstance(value, Symbol) else value) == 0
-
-
-def _expression(symbol: Symbol, names: Mapping[int, str]) -> str:
-    parts = [names[argument.number] for argument in symbol.arguments]
-    operation = symbol.operation
-    if operation == "input":
-        return str(symbol.value)
-    if operation in _INFIX:
-        return f"({parts[0]}) {operation} ({parts[1]})"
-    if operation == "neg":
-        return f"-({parts[0]})"
-    if operation == "where":
-        return f"({parts[1]}) if ({parts[0]}) else ({parts[2]})"
-    if operation in ("min", "max", "abs"):
-        return f"{operation}({', '.join(parts)})"
-    return f"math.{operation}({', '.join(parts)})"
+    return any(step is on for step in ordered(output for output in outputs if isinstance(output, Symbol)))

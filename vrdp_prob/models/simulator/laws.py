@@ -1,4 +1,4 @@
-"""The laws of a model as compiled source: every hook is recorded once and written down with its derivative."""
+"""The laws of a model as functions to compile: every hook is recorded once, and written down with its derivative."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -6,15 +6,8 @@ from dataclasses import dataclass
 from vrdp_prob.models.effects.effect import BodyView, Effect
 from vrdp_prob.models.parameters import Parameter, Scope
 from vrdp_prob.models.simulator.contact import ContactKind, Feature, contact, contact_geometry, room_on_feature
-from vrdp_prob.models.simulator.formula import (
-    Recorder,
-    Scalar,
-    Symbol,
-    assignments,
-    depends,
-    function_source,
-    vector_jacobian,
-)
+from vrdp_prob.models.simulator.formula import Recorder, Scalar, Symbol, depends, vector_jacobian
+from vrdp_prob.models.simulator.machine_code import ARRAY, NUMBER, law_function
 from vrdp_prob.models.simulator.mathematics import length, where
 from vrdp_prob.models.simulator.motion import (
     SLIPPING_ABOVE,
@@ -29,16 +22,12 @@ from vrdp_prob.models.simulator.motion import (
 
 STATE = ("x", "y", "angle", "vx", "vy", "spin")
 ROLLING = ("rolling_x", "rolling_y")
-"""Numbers of a body's state behind `STATE` in models where spheres slip."""
+"""Numbers of a body's state behind `STATE`; they mean something in models where spheres slip only."""
+STATE_SIZE = len(STATE) + len(ROLLING)
 CONSTANTS = ("mass", "inverse_mass", "inverse_inertia", "restitution", "radius", "is_sphere")
 """Constants of a body that every model has, in the order of the kernel's array."""
 _SIDES = 6
 """First column of the sides in the kernel's phases."""
-
-
-def state_size(effects: Sequence[Effect]) -> int:
-    """Numbers in a body's state."""
-    return len(STATE) + (len(ROLLING) if slips(effects) else 0)
 
 
 @dataclass(frozen=True)
@@ -79,19 +68,19 @@ class LawInputs:
         self.effects, self.layout = effects, layout
         self.recorder = Recorder()
         self.time = self.recorder.input("t")
-        self.shared = {name: self.recorder.input(f"shared[{i}]") for i, name in enumerate(layout.shared)}
+        self.shared = {name: self.recorder.input("shared", i) for i, name in enumerate(layout.shared)}
 
-    def array(self, text: str, size: int) -> list[Symbol]:
+    def array(self, name: str, size: int) -> list[Symbol]:
         """Symbols for the numbers of an array."""
-        return [self.recorder.input(f"{text}[{index}]") for index in range(size)]
+        return [self.recorder.input(name, index) for index in range(size)]
 
-    def state(self, text: str) -> list[Symbol]:
+    def state(self, name: str) -> list[Symbol]:
         """Symbols for the state of a body."""
-        return self.array(text, state_size(self.effects))
+        return self.array(name, STATE_SIZE)
 
-    def constants(self, text: str) -> list[Symbol]:
+    def constants(self, name: str) -> list[Symbol]:
         """Symbols for the constants of a body."""
-        return self.array(text, len(self.layout.constants))
+        return self.array(name, len(self.layout.constants))
 
     def phase(self) -> list[Symbol]:
         """Symbols for the phase of a body."""
@@ -143,33 +132,40 @@ def with_kick(effects: Sequence[Effect]) -> list[Effect]:
     return [effect for effect in effects if effect.overrides("kick")]
 
 
-def _targets(name: str, values: Sequence[Scalar]) -> dict[str, Scalar]:
-    return {f"{name}[{index}]": value for index, value in enumerate(values)}
+def _arguments(text: str) -> dict[str, str]:
+    """Types of arguments by name: numbers or arrays."""
+    return {name: NUMBER if name in ("t", "of_value") else ARRAY for name in text.split()}
 
 
-def _vjp_lines(outputs: Sequence[Scalar], bars: Sequence[Symbol], arrays: Mapping[str, Sequence[Symbol]]) -> list[str]:
-    """Lines that add the adjoints of inputs to arrays, by the names of these."""
+def _vjp(
+    name: str,
+    arguments: str,
+    outputs: Sequence[Scalar],
+    bars: Sequence[Symbol],
+    arrays: Mapping[str, Sequence[Symbol]],
+) -> str:
+    """Function that adds the adjoints of inputs to arrays, which are its last arguments."""
     adjoints = iter(vector_jacobian(outputs, bars, [symbol for symbols in arrays.values() for symbol in symbols]))
-    targets = {target: next(adjoints) for array, symbols in arrays.items() for target in _targets(array, symbols)}
-    return assignments(targets, add=True)
+    by_array = {array: [next(adjoints) for _ in symbols] for array, symbols in arrays.items()}
+    return law_function(name, _arguments(f"{arguments} {' '.join(arrays)}"), by_array, add=True)
 
 
-def _motion_source(effects: Sequence[Effect], layout: Layout) -> str:
+def _motion_text(effects: Sequence[Effect], layout: Layout) -> str:
     inputs = LawInputs(effects, layout)
     state, constants = inputs.state("y"), inputs.constants("body")
     phase = inputs.phase()
     body = inputs.view(state, constants, phase)
     outputs = derivative(effects, inputs.time, body, Phase(phase[0], phase[3]), inputs.shared)
-    arguments = "t, y, phase, body, shared"
-    value = function_source("motion", f"{arguments}, out", assignments(_targets("out", outputs)))
+    outputs = (*outputs, *[0.0] * (STATE_SIZE - len(outputs)))
+    value = law_function("motion", _arguments("t y phase body shared out"), {"out": outputs})
     arrays = {
         "y_bar": state,
         "body_bar": constants,
         "shared_bar": list(inputs.shared.values()),
         "t_bar": [inputs.time],
     }
-    lines = _vjp_lines(outputs, inputs.array("bar", len(state)), arrays)
-    return value + function_source("motion_vjp", f"{arguments}, bar, y_bar, body_bar, shared_bar, t_bar", lines)
+    bars = inputs.array("bar", STATE_SIZE)
+    return value + _vjp("motion_vjp", "t y phase body shared bar", outputs, bars, arrays)
 
 
 def _external(effects: Sequence[Effect], inputs: LawInputs) -> list[Scalar]:
@@ -182,15 +178,20 @@ def _external(effects: Sequence[Effect], inputs: LawInputs) -> list[Scalar]:
     return [share * ax, share * ay, limit, spin_deceleration(effects, inputs.time, body, inputs.shared)]
 
 
-def _external_source(effects: Sequence[Effect], layout: Layout) -> str:
-    lines = assignments(_targets("out", _external(effects, LawInputs(effects, layout))))
-    return function_source("external", "t, y, phase, body, shared, out", lines)
+def _external_text(effects: Sequence[Effect], layout: Layout) -> str:
+    outputs = _external(effects, LawInputs(effects, layout))
+    return law_function("external", _arguments("t y phase body shared out"), {"out": outputs})
 
 
 def is_timed(effects: Sequence[Effect], layout: Layout) -> bool:
     """Whether what pushes a body at rest, or its friction, changes with time."""
     inputs = LawInputs(effects, layout)
     return depends(_external(effects, inputs), inputs.time) or depends(_pair_force(effects, inputs), inputs.time)
+
+
+def is_coupled(effects: Sequence[Effect]) -> bool:
+    """Whether forces act between bodies that do not touch."""
+    return any(effect.overrides("pair_force") for effect in effects)
 
 
 def _pair_force(effects: Sequence[Effect], inputs: LawInputs) -> list[Scalar]:
@@ -203,11 +204,11 @@ def _pair_force(effects: Sequence[Effect], inputs: LawInputs) -> list[Scalar]:
     return total
 
 
-def _pair_source(effects: Sequence[Effect], layout: Layout) -> str:
+def _pair_text(effects: Sequence[Effect], layout: Layout) -> str:
     inputs = LawInputs(effects, layout)
     force = _pair_force(effects, inputs)
-    arguments = "t, ya, yb, body_a, body_b, shared"
-    value = function_source("pair_force", f"{arguments}, out", assignments(_targets("out", force)))
+    arguments = "t ya yb body_a body_b shared"
+    value = law_function("pair_force", _arguments(f"{arguments} out"), {"out": force})
     arrays = {
         "ya_bar": inputs.state("ya"),
         "yb_bar": inputs.state("yb"),
@@ -216,94 +217,93 @@ def _pair_source(effects: Sequence[Effect], layout: Layout) -> str:
         "shared_bar": list(inputs.shared.values()),
         "t_bar": [inputs.time],
     }
-    lines = _vjp_lines(force, inputs.array("bar", 2), arrays)
-    return value + function_source("pair_force_vjp", f"{arguments}, bar, {', '.join(arrays)}", lines)
+    return value + _vjp("pair_force_vjp", f"{arguments} bar", force, inputs.array("bar", 2), arrays)
 
 
-def _by_number(name: str, arguments: str, blocks: Sequence[Sequence[str]], nothing: str) -> str:
-    """Function that does what belongs to the number `which`."""
-    lines = []
-    for number, block in enumerate(blocks):
-        lines += [f"if which == {number}:", *(f"    {line}" for line in block or ["pass"])]
-    return function_source(name, f"which, {arguments}", [*lines, nothing])
-
-
-def _kick_source(effects: Sequence[Effect], layout: Layout) -> str:
-    times, of_times, changes, of_changes = [], [], [], []
-    for effect in with_kick(effects):
-        inputs = LawInputs(effects, layout)
-        shared, state, constants = list(inputs.shared.values()), inputs.state("y"), inputs.constants("body")
-        time = inputs.recorder.constant(0.0) + effect.kick_time(inputs.shared)
-        change = effect.kick(inputs.time, inputs.view(state, constants), inputs.shared)
-        times.append([*assignments({"time": time}), "return time"])
-        of_times.append(_vjp_lines([time], [inputs.recorder.input("bar")], {"shared_bar": shared}))
-        changes.append(assignments(_targets("out", change)))
-        arrays = {"y_bar": state, "body_bar": constants, "shared_bar": shared, "t_bar": [inputs.time]}
-        of_changes.append(_vjp_lines(change, inputs.array("bar", 3), arrays))
-    arguments = "t, y, body, shared"
-    return (
-        _by_number("kick_time", "shared", times, "return math.inf")
-        + _by_number("kick_time_vjp", "shared, bar, shared_bar", of_times, "return")
-        + _by_number("kick", f"{arguments}, out", changes, "return")
-        + _by_number("kick_vjp", f"{arguments}, bar, y_bar, body_bar, shared_bar, t_bar", of_changes, "return")
-    )
-
-
-def _boundary_source(effects: Sequence[Effect], layout: Layout) -> str:
-    values, rates, of_values = [], [], []
-    for effect in with_boundary(effects):
-        inputs = LawInputs(effects, layout)
-        shared, state, constants = list(inputs.shared.values()), inputs.state("y"), inputs.constants("body")
-        value = inputs.recorder.constant(0.0) + effect.boundary(inputs.view(state, constants), inputs.shared)
-        slopes = vector_jacobian([value], [inputs.recorder.constant(1.0)], state)
-        products = [slope * rate for slope, rate in zip(slopes, inputs.state("rate"), strict=True)]
-        values.append([*assignments({"value": value}), "return value"])
-        rates.append([*assignments({"rate_of": sum(products[1:], products[0])}), "return rate_of"])
-        arrays = {"y_bar": state, "body_bar": constants, "shared_bar": shared}
-        of_values.append(_vjp_lines([value], [inputs.recorder.input("bar")], arrays))
-    return (
-        _by_number("boundary", "y, body, shared", values, "return 1.0")
-        + _by_number("boundary_rate", "y, rate, body, shared", rates, "return 0.0")
-        + _by_number("boundary_vjp", "y, body, shared, bar, y_bar, body_bar, shared_bar", of_values, "return")
-    )
-
-
-_CONTACT_ARGUMENTS = "ya, yb, body_a, body_b, feature, shared"
-_CONTACT_BARS = "bar, ya_bar, yb_bar, body_a_bar, body_b_bar, shared_bar"
-
-
-def _contact_source(kind: ContactKind, effects: Sequence[Effect], layout: Layout) -> str:
+def _kick_text(number: int, effect: Effect, effects: Sequence[Effect], layout: Layout) -> str:
     inputs = LawInputs(effects, layout)
-    state_a, state_b = inputs.state("ya"), inputs.state("yb")
-    constants_a, constants_b = inputs.constants("body_a"), inputs.constants("body_b")
-    feature = inputs.array("feature", 7)
-    a, b = inputs.view(state_a, constants_a), inputs.view(state_b, constants_b)
-    of_a, of_b = Feature(*feature[:3]), Feature(*feature[3:6])
-    geometry = contact_geometry(kind, a, b, of_a, of_b)
-    result = contact(effects, geometry, a, b, inputs.shared, pressing=feature[6])
+    shared, state, constants = list(inputs.shared.values()), inputs.state("y"), inputs.constants("body")
+    time = effect.kick_time(inputs.shared)
+    change = effect.kick(inputs.time, inputs.view(state, constants), inputs.shared)
+    arrays = {"y_bar": state, "body_bar": constants, "shared_bar": shared, "t_bar": [inputs.time]}
+    of_time, of_change = [inputs.recorder.input("of_value")], inputs.array("bar", 3)
+    return (
+        law_function(f"kick_time_{number}", _arguments("shared"), {}, result=time)
+        + _vjp(f"kick_time_vjp_{number}", "shared of_value", [time], of_time, {"shared_bar": shared})
+        + law_function(f"kick_{number}", _arguments("t y body shared out"), {"out": change})
+        + _vjp(f"kick_vjp_{number}", "t y body shared bar", change, of_change, arrays)
+    )
+
+
+def _boundary_text(number: int, effect: Effect, effects: Sequence[Effect], layout: Layout) -> str:
+    inputs = LawInputs(effects, layout)
+    shared, state, constants = list(inputs.shared.values()), inputs.state("y"), inputs.constants("body")
+    value = effect.boundary(inputs.view(state, constants), inputs.shared)
+    slopes = vector_jacobian([value], [inputs.recorder.constant(1.0)], state)
+    products = [slope * rate for slope, rate in zip(slopes, inputs.state("rate"), strict=True)]
+    arrays = {"y_bar": state, "body_bar": constants, "shared_bar": shared}
+    of_value = [inputs.recorder.input("of_value")]
+    rate = sum(products[1:], products[0])
+    return (
+        law_function(f"boundary_{number}", _arguments("y body shared"), {}, result=value)
+        + law_function(f"boundary_rate_{number}", _arguments("y rate body shared"), {}, result=rate)
+        + _vjp(f"boundary_vjp_{number}", "y body shared of_value", [value], of_value, arrays)
+    )
+
+
+_CONTACT_ARGUMENTS = "ya yb body_a body_b feature shared"
+
+
+class _Contact:
+    """Symbols of a contact: its two bodies as laws see them, its geometry and its arguments."""
+
+    def __init__(self, kind: ContactKind, inputs: LawInputs) -> None:
+        self.number, self._inputs = int(kind), inputs
+        self.states = inputs.state("ya"), inputs.state("yb")
+        self.constants = inputs.constants("body_a"), inputs.constants("body_b")
+        self.feature = inputs.array("feature", 7)
+        of_a, of_b = Feature(*self.feature[:3]), Feature(*self.feature[3:6])
+        self.a, self.b = (inputs.view(*of_body) for of_body in zip(self.states, self.constants, strict=True))
+        self.geometry = contact_geometry(kind, self.a, self.b, of_a, of_b)
+        self.room = room_on_feature(kind, self.a, self.b, of_a, of_b)
+
+    def value(self, part: str, outputs: Sequence[Scalar]) -> str:
+        """Function that computes something of the contact."""
+        return law_function(f"{part}_{self.number}", _arguments(f"{_CONTACT_ARGUMENTS} out"), {"out": outputs})
+
+    def vjp(self, part: str, outputs: Sequence[Scalar]) -> str:
+        """Function of its derivative."""
+        arrays = {
+            "ya_bar": self.states[0],
+            "yb_bar": self.states[1],
+            "body_a_bar": self.constants[0],
+            "body_b_bar": self.constants[1],
+            "shared_bar": list(self._inputs.shared.values()),
+        }
+        bars = self._inputs.array("bar", len(outputs))
+        return _vjp(f"{part}_vjp_{self.number}", f"{_CONTACT_ARGUMENTS} bar", outputs, bars, arrays)
+
+
+def _contact_text(kind: ContactKind, effects: Sequence[Effect], layout: Layout) -> str:
+    inputs = LawInputs(effects, layout)
+    meeting = _Contact(kind, inputs)
+    geometry = meeting.geometry
+    result = contact(effects, geometry, meeting.a, meeting.b, inputs.shared, pressing=meeting.feature[6])
     velocities = [*result.a, *result.b]
-    room = room_on_feature(kind, a, b, of_a, of_b)
-    constraint = [*_gap_motion(geometry.gap, state_a, state_b), room]
     more = [result.closing_speed, result.normal_impulse, *geometry.point, *geometry.normal, geometry.gap]
-    name = kind.name.lower()
-    text = function_source(
-        f"contact_{name}", f"{_CONTACT_ARGUMENTS}, out", assignments(_targets("out", [*velocities, *more]))
-    )
-    text += function_source(
-        f"constraint_{name}",
-        f"{_CONTACT_ARGUMENTS}, out",
-        assignments(_targets("out", [*constraint, _rate(room, state_a, state_b)])),
-    )
-    arrays = {
-        "ya_bar": state_a,
-        "yb_bar": state_b,
-        "body_a_bar": constants_a,
-        "body_b_bar": constants_b,
-        "shared_bar": list(inputs.shared.values()),
-    }
-    for part, outputs in (("contact", velocities), ("gap", [geometry.gap]), ("constraint", constraint)):
-        lines = _vjp_lines(outputs, inputs.array("bar", len(outputs)), arrays)
-        text += function_source(f"{part}_{name}_vjp", f"{_CONTACT_ARGUMENTS}, {_CONTACT_BARS}", lines)
+    return meeting.value("contact_law", [*velocities, *more]) + meeting.vjp("contact_law", velocities)
+
+
+def geometry_text() -> str:
+    """Text of what holds for contacts in all models: the gap, and what keeps it."""
+    text = ""
+    for kind in ContactKind:
+        meeting = _Contact(kind, LawInputs((), Layout(CONSTANTS, ())))
+        gap, room = meeting.geometry.gap, meeting.room
+        constraint = [*_gap_motion(gap, *meeting.states), room]
+        text += meeting.vjp("gap_law", [gap])
+        text += meeting.value("constraint_law", [*constraint, _rate(room, *meeting.states)])
+        text += meeting.vjp("constraint_law", constraint)
     return text
 
 
@@ -321,28 +321,14 @@ def _rate(length: Symbol, state_a: Sequence[Symbol], state_b: Sequence[Symbol]) 
     return sum(products[1:], products[0])
 
 
-def _choice_source(part: str, suffix: str, arguments: str) -> str:
-    arguments = f"{_CONTACT_ARGUMENTS}, {arguments}"
-    lines = [
-        f"if kind == {int(ContactKind.LINE_POINT)}:",
-        f"    {part}_{ContactKind.LINE_POINT.name.lower()}{suffix}({arguments})",
-        "else:",
-        f"    {part}_{ContactKind.POINT_POINT.name.lower()}{suffix}({arguments})",
-    ]
-    return function_source(f"{part}_law{suffix}", f"kind, {arguments}", lines)
-
-
-def law_source(effects: Sequence[Effect], layout: Layout) -> str:
-    """Source of all compiled laws of a model (see `laws_kernel.py`)."""
+def law_text(effects: Sequence[Effect], layout: Layout) -> str:
+    """Text of the laws of a model (`laws_kernel.py` says what they compute)."""
     parts = [
-        _motion_source(effects, layout),
-        _external_source(effects, layout),
-        _pair_source(effects, layout),
-        _kick_source(effects, layout),
-        _boundary_source(effects, layout),
-        *(_contact_source(kind, effects, layout) for kind in ContactKind),
-        _choice_source("contact", "", "out"),
-        _choice_source("constraint", "", "out"),
-        *(_choice_source(part, "_vjp", _CONTACT_BARS) for part in ("contact", "gap", "constraint")),
+        _motion_text(effects, layout),
+        _external_text(effects, layout),
+        _pair_text(effects, layout),
+        *(_kick_text(number, effect, effects, layout) for number, effect in enumerate(with_kick(effects))),
+        *(_boundary_text(number, effect, effects, layout) for number, effect in enumerate(with_boundary(effects))),
+        *(_contact_text(kind, effects, layout) for kind in ContactKind),
     ]
     return "".join(parts)

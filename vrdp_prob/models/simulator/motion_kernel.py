@@ -8,17 +8,19 @@ import math
 
 import numpy as np
 
+from vrdp_prob.models.simulator.apart_kernel import add_forces_apart
 from vrdp_prob.models.simulator.cluster_kernel import constrain, is_alone, mobility, presses, set_constraints
 from vrdp_prob.models.simulator.laws_kernel import (
     COUPLED,
     STATE_SIZE,
+    body_stages,
     compiled,
     dense_output,
     motion,
     pair_force,
-    stage_state,
+    step_errors,
 )
-from vrdp_prob.models.simulator.tableau import DENSE, ERRORS, NODES
+from vrdp_prob.models.simulator.tableau import NODES
 from vrdp_prob.models.simulator.world_kernel import (
     MOVING,
     PUSH,
@@ -26,6 +28,7 @@ from vrdp_prob.models.simulator.world_kernel import (
     SPARE,
     SPIN_SENSE,
     STAGES,
+    TERMS,
     TRAVEL,
     WORK,
     evaluate,
@@ -57,21 +60,22 @@ def derivatives(world, body, t, rates):
         for c in range(STATE_SIZE):
             out[c] = 0.0
     else:
-        motion(t, world.stages[WORK, body], world.phase[body], world.body[body], world.shared, out)
+        motion(world.model, t, world.stages[WORK, body], world.phase[body], world.body[body], world.shared, out)
 
 
 @compiled
-def cluster_derivatives(world, cluster, t, rates):
-    """Time derivative of all bodies of a cluster at the states in the work row, into `rates`."""
+def cluster_derivatives(world, cluster, t, stage):
+    """Time derivative of all bodies of a cluster at the states in the work row, into the row of a stage."""
     for place in range(world.members[cluster, 0]):
-        derivatives(world, world.members[cluster, 1 + place], t, rates)
-    add_forces(world, cluster, t, rates)
+        derivatives(world, world.members[cluster, 1 + place], t, world.stages[stage])
+    add_forces_apart(world, cluster, t, stage)
 
 
 @compiled
-def add_forces(world, cluster, t, rates):
-    """Add the accelerations by forces between the bodies of a cluster, at the states in the work row."""
-    if COUPLED:
+def add_forces(world, cluster, t, stage):
+    """Add the accelerations by forces between the bodies of a cluster, at the states in the work row, to a stage."""
+    rates = world.stages[stage]
+    if world.model[COUPLED]:
         add_pair_forces(world, cluster, t, rates)
     if presses(world, cluster):
         set_constraints(world, cluster)
@@ -96,39 +100,33 @@ def add_pair_forces(world, cluster, t, rates):
 def pair_force_of(world, a, b, t, force):
     """Force of the second body on the first, at the states in the work row."""
     work = world.stages[WORK]
-    pair_force(t, work[a], work[b], world.body[a], world.body[b], world.shared, force)
+    pair_force(world.model, t, work[a], work[b], world.body[a], world.body[b], world.shared, force)
 
 
 @compiled
-def body_stages(y, stages, phase, constants, shared, body, t, h, begin, end):
-    """Stages `begin` to `end` of a step of one body from `y`, apart from forces of other bodies.
-
-    It takes rows and not the world, because handing over all its arrays takes longer than a stage.
-    """
-    state = stages[WORK, body]
-    still = phase[MOVING] == RESTING and phase[SPIN_SENSE] == 0.0
-    for stage in range(begin, end):
-        stage_state(y, stages, body, stage, h, state)
-        if still:
-            for c in range(STATE_SIZE):
-                stages[stage, body, c] = 0.0
-        else:
-            motion(t + NODES[stage] * h, state, phase, constants, shared, stages[stage, body])
+def stages_of(world, body, t, h, begin, end):
+    """Stages `begin` to `end` of a step of one body, apart from forces of other bodies."""
+    y, stages, state = world.polynomial[body, 0], world.stages, world.stages[WORK, body]
+    if not is_still(world, body):
+        phase, constants = world.phase[body], world.body[body]
+        body_stages(world.model, y, stages, phase, constants, world.shared, body, state, t, h, begin, end)
+        return
+    for c in range(STATE_SIZE):
+        state[c] = y[c]
+        for stage in range(begin, end):
+            stages[stage, body, c] = 0.0
 
 
 @compiled
 def compute_stages(world, cluster, t, h, begin, end):
     """Stages `begin` to `end` of a step from the states in the polynomials' constant terms."""
     if is_alone(world, cluster):
-        y, phase, constants = world.polynomial[cluster, 0], world.phase[cluster], world.body[cluster]
-        body_stages(y, world.stages, phase, constants, world.shared, cluster, t, h, begin, end)
+        stages_of(world, cluster, t, h, begin, end)
         return
     for stage in range(begin, end):
         for place in range(world.members[cluster, 0]):
-            body = world.members[cluster, 1 + place]
-            y, phase, constants = world.polynomial[body, 0], world.phase[body], world.body[body]
-            body_stages(y, world.stages, phase, constants, world.shared, body, t, h, stage, stage + 1)
-        add_forces(world, cluster, t + NODES[stage] * h, world.stages[stage])
+            stages_of(world, world.members[cluster, 1 + place], t, h, stage, stage + 1)
+        add_forces_apart(world, cluster, t + NODES[stage] * h, stage)
 
 
 @compiled
@@ -156,12 +154,9 @@ def match_velocities(world, cluster):
 def step_error(world, body, h):
     """Error of a step relative to the tolerance (Hairer's combination of two estimates)."""
     worst = 0.0
+    step_errors(world.model, world.stages, body, world.errors)
     for c in range(STATE_SIZE):
-        third, fifth = 0.0, 0.0
-        for stage in range(12):
-            if ERRORS[1, stage] != 0.0:
-                third += ERRORS[0, stage] * world.stages[stage, body, c]
-                fifth += ERRORS[1, stage] * world.stages[stage, body, c]
+        third, fifth = world.errors[0, c], world.errors[1, c]
         scale = math.sqrt(fifth * fifth + 0.01 * third * third)
         if not math.isfinite(scale):
             return math.inf
@@ -180,7 +175,7 @@ def inner_error(world, cluster, t, h):
     """
     worst, rate = 0.0, world.stages[PUSH + 1, 0]
     take_states(world, cluster, 0.5)
-    cluster_derivatives(world, cluster, t + 0.5 * h, world.stages[SPARE])
+    cluster_derivatives(world, cluster, t + 0.5 * h, SPARE)
     for place in range(world.members[cluster, 0]):
         body = world.members[cluster, 1 + place]
         evaluate_rate(world.polynomial[body], 0.5, h, rate)
@@ -193,9 +188,9 @@ def inner_error(world, cluster, t, h):
 def set_polynomial(world, body, h):
     """Turn the stages of a step into the polynomial of a body's motion, and bound how far it comes."""
     polynomial = world.polynomial[body]
-    dense_output(world.stages, body, h, polynomial)
+    dense_output(world.model, world.stages, body, h, polynomial)
     x, y = 0.0, 0.0
-    for power in range(1, DENSE.shape[0]):
+    for power in range(1, TERMS):
         x += abs(polynomial[power, 0])
         y += abs(polynomial[power, 1])
     world.phase[body, TRAVEL] = math.hypot(x, y)

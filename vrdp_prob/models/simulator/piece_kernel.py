@@ -6,6 +6,7 @@
 
 import math
 
+from vrdp_prob.models.simulator.apart_kernel import advance_apart, begin_clusters_apart, choose_contacts_apart
 from vrdp_prob.models.simulator.cluster_kernel import (
     HOLD,
     LEANS,
@@ -19,10 +20,9 @@ from vrdp_prob.models.simulator.cluster_kernel import (
     touch_count,
 )
 from vrdp_prob.models.simulator.detection_kernel import LAST_CONTACT
-from vrdp_prob.models.simulator.laws_kernel import SLIPS, STATE_SIZE, compiled
-from vrdp_prob.models.simulator.pressing_kernel import choose_contacts, forget_touch
+from vrdp_prob.models.simulator.laws_kernel import STATE_SIZE, compiled
+from vrdp_prob.models.simulator.pressing_kernel import forget_touch
 from vrdp_prob.models.simulator.search_kernel import search_body
-from vrdp_prob.models.simulator.step_kernel import advance
 from vrdp_prob.models.simulator.tape_kernel import STATE_A, add_pieces, complete_pieces, write_frames
 from vrdp_prob.models.simulator.world_kernel import (
     MOVING,
@@ -48,7 +48,7 @@ def leave_piece(world, tape, body, t):
         y[3], y[4] = 0.0, 0.0
     if phase[SPIN_SENSE] == 0.0:
         y[5] = 0.0
-    if SLIPS and phase[MOVING] != SLIPPING:
+    if phase[MOVING] != SLIPPING:
         y[6], y[7] = y[3], y[4]
     for c in range(STATE_SIZE):
         world.polynomial[body, 0, c] = y[c]
@@ -66,9 +66,9 @@ def leave_pieces(world, tape, cluster, t):
 def begin_pieces(world, tape, cluster, t, horizon):
     """Start pieces of a cluster from their constant terms; returns an outcome."""
     add_pieces(tape, world, cluster)
-    solved = advance(world, cluster, t, horizon)
+    solved = advance_apart(world, cluster, t, horizon)
     complete_pieces(tape, world, cluster)
-    return OK if solved else NOT_SOLVED
+    return OK if solved != 0.0 else NOT_SOLVED
 
 
 @compiled
@@ -106,7 +106,7 @@ def begin_clusters(world, pairs, tape, cluster, t, horizon):
 def restart(world, pairs, tape, cluster, t, horizon):
     """Start new pieces for the bodies of a cluster, with the contacts that last."""
     if presses(world, cluster):
-        choose_contacts(world, cluster, t)
+        choose_contacts_apart(world, cluster, t)
         for touch in range(touch_count(world)):
             if world.touching[touch, HOLD] == MATCHES and cluster_of_touch(world, touch) == cluster:
                 a, b = int(world.touching[touch, TOUCH_A]), int(world.touching[touch, TOUCH_B])
@@ -116,4 +116,4 @@ def restart(world, pairs, tape, cluster, t, horizon):
         # Other forces act now: how long the last step was says nothing.
         for place in range(world.members[cluster, 0]):
             world.clock[world.members[cluster, 1 + place], STEP] = math.inf
-    return begin_clusters(world, pairs, tape, cluster, t, horizon)
+    return begin_clusters_apart(world, pairs, tape, cluster, t, horizon)

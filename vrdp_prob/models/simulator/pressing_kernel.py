@@ -125,7 +125,7 @@ def stays(push):
 @compiled
 def failure(world, cluster, t):
     """What ends the pieces of a cluster at the states at hand: how, and for which contact or body."""
-    cluster_derivatives(world, cluster, t, world.stages[SPARE])
+    cluster_derivatives(world, cluster, t, SPARE)
     for touch in range(touch_count(world)):
         row = world.touching[touch]
         if row[HOLD] == PRESSES and cluster_of_touch(world, touch) == cluster:
@@ -296,7 +296,7 @@ def press(world, cluster, t):
     while True:
         for place in range(world.members[cluster, 0]):
             derivatives(world, world.members[cluster, 1 + place], t, world.stages[SPARE])
-        if COUPLED:
+        if world.model[COUPLED]:
             add_pair_forces(world, cluster, t, world.stages[SPARE])
         constrain(world, cluster, world.stages[SPARE], 1.0)
         if not drop(world, cluster, FAINT, MATCHES, 1.0):

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from types import ModuleType
+from itertools import chain
 from typing import Any
 
 import numpy as np
@@ -16,6 +16,7 @@ from vrdp_prob.models.parameters import Scope
 from vrdp_prob.models.physics import PhysicsModel
 from vrdp_prob.models.simulator.arrays import KernelArrays, kernel_arrays
 from vrdp_prob.models.simulator.events import EventTable, Tapes
+from vrdp_prob.models.simulator.kernel import Kernel
 from vrdp_prob.models.simulator.outcome import Outcome
 from vrdp_prob.models.simulator.work import record_work
 from vrdp_prob.models.simulator.worlds import Worlds
@@ -23,6 +24,8 @@ from vrdp_prob.scene import Shape
 
 EVENT_LIMIT = 10_000
 """Events of one world after which its simulation breaks off, unless the caller says otherwise."""
+FIRST_ROWS = 64
+"""Rows of the tape per world and body for which there is room at first."""
 
 
 @dataclass(frozen=True)
@@ -131,35 +134,76 @@ def _check(times: Float[Tensor, "world_or_one time"], world_count: int) -> None:
 class _Run:
     """One call of the kernel, and what its derivative needs to know of it."""
 
-    def __init__(self, kernel: ModuleType, arrays: KernelArrays, shown: int, event_limit: int) -> None:
-        self.kernel, self.kinds, self.shown, self.event_limit = kernel, arrays.kinds, shown, event_limit
+    def __init__(self, kernel: Kernel, arrays: KernelArrays, shown: int, event_limit: int) -> None:
+        self.kernel, self.kinds, self.event_limit = kernel, arrays.kinds, event_limit
         self.outcomes: Int[np.ndarray, "world"] = np.zeros(len(arrays.kinds), dtype=np.int64)
         self.tapes: Tapes
+        functions, bodies = kernel.functions, arrays.kinds.shape[1]
+        phase, touches = functions.SIDES + kernel.boundary_count, functions.TOUCHES_PER_BODY * bodies
+        self._sizes = {
+            "body": bodies,
+            "shown": shown,
+            "constant": arrays.bodies.shape[2],
+            "parameter": arrays.shared.shape[1],
+            "entry": len(kernel.model),
+            "kick": kernel.kick_count,
+            "phase": phase,
+            "number": max(functions.PIECE_PHASE + phase, functions.CLOSING_SPEED + 8),
+            "list": bodies + 2,
+            "member": bodies + 1,
+            "touch": touches,
+            "column": touches + 1,
+        }
 
     def forward(self, inputs: Sequence[Tensor]) -> tuple[Tensor, Tensor]:
         """Trajectory and velocity [world, time, body, 3]."""
-        bodies, shared, start, times = (tensor.detach().contiguous().numpy() for tensor in inputs)
-        trajectory, velocity = (np.empty((len(self.kinds), times.shape[1], self.shown, 3)) for _ in range(2))
-        rows = self.kernel.rollout_batch(
-            self.kinds, bodies, shared, start, times, self.event_limit, trajectory, velocity, self.outcomes
-        )
-        self.tapes = Tapes(*rows)
-        record_work(int(self.tapes.first_row[-1]))
+        arrays = self._arrays(inputs)
+        functions, count, frames = self.kernel.functions, len(self.kinds), inputs[3].shape[1]
+        trajectory, velocity = (np.empty((count, frames, self._sizes["shown"], 3)) for _ in range(2))
+        tapes, done = self._empty_tapes(FIRST_ROWS * (count + self._sizes["body"])), 0
+        while done < count:
+            results = trajectory, velocity, self.outcomes, *tapes
+            sizes = self._sizes | {"row": len(tapes.integers), "frame": frames, "moving_frame": frames}
+            rooms = [bundle.workspace(sizes) for bundle in (functions.World, functions.Pairs, functions.Tape)]
+            done = functions.rollout_batch(*arrays, self.event_limit, *results, done, *chain(*rooms))
+            if done < count:
+                tapes = self._longer(tapes)
+        last = int(tapes.first_row[-1])
+        self.tapes = Tapes(tapes.integers[:last], tapes.numbers[:last], tapes.first_row)
+        record_work(last)
         return torch.from_numpy(trajectory), torch.from_numpy(velocity)
+
+    def _arrays(self, inputs: Sequence[Tensor]) -> tuple[np.ndarray, ...]:
+        """First arguments of the kernel."""
+        return self.kernel.model, self.kinds, *(tensor.detach().contiguous().numpy() for tensor in inputs)
+
+    def _empty_tapes(self, rows: int) -> Tapes:
+        integers = np.zeros((rows, self.kernel.functions.INTEGERS), np.int64)
+        return Tapes(integers, np.zeros((rows, self._sizes["number"])), np.zeros(len(self.kinds) + 1, np.int64))
+
+    def _longer(self, tapes: Tapes) -> Tapes:
+        """Twice as long tapes, with what is written."""
+        longer = self._empty_tapes(2 * len(tapes.integers))
+        for new, old in zip(longer, tapes, strict=True):
+            new[: len(old)] = old
+        return longer
 
     def backward(
         self, inputs: Sequence[Tensor], bars: Sequence[Tensor | None], *, of_times: bool
     ) -> tuple[Tensor | None, ...]:
         """Derivative by all inputs of the sum of trajectory and velocity times `bars`; None where that is 0."""
-        bodies, shared, start, times = (tensor.detach().contiguous().numpy() for tensor in inputs)
-        results = [np.zeros_like(array) for array in (bodies, shared, start)]
+        arrays, functions, shown = self._arrays(inputs), self.kernel.functions, self._sizes["shown"]
+        results = [np.zeros_like(array) for array in arrays[2:5]]
         # Empty where nobody asks, which the kernel takes as a sign.
-        results.append(np.zeros_like(times) if of_times else np.zeros((1, 0)))
-        shape = len(self.kinds), times.shape[1], self.shown, 3
+        results.append(np.zeros_like(arrays[5]) if of_times else np.zeros((1, 0)))
+        shape = len(self.kinds), inputs[3].shape[1], shown, 3
         seen = [_contiguous(bars[0]) if bars[0] is not None else np.zeros(shape)]
-        seen.append(_contiguous(bars[1]) if bars[1] is not None else np.zeros((1, 0, self.shown, 3)))
+        seen.append(_contiguous(bars[1]) if bars[1] is not None else np.zeros((1, 0, shown, 3)))
         record_work(int(self.tapes.first_row[-1]))
-        self.kernel.reverse_batch(self.kinds, bodies, shared, start, times, self.outcomes, *self.tapes, *seen, *results)
+        sizes = {"row": len(self.tapes.integers), "frame": shape[1], "moving_frame": seen[1].shape[1]}
+        sizes |= self._sizes | {"asked_frame": results[3].shape[1]}
+        rooms = [bundle.workspace(sizes) for bundle in (functions.World, functions.Tape, functions.Adjoint)]
+        functions.reverse_batch(*arrays, self.outcomes, *self.tapes, *seen, *results, *chain(*rooms))
         gradients = [torch.from_numpy(array) for array in results]
         return (*gradients[:3], gradients[3] if of_times else None)
 
@@ -189,7 +233,8 @@ class _Simulation(torch.autograd.Function):
 def compile_model(model: PhysicsModel | None = None) -> None:
     """Compile the kernel of a model and its derivative now rather than in the first simulation.
 
-    The compiled code is kept in the user's cache, so this takes about a minute, once per machine and set of effects.
+    The kernels are the same for all models and kept in the user's cache: they take half a minute, once per machine. The
+    laws of a model take a twentieth of a second in every process.
 
     Parameters
     ----------

@@ -5,8 +5,9 @@
 
 import math
 
+from vrdp_prob.models.simulator.apart_kernel import collide_apart, end_pieces_apart
 from vrdp_prob.models.simulator.detection_kernel import CONTACT_TIME, LAST_CONTACT, OVERLAPPING
-from vrdp_prob.models.simulator.event_kernel import collide, end_pieces, kick_bodies, release
+from vrdp_prob.models.simulator.event_kernel import kick_bodies, release
 from vrdp_prob.models.simulator.laws_kernel import KICKS, compiled
 from vrdp_prob.models.simulator.tape_kernel import EVENTS, ROWS, clear_tape, finish
 from vrdp_prob.models.simulator.world_kernel import (
@@ -40,7 +41,7 @@ def next_event(world, pairs):
     for cluster in range(count):
         if world.clock[cluster, UNTIL] < time:
             time, kind, first = world.clock[cluster, UNTIL], 1, cluster
-    for which in range(KICKS):
+    for which in range(world.model[KICKS]):
         if world.kicks[which] < time:
             time, kind, first = world.kicks[which], 3, which
     for i in range(count):
@@ -60,11 +61,11 @@ def clear_pairs(pairs):
 
 
 @compiled
-def rollout_world(world, pairs, tape, event_limit):
-    """Simulate one world; returns an outcome."""
+def rollout_world(world, pairs, tape, begin, event_limit):
+    """Simulate one world, recorded from a row on; returns an outcome."""
     clear_world(world)
     clear_pairs(pairs)
-    clear_tape(tape, world.start)
+    clear_tape(tape, world.start, begin)
     horizon = tape.times[-1]
     outcome = OK
     while True:
@@ -72,19 +73,19 @@ def rollout_world(world, pairs, tape, event_limit):
         if not time <= horizon or (kind == 1 and time >= horizon):
             finish(tape, world, horizon, 0.0)
             return outcome
-        rows = tape.counts[ROWS]
-        if rows + 8 + ROWS_PER_BODY * world.kind.shape[0] > tape.integers.shape[0]:
+        row = tape.counts[ROWS]
+        if row + 8 + ROWS_PER_BODY * world.kind.shape[0] > tape.integers.shape[0]:
             return TAPE_FULL
         result = EVENT_LIMIT
-        if tape.counts[EVENTS] < event_limit and rows < ROWS_PER_EVENT * (event_limit + 1):
+        if tape.counts[EVENTS] < event_limit and row - begin < ROWS_PER_EVENT * (event_limit + 1):
             if kind == 0:
                 result = release(world, pairs, tape, first, horizon)
             elif kind == 1:
-                result = end_pieces(world, pairs, tape, first, horizon)
+                result = end_pieces_apart(world, pairs, tape, first, horizon)
             elif kind == 3:
                 result = kick_bodies(world, pairs, tape, first, horizon)
             else:
-                result = collide(world, pairs, tape, first, second, horizon)
+                result = collide_apart(world, pairs, tape, first, second, horizon)
         outcome = max(outcome, result)
         if result in (EVENT_LIMIT, NOT_SOLVED):
             finish(tape, world, time, 1.0)

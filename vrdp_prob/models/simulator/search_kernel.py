@@ -6,6 +6,7 @@
 
 import math
 
+from vrdp_prob.models.simulator.apart_kernel import search_pair_apart
 from vrdp_prob.models.simulator.cluster_kernel import TOUCH_A, TOUCH_B, TOUCH_FEATURE, touch_count
 from vrdp_prob.models.simulator.detection_kernel import (
     ANGLE_FIRST,
@@ -239,4 +240,4 @@ def search_body(world, pairs, body, t, horizon):
     """Search the contacts of a body with all others from a time on."""
     for other in range(world.kind.shape[0]):
         if other != body:
-            search_pair(world, pairs, body, other, t, horizon)
+            search_pair_apart(world, pairs, body, other, t, horizon)

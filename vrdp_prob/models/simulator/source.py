@@ -1,9 +1,11 @@
-"""From a model to compiled code: assemble generated laws and kernels into one module and import it from a cache."""
+"""The kernels as compiled code: assemble their text to one module, compile it once per machine, keep it on disk."""
 
+import contextlib
 import hashlib
 import importlib.util
 import os
 import re
+import subprocess
 import sys
 import tempfile
 from collections.abc import Sequence
@@ -11,23 +13,21 @@ from functools import cache
 from importlib import resources
 from pathlib import Path
 from types import ModuleType
+from typing import Any
 
 import numba
 from platformdirs import user_cache_dir
 
 from vrdp_prob.files import write_atomically
-from vrdp_prob.models.effects.effect import Effect
 from vrdp_prob.models.simulator import tableau
-from vrdp_prob.models.simulator.contact import rubs
-from vrdp_prob.models.simulator.law_check import check_laws
-from vrdp_prob.models.simulator.laws import Layout, is_timed, law_source, state_size, with_boundary, with_kick
-from vrdp_prob.models.simulator.motion import ROLLING_SHARE, slips
-from vrdp_prob.models.simulator.stages import step_source
+from vrdp_prob.models.simulator.motion import ROLLING_SHARE
 
 CACHE_VARIABLE = "VRDP_PROB_CACHE"
 """Environment variable that names another folder for compiled kernels."""
 
 _KERNELS = (
+    "laws",
+    "apart",
     "world",
     "cluster",
     "motion",
@@ -45,9 +45,18 @@ _KERNELS = (
     "adjoint_events",
     "batch",
 )
-_LIGHT = "no_cpython_wrapper=True, no_cfunc_wrapper=True"
-"""Options of functions that only compiled code calls; numba needs less time for them."""
-_HEADER = '"""Assembled by vrdp_prob.models.simulator.source; do not edit."""\n\n'
+_HEADER = '''"""Assembled by vrdp_prob.models.simulator.source; do not edit."""
+
+import math
+
+import numpy as np
+from numba import njit
+from numba.core.types import float64, int64, void
+
+from vrdp_prob.models.simulator.bundle import Bundle, floats, integer_room, integers, new_bundle, room
+from vrdp_prob.models.simulator.calls import call, call_for_integer, call_for_number
+
+'''
 
 
 def _without_imports(source: str) -> str:
@@ -55,42 +64,28 @@ def _without_imports(source: str) -> str:
     return re.sub(r"^from vrdp_prob\.[\w.]+ import (\([^)]*\)|[^\n]*)\n", "", source, flags=re.MULTILINE)
 
 
-def assemble(effects: Sequence[Effect], layout: Layout) -> str:
-    """Source of the module that simulates a model."""
-    check_laws(effects, layout)
+def assemble() -> str:
+    """Source of the module of all kernels."""
     folder = resources.files("vrdp_prob.models.simulator")
     parts = [
         _HEADER,
-        "import math\nfrom typing import NamedTuple\n\nimport numpy as np\nfrom numba import njit\n\n",
-        f"compiled = njit(nogil=True, error_model='numpy', {_LIGHT}, _nrt=False)\n",
-        f"allocating = njit(nogil=True, error_model='numpy', {_LIGHT})\n",
-        f"STATE_SIZE, SLIPS, RUBS = {state_size(effects)}, {slips(effects)}, {rubs(effects)}\n",
         f"ROLLING_SHARE = {ROLLING_SHARE!r}\n",
-        f"COUPLED, TIMED = {_is_coupled(effects)}, {is_timed(effects, layout)}\n",
-        f"KICKS, BOUNDARIES = {len(with_kick(effects))}, {len(with_boundary(effects))}\n",
-        *(f"{name} = np.array({getattr(tableau, name).tolist()!r})\n" for name in ("DENSE", "ERRORS", "NODES")),
-        step_source(),
-        law_source(effects, layout),
+        *(f"{name} = np.array({getattr(tableau, name).tolist()!r})\n" for name in ("DENSE", "NODES")),
     ]
-    for name in _KERNELS:
-        file = folder / f"{name}_kernel.py"
-        if file.is_file():
-            parts.append(_without_imports(file.read_text(encoding="utf-8")))
+    parts += [_without_imports((folder / f"{name}_kernel.py").read_text(encoding="utf-8")) for name in _KERNELS]
     text = "\n".join(parts)
     _check_names(text)
     return text
 
 
 def _check_names(text: str) -> None:
-    """Raise where two kernels define a function of the same name, as all share one module."""
+    """Raise where two kernels define the same name, as all share one module."""
     names = re.findall(r"^def (\w+)\(", text, flags=re.MULTILINE)
+    for several in re.findall(r"^([A-Z][\w, ]*) = ", text, flags=re.MULTILINE):
+        names += several.split(", ")
     twice = sorted({name for name in names if names.count(name) > 1})
     if twice:
         raise RuntimeError(f"the kernel defines {', '.join(twice)} more than once; rename one of each.")
-
-
-def _is_coupled(effects: Sequence[Effect]) -> bool:
-    return any(effect.overrides("pair_force") for effect in effects)
 
 
 def cache_folder() -> Path:
@@ -105,12 +100,22 @@ def cache_folder() -> Path:
         return Path(tempfile.mkdtemp(prefix="vrdp-prob-"))
 
 
+def _digest(text: str) -> str:
+    """Name of what the text of all kernels compiles to."""
+    folder = resources.files("vrdp_prob.models.simulator")
+    parts = [
+        text,
+        numba.__version__,
+        *((folder / name).read_text(encoding="utf-8") for name in ("bundle.py", "calls.py")),
+    ]
+    return hashlib.sha256("".join(parts).encode()).hexdigest()[:16]
+
+
 @cache
-def load(effects: tuple[Effect, ...], layout: Layout) -> ModuleType:
-    """Import the kernel of a model, compiled once per machine, version of numba and set of effects."""
-    text = assemble(effects, layout)
-    digest = hashlib.sha256((text + numba.__version__).encode()).hexdigest()[:16]
-    name = f"vrdp_prob_kernel_{digest}"
+def kernels() -> ModuleType:
+    """Import the kernels, compiled once per machine and version of numba."""
+    text = assemble()
+    name = f"vrdp_prob_kernel_{_digest(text)}"
     path = cache_folder() / f"{name}.py"
     if not path.is_file():
         with write_atomically(path) as temporary:
@@ -122,3 +127,54 @@ def load(effects: tuple[Effect, ...], layout: Layout) -> ModuleType:
     sys.modules[name] = module
     specification.loader.exec_module(module)
     return module
+
+
+@cache
+def addresses_apart() -> dict[str, int]:
+    """Addresses of the kernels that are compiled apart.
+
+    Where they were never compiled on this machine, another process compiles half of them meanwhile.
+    """
+    functions = kernels()
+    names = [function.__name__ for function in functions.APART]
+    marker = Path(str(functions.__file__)).with_suffix(".compiled")
+    if marker.is_file():
+        return compile_apart(names)
+    helper = _helper(marker.parent, names[len(names) // 2 :]) if _processors() > 1 else None
+    addresses = compile_apart(names[: len(names) // 2])
+    if helper is not None:
+        helper.wait()
+    addresses |= compile_apart(names[len(names) // 2 :])
+    with contextlib.suppress(OSError):
+        marker.touch()
+    return addresses
+
+
+def _processors() -> int:
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def _helper(folder: Path, names: Sequence[str]) -> "subprocess.Popen[bytes] | None":
+    """Process that compiles kernels into a folder; what it fails to compile is compiled here later."""
+    code = f"from {__name__} import compile_apart; compile_apart({list(names)!r})"
+    environment = {**os.environ, CACHE_VARIABLE: str(folder), "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
+    none = subprocess.DEVNULL
+    try:
+        return subprocess.Popen([sys.executable, "-c", code], env=environment, stdin=none, stdout=none, stderr=none)
+    except OSError:
+        return None
+
+
+def compile_apart(names: Sequence[str]) -> dict[str, int]:
+    """Addresses of kernels by name, compiled where they are not on disk yet."""
+    options: dict[str, Any] = {"nopython": True, "error_model": "numpy", "_nrt": False}
+    addresses: dict[str, int] = {}
+    for function, signature in kernels().APART.items():
+        if function.__name__ in names:
+            _kept.append(numba.cfunc(signature, cache=True, **options)(function.py_func))
+            addresses[function.__name__] = _kept[-1].address
+    return addresses
+
+
+_kept: list[Any] = []
+"""Compiled kernels, which must live as long as their addresses are used."""

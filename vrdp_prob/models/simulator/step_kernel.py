@@ -66,7 +66,7 @@ def hold_cluster(world, cluster, t):
 def rest(world, cluster, t, horizon):
     """Let a cluster rest, where forces change with time until they move a body."""
     hold_cluster(world, cluster, t)
-    if TIMED and not world.kind[cluster, FIXED]:
+    if world.model[TIMED] and not world.kind[cluster, FIXED]:
         world.clock[cluster, ENDING] = CONTINUES
         until = find_yielding(world, cluster, t, horizon)
         for place in range(world.members[cluster, 0]):
@@ -119,7 +119,7 @@ def try_step(world, cluster, t, h):
     world.clock[cluster, ENDING] = CONTINUES
     for place in range(world.members[cluster, 0]):
         share = find_ending(world, cluster, world.members[cluster, 1 + place], share)
-    if BOUNDARIES > 0:
+    if world.model[BOUNDARIES] > 0:
         for place in range(world.members[cluster, 0]):
             share = find_crossing(world, cluster, world.members[cluster, 1 + place], share)
     return error, share
@@ -127,16 +127,16 @@ def try_step(world, cluster, t, h):
 
 @compiled
 def advance(world, cluster, t, horizon):
-    """Compute the next piece of motion of a cluster from the states in the constant terms; False where that fails."""
+    """Compute the next piece of motion of a cluster from its constant terms; 0.0 where that fails, else 1.0."""
     if rests(world, cluster):
         rest(world, cluster, t, horizon)
-        return True
+        return 1.0
     h = begin_step(world, cluster, t, horizon)
     if is_alone(world, cluster) and hardly_moves(world, cluster):
         hold(world, cluster, t)
         clock = world.clock[cluster]
         clock[UNTIL], clock[ENDING], clock[ENDING_BODY] = t, STOPS, cluster
-        return True
+        return 1.0
     while h >= SMALLEST_STEP:
         error, share = try_step(world, cluster, t, h)
         if error > 1.0:
@@ -144,13 +144,13 @@ def advance(world, cluster, t, horizon):
         elif not really_stops(world, cluster, share):
             h *= 0.5 * max(share, 0.1)
         else:
-            if COUPLED or TIMED or presses(world, cluster):
+            if world.model[COUPLED] != 0 or world.model[TIMED] != 0 or presses(world, cluster):
                 share = find_parting(world, cluster, t, h, share)
             for place in range(world.members[cluster, 0]):
                 clock = world.clock[world.members[cluster, 1 + place]]
                 clock[ORIGIN], clock[LENGTH], clock[UNTIL] = t, h, t + share * h
                 clock[STEP] = h * min(5.0, 0.9 * max(error, 1e-9) ** (-0.125))
                 clock[ENDING] = world.clock[cluster, ENDING]
-            return True
+            return 1.0
     hold_cluster(world, cluster, t)
-    return False
+    return 0.0

@@ -4,10 +4,8 @@
 # mypy: disable-error-code="no-untyped-def"
 
 import math
-from typing import NamedTuple
 
-import numpy as np
-
+from vrdp_prob.models.simulator.bundle import Bundle, floats, integer_room, integers, room
 from vrdp_prob.models.simulator.cluster_kernel import (
     HOLD,
     MATCHES,
@@ -24,7 +22,6 @@ from vrdp_prob.models.simulator.world_kernel import (
     FIXED,
     LENGTH,
     ORIGIN,
-    PHASE_SIZE,
     evaluate,
     evaluate_at,
     share_of,
@@ -43,7 +40,7 @@ INTEGERS = 7
 # Columns of numbers. A piece: origin, length, states, phases. An event: its time. A contact: features, then its result
 # (or, where it slides off, the rate at which its room on the feature shrinks).
 TIME, FEATURE, CLOSING_SPEED = 0, 1, 8
-NUMBERS = max(2 + STATE_SIZE + PHASE_SIZE, 16)
+PIECE_PHASE = 2 + STATE_SIZE
 # Columns of `place`: next frame of a body, row of its current piece.
 FRAME, ROW = 0, 1
 # Columns of `counts`.
@@ -52,23 +49,24 @@ ROWS, EVENTS = 0, 1
 RESULT, STATE_A, STATE_B, SHOWN = 0, 1, 2, 3
 
 
-class Tape(NamedTuple):
-    """Rows of the record, and where the output goes."""
-
-    integers: np.ndarray  # [row, INTEGERS]
-    numbers: np.ndarray  # [row, NUMBERS]
-    counts: np.ndarray  # [(rows, events)]
-    place: np.ndarray  # [body, (frame, row)]
-    times: np.ndarray  # [time], s
-    trajectory: np.ndarray  # [time, shown body, (x, y, angle)]
-    velocity: np.ndarray  # [time, shown body, (vx, vy, spin)]
-    local: np.ndarray  # [(result, state a, state b, state to show), 16]
+Tape = Bundle(
+    "Tape",
+    integers=integers("row", INTEGERS),
+    numbers=floats("row", "number"),
+    times=floats("frame"),  # s
+    trajectory=floats("frame", "shown", 3),  # [frame, body, (x, y, angle)], or its adjoint
+    velocity=floats("moving_frame", "shown", 3),  # the same of (vx, vy, spin); its adjoint may be empty
+    counts=integer_room(2),  # [(rows, events)]
+    place=integer_room("body", 2),  # [body, (frame, row)]
+    local=room(4, 16),  # [(result, state a, state b, state to show), 16]
+)
+"""Rows of the record, of all worlds behind each other, and where the output of a world goes."""
 
 
 @compiled
-def clear_tape(tape, start):
-    """Nothing recorded; before its release a body shows the state it is released with."""
-    tape.counts[ROWS], tape.counts[EVENTS] = 0, 0
+def clear_tape(tape, start, begin):
+    """Nothing recorded of a world whose rows begin at `begin`; before its release a body shows how it is released."""
+    tape.counts[ROWS], tape.counts[EVENTS] = begin, 0
     for body in range(tape.place.shape[0]):
         tape.place[body, FRAME], tape.place[body, ROW] = 0, -1
     for frame in range(tape.times.shape[0]):
@@ -139,8 +137,8 @@ def complete_pieces(tape, world, cluster):
         body = world.members[cluster, 1 + place]
         numbers = tape.numbers[tape.place[body, ROW]]
         numbers[TIME], numbers[1] = world.clock[body, ORIGIN], world.clock[body, LENGTH]
-        for c in range(PHASE_SIZE):
-            numbers[2 + STATE_SIZE + c] = world.phase[body, c]
+        for c in range(world.phase.shape[1]):
+            numbers[PIECE_PHASE + c] = world.phase[body, c]
 
 
 @compiled

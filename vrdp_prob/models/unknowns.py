@@ -104,15 +104,16 @@ def _motion(tracks: Tracks, structure: Structure) -> Iterator[Coordinate]:
 
 
 def _turning(tracks: Tracks, model: PhysicsModel, structure: Structure) -> Iterator[Coordinate]:
-    """Yaw of cubes that meet something; spin of what is seen to turn, or whose spin matters in contacts."""
+    """Yaw of cubes that meet something; spin of what is seen to turn, or whose spin matters to the motion."""
     measured = set(Observations.of(tracks).angle_bodies)
     angles = tracks.angles
     rubs = any(effect.overrides("tangential_impulse") for effect in model.effects)
+    bends = any(effect.spin_matters for effect in model.effects)
     for body, description in enumerate(tracks.bodies):
         meets = body in structure.meeting
         if meets and description.shape is Shape.CUBE:
             yield Coordinate("angle", body, Transform.IDENTITY, Prior(0.0, YAW_SD), scale=0.1)
-        spin_matters = meets and (rubs or description.shape is Shape.CUBE)
+        spin_matters = bends or (meets and (rubs or description.shape is Shape.CUBE))
         if body in structure.moving and (spin_matters or body in measured):
             yield Coordinate("spin", body, Transform.IDENTITY, Prior(0.0, SPIN_SD), scale=0.1)
         if body in measured and angles is not None:
@@ -137,7 +138,8 @@ def _matter(tracks: Tracks, structure: Structure) -> Iterator[Coordinate]:
 def _physics(tracks: Tracks, model: PhysicsModel, structure: Structure) -> Iterator[Coordinate]:
     """Parameters of the model that can have an effect on these bodies."""
     turning = any(tracks.bodies[body].shape is Shape.CUBE for body in structure.meeting)
-    spin_matters = turning or bool(Observations.of(tracks).angle_bodies)
+    bends = any(effect.spin_matters for effect in model.effects)
+    spin_matters = turning or bends or bool(Observations.of(tracks).angle_bodies)
     for parameter in model.parameters:
         concerned = [index for index, body in enumerate(tracks.bodies) if body.shape in parameter.shapes]
         if parameter.scope is Scope.SHARED and concerned and (spin_matters or parameter.name != ANGULAR_DRAG.name):

@@ -114,6 +114,8 @@ class Effect:
     """Its parameters."""
     vanishes_at: ClassVar[Mapping[str, float]] = {}
     """Values of parameters at which the effect is gone, so that the model without it is nested."""
+    spin_matters: ClassVar[bool] = False
+    """Whether the path of a body in free flight depends on its spin, which is then unknown where nobody saw it."""
 
     @classmethod
     def overrides(cls, hook: str) -> bool:

@@ -1,0 +1,39 @@
+"""A table that is curved."""
+
+from collections.abc import Mapping
+from typing import ClassVar
+
+from vrdp_prob.models.effects.effect import BodyView, Effect
+from vrdp_prob.models.parameters import Parameter, Prior, Transform
+from vrdp_prob.models.simulator.formula import Scalar
+
+BOWL_STIFFNESS = Parameter(
+    "bowl_stiffness",
+    "1/s^2",
+    "acceleration towards the middle per distance; away from it where negative",
+    Transform.IDENTITY,
+    Prior(0.0, 0.2),
+    default=0.0,
+)
+BOWL_X = Parameter(
+    "bowl_x", "m", "x of the lowest (or highest) point", Transform.IDENTITY, Prior(0.0, 2.0), default=0.0
+)
+BOWL_Y = Parameter(
+    "bowl_y", "m", "y of the lowest (or highest) point", Transform.IDENTITY, Prior(0.0, 2.0), default=0.0
+)
+
+
+class Bowl(Effect):
+    """A pull towards one point, in proportion to the distance."""
+
+    name: ClassVar = "bowl"
+    sentence: ClassVar = "The table is a shallow bowl (or a dome): bodies are drawn to (or from) one point."
+    law: ClassVar = "a = -bowl_stiffness (x - (bowl_x, bowl_y))"
+    source: ClassVar = "gravity on a paraboloid, small slopes: bowl_stiffness is g over the radius of curvature"
+    parameters: ClassVar = (BOWL_STIFFNESS, BOWL_X, BOWL_Y)
+    vanishes_at: ClassVar = {"bowl_stiffness": 0.0}
+
+    def acceleration(self, time: Scalar, body: BodyView, parameters: Mapping[str, Scalar]) -> tuple[Scalar, Scalar]:
+        """Acceleration in m/s^2 towards the lowest point."""
+        stiffness = parameters["bowl_stiffness"]
+        return stiffness * (parameters["bowl_x"] - body.x), stiffness * (parameters["bowl_y"] - body.y)

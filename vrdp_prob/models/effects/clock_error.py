@@ -1,0 +1,38 @@
+"""A clock that loses frames."""
+
+from collections.abc import Mapping
+from typing import ClassVar
+
+import torch
+from jaxtyping import Float
+from torch import Tensor
+
+from vrdp_prob.models.effects.effect import Effect
+from vrdp_prob.models.parameters import Parameter, Prior, Transform
+
+LOST_TIME = Parameter(
+    "lost_time", "s", "time that passed without a frame", Transform.IDENTITY, Prior(0.0, 0.2), default=0.0
+)
+LOST_AT = Parameter(
+    "lost_at", "s", "time stamp after which frames are missing", Transform.IDENTITY, Prior(2.5, 1.5), default=2.5
+)
+
+
+class ClockError(Effect):
+    """Frames were dropped, and the stamps go on as if they had not been.
+
+    A clock that is fast or slow throughout cannot be seen: velocities and frictions make up for it.
+    """
+
+    name: ClassVar = "clock_error"
+    sentence: ClassVar = "Frames are missing though their time stamps go on evenly: all bodies jump along their paths."
+    law: ClassVar = "true time = stamp + lost_time after lost_at"
+    source: ClassVar = "definition"
+    parameters: ClassVar = (LOST_TIME, LOST_AT)
+    vanishes_at: ClassVar = {"lost_time": 0.0}
+
+    def measured_times(
+        self, times: Float[Tensor, "world time"], parameters: Mapping[str, Float[Tensor, "..."]]
+    ) -> Float[Tensor, "world time"]:
+        """True times in s of the frames."""
+        return times + torch.where(times > parameters["lost_at"][:, None], parameters["lost_time"][:, None], 0.0)

@@ -1,0 +1,44 @@
+"""A lens that bends straight lines."""
+
+from collections.abc import Mapping
+from typing import ClassVar
+
+import torch
+from jaxtyping import Float
+from torch import Tensor
+
+from vrdp_prob.models.effects.effect import Effect
+from vrdp_prob.models.parameters import Parameter, Prior, Transform
+
+DISTORTION = Parameter(
+    "distortion",
+    "1/m^2",
+    "relative displacement per squared distance",
+    Transform.IDENTITY,
+    Prior(0.0, 0.02),
+    default=0.0,
+)
+LENS_X = Parameter("lens_x", "m", "x of the picture's centre", Transform.IDENTITY, Prior(0.0, 1.0), 0.0)
+LENS_Y = Parameter("lens_y", "m", "y of the picture's centre", Transform.IDENTITY, Prior(0.0, 1.0), 0.0)
+
+
+class LensDistortion(Effect):
+    """Positions are recorded farther from the picture's centre than they are, or nearer."""
+
+    name: ClassVar = "lens_distortion"
+    sentence: ClassVar = "The lens bends straight lines: positions far from the middle of the picture are displaced."
+    law: ClassVar = "recorded r' = r (1 + distortion |r|^2) about (lens_x, lens_y)"
+    source: ClassVar = "Brown, Close-range camera calibration, Photogrammetric Engineering 37 (1971), first radial term"
+    parameters: ClassVar = (DISTORTION, LENS_X, LENS_Y)
+    vanishes_at: ClassVar = {"distortion": 0.0}
+
+    def measured_positions(
+        self,
+        positions: Float[Tensor, "world time body 2"],
+        times: Float[Tensor, "world time"],
+        parameters: Mapping[str, Float[Tensor, "..."]],
+    ) -> Float[Tensor, "world time body 2"]:
+        """Positions in m as they are recorded."""
+        centre = torch.stack([parameters["lens_x"], parameters["lens_y"]], dim=-1)[:, None, None, :]
+        apart = positions - centre
+        return positions + parameters["distortion"][:, None, None, None] * (apart**2).sum(-1, keepdim=True) * apart

@@ -1,0 +1,65 @@
+"""A straight wall that nobody sees."""
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import ClassVar
+
+import torch
+from jaxtyping import Float
+from torch import Tensor
+
+from vrdp_prob.models.effects.effect import Effect
+from vrdp_prob.models.parameters import EDGE, Parameter, Prior, Transform
+from vrdp_prob.models.simulator.obstacle import Obstacle
+
+HALF_LENGTH = 20.0
+"""Half the length of the wall in m: it ends nowhere that a body gets to."""
+
+WALL_DISTANCE = Parameter(
+    "hidden_wall_distance",
+    "m",
+    "distance of the wall from the origin",
+    Transform.IDENTITY,
+    Prior(0.0, 3.0),
+    default=3.0,
+)
+WALL_DIRECTION = Parameter(
+    "hidden_wall_direction",
+    "rad",
+    "direction from the origin to the wall, square to it",
+    Transform.IDENTITY,
+    Prior(0.0, 2.0),
+    default=0.0,
+)
+HIDDEN_WALL_RESTITUTION = Parameter(
+    "hidden_wall_restitution",
+    "1",
+    "restitution factor of the wall",
+    Transform.LOG,
+    Prior(math.log(0.8), 0.35, upper=EDGE),
+    default=0.8,
+)
+
+
+class Wall(Effect):
+    """A fixed straight wall that bodies bounce off."""
+
+    name: ClassVar = "wall"
+    sentence: ClassVar = "A wall that cannot be seen throws bodies back."
+    law: ClassVar = (
+        "bodies touch the line x cos(a) + y sin(a) = hidden_wall_distance with a = hidden_wall_direction; "
+        "e = r hidden_wall_restitution"
+    )
+    source: ClassVar = "contact with a body of infinite mass"
+    parameters: ClassVar = (WALL_DISTANCE, WALL_DIRECTION, HIDDEN_WALL_RESTITUTION)
+
+    def obstacles(self, parameters: Mapping[str, Float[Tensor, "..."]]) -> Sequence[Obstacle]:
+        """The wall."""
+        distance, direction = parameters["hidden_wall_distance"], parameters["hidden_wall_direction"]
+        x, y = torch.cos(direction), torch.sin(direction)
+        ends = [
+            coordinate
+            for side in (-HALF_LENGTH, HALF_LENGTH)
+            for coordinate in (distance * x - side * y, distance * y + side * x)
+        ]
+        return (Obstacle.walls(torch.stack(ends, dim=-1)[:, None], parameters["hidden_wall_restitution"][:, None]),)

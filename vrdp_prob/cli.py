@@ -124,6 +124,12 @@ def ask_question(
     question: Annotated[str, typer.Argument(metavar="QUESTION", help="In English, CLEVRER's wording.")],
     *,
     choice: Annotated[list[str] | None, typer.Option(metavar="TEXT", help="An option; repeat for each.")] = None,
+    explain: Annotated[
+        bool, typer.Option("--explain", help="Also what the answer hangs on, and what would settle it.")
+    ] = False,
+    mc_error: Annotated[
+        float | None, typer.Option(metavar="SHARE", help="Monte Carlo error to reach, for example 0.01.")
+    ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="One JSON document on standard output.")] = False,
     video: Video = None,
     camera: CameraOption = None,
@@ -157,11 +163,13 @@ def ask_question(
         seed=seed,
         progress=progress,
     )
-    answer = ask(posterior, asked, progress=progress)
+    answer = ask(posterior, asked, mc_error=mc_error, progress=progress)
+    explanation = answer.explain() if explain else None
     if as_json:
-        print(json.dumps(answer.to_document(), allow_nan=False))
+        told = {} if explanation is None else {"explanation": explanation.to_document()}
+        print(json.dumps({**answer.to_document(), **told}, allow_nan=False))
     else:
-        print("\n".join(answer_lines(answer)))
+        print("\n".join([*answer_lines(answer), *(explanation.sentences if explanation is not None else ())]))
 
 
 @app.command(name="evaluate")

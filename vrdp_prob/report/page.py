@@ -295,7 +295,13 @@ def _diagnostics(content: ReportContent) -> list[tuple[str, str, str]]:
         meaning = "the same for the ends of 90 % intervals; above 400 is good"
         rows.append(("... in the tails", f"{convergence.ess_tail:.0f}", meaning))
     if convergence.divergences is not None:
-        rows.append(("Divergences", str(convergence.divergences), "steps at which the sampler lost its way; 0 is good"))
+        rows.append(
+            (
+                "Divergences",
+                str(convergence.divergences),
+                "steps at which the sampler lost its way; below 1 % of all is good",
+            )
+        )
     if convergence.pareto_k is not None and math.isfinite(convergence.pareto_k):
         meaning = "tail of the importance weights; below 0.7 is good"
         rows.append(("Pareto k", f"{convergence.pareto_k:.2f}", meaning))

@@ -267,7 +267,7 @@ def calibrate_camera(
 
 @app.command(name="compile")
 def compile_simulator(model: Model = None) -> None:
-    """Compile the simulator now, once per machine and model, rather than in the first run."""
+    """Compile the simulator now, once per machine, rather than in the first run."""
     compile_model(default_model() if model is None else _model(model))
 
 

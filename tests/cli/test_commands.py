@@ -49,9 +49,10 @@ def test_report_writes_its_three_files(folder: Path, tmp_path: Path, capsys: pyt
 
 def test_ask_prints_exactly_one_document(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     question = "What color is the object that collides with the red object?"
-    assert cli.run(["ask", str(folder), question, "--json", "--sampler", "laplace", "--seed", "3"]) == 0
+    assert cli.run(["ask", str(folder), question, "--json", "--explain", "--sampler", "laplace", "--seed", "3"]) == 0
     document = json.loads(capsys.readouterr().out)
     assert document["answer"] == "blue"
+    assert document["explanation"] == {"parts": [], "sentences": [document["explanation"]["sentences"][0]]}
     jsonschema.validate(document, schema("report")["properties"]["answers"]["items"])
 
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tests.discovery import places
-from tests.discovery.scenes import MATERIALS
+from tests.discovery.scenes import MATERIALS, ROLLING
 from tests.discovery.videos import Video
 from vrdp_prob.scene import Shape
 
@@ -130,7 +130,10 @@ def material_friction(videos: Videos, strength: float, generator: np.random.Gene
 
 
 def slip_to_roll(videos: Videos, strength: float, generator: np.random.Generator) -> Videos:
-    """Strength: friction coefficient of a sphere that slips; spheres are released without rolling."""
+    """Strength: friction coefficient of a sphere that slips; spheres are released without rolling.
+
+    It has no value at which it vanishes. Below the rolling resistance it makes no sense, so that is the least.
+    """
     if not any(Shape.SPHERE in video.shapes for video in videos):
         raise ValueError("slip_to_roll needs spheres; draw videos with some.")
     return governed(videos, slip_friction=strength)
@@ -208,7 +211,7 @@ CATALOGUE: dict[str, Cause] = {
     "time_varying_friction": Cause("time_varying_friction", time_varying_friction, "1", 4.0),
     "mass_dependent_friction": Cause("mass_dependent_friction", mass_dependent_friction, "1", 3.0),
     "material_friction": Cause("material_friction", material_friction, "1", 6.0),
-    "slip_to_roll": Cause("slip_to_roll", slip_to_roll, "1", 0.1, least=0.005),
+    "slip_to_roll": Cause("slip_to_roll", slip_to_roll, "1", 0.2, least=ROLLING),
     "contact_friction": Cause("contact_friction", contact_friction, "1", 1.0),
     "speed_dependent_restitution": Cause("speed_dependent_restitution", speed_dependent_restitution, "1", 1.0),
     "hidden_obstacle": Cause("hidden_obstacle", hidden_obstacle, "m", 0.5),

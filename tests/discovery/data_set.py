@@ -21,9 +21,9 @@ from tests.discovery.videos import UnendingMotionError
 from vrdp_prob.datasets import write_folder
 from vrdp_prob.scene import Tracks
 
-NEAR_ENOUGH = 0.01
-"""Relative error of a strength at which the search for it ends."""
-WEAKEST = 1e-3
+NEAR_ENOUGH = 0.02
+"""Relative error of the effect size, or of the strength, at which the search for a strength ends."""
+WEAKEST = 1e-4
 """Smallest share of the largest strength that the search tries."""
 ORDERS_FRICTION = ("mass_dependent_friction", "material_friction")
 """Causes that leave nothing where the refit gives each body a friction of its own."""
@@ -196,7 +196,7 @@ class Yardstick:
         """Strength at which the cause leaves a wanted residual, in units of the noise.
 
         It is searched between the cause's `least` and `most`. Where no strength leaves as much, or none as little, the
-        nearest end is returned, and where the residual jumps (a contact more or less), the place of the jump: so look
+        one that comes nearest is returned, and where the residual jumps (a contact more or less), the place of the jump: so look
         at the effect size that was reached, which the truth states.
         """
         cause = ALL[self.way]
@@ -209,17 +209,16 @@ class Yardstick:
                 size = self.left_by(strength(coordinate)).size
             except UnendingMotionError:
                 return 5.0
-            return float(np.log(max(size, 1e-3) / effect_size))
+            found = float(np.log(max(size, 1e-3) / effect_size))
+            return 0.0 if abs(found) < NEAR_ENOUGH else found
 
-        ends = float(np.log(WEAKEST)), 0.0
-        if excess(ends[1]) < 0:
-            tried = [(excess(coordinate), coordinate) for coordinate in (0.0, -0.7, -1.4)]
-            ends = ends[0], max(tried)[1]
-            if max(tried)[0] < 0:
-                return strength(ends[1])
-        if excess(ends[0]) > 0:
-            return strength(ends[0])
-        return strength(brentq(excess, *ends, xtol=NEAR_ENOUGH, rtol=1e-6))
+        weakest, strongest = float(np.log(WEAKEST)), 0.0
+        if excess(weakest) > 0 or excess(strongest) < 0:
+            tried = [(excess(coordinate), coordinate) for coordinate in (weakest, -2.8, -2.1, -1.4, -0.7, strongest)]
+            if max(tried)[0] < 0 or min(tried)[0] > 0:
+                return strength(min(tried, key=lambda pair: abs(pair[0]))[1])
+            weakest, strongest = min(tried)[1], max(tried)[1]
+        return strength(brentq(excess, weakest, strongest, xtol=NEAR_ENOUGH, rtol=1e-6))
 
 
 def _seeds(seed: int, causes: int) -> _Seeds:

@@ -56,7 +56,7 @@ def measure(
 ) -> tuple[Tracks, Bool[np.ndarray, "time body"]]:
     """Tracks of a video, and which observations are outliers."""
     states = video.motion.states
-    seen = _seen(video, measurement.dropout, generator)
+    seen = _seen(video, measurement.dropout, generator) & video.in_view
     wrong = seen & _settled(video) & (generator.random(seen.shape) < measurement.outliers)
     places = recorded(video, states[..., :2]) + measurement.noise * generator.standard_normal((*seen.shape, 2))
     places = places + np.where(
@@ -70,23 +70,24 @@ def measure(
         places,
         angles=_angles(video, seen, measurement, generator) if measurement.angles else None,
         walls=tuple(wall if measurement.wall_restitution else replace(wall, restitution=None) for wall in video.walls),
-        camera=overhead_camera(video.centre, video.frame_rate) if measurement.camera else None,
+        camera=overhead_camera(video) if measurement.camera else None,
     )
     return tracks, wrong
 
 
-def overhead_camera(centre: tuple[float, float], frame_rate: float) -> Camera:
-    """A camera 10 m above the middle of its picture, which shows 8 m by 6 m of the table."""
-    height, focus, width, tall = 10.0, 1000.0, 800, 600
-    x, y = centre
+def overhead_camera(video: Video) -> Camera:
+    """A camera 10 m above the middle of the picture, which shows what is in view."""
+    height, side = 10.0, 800
+    focus = side / 2 * height / video.view
+    x, y = video.centre
     projection = np.array(
         [
-            [focus, 0.0, -width / 2, width / 2 * height - focus * x],
-            [0.0, -focus, -tall / 2, tall / 2 * height + focus * y],
+            [focus, 0.0, -side / 2, side / 2 * height - focus * x],
+            [0.0, -focus, -side / 2, side / 2 * height + focus * y],
             [0.0, 0.0, -1.0, height],
         ]
     )
-    return Camera(projection, width, tall, frame_rate)
+    return Camera(projection, side, side, video.frame_rate)
 
 
 def _bodies(video: Video, *, masses: bool) -> tuple[Body, ...]:

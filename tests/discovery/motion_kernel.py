@@ -1,8 +1,8 @@
 # ruff: noqa: PLR0917, PLR0912  compiled functions take plain arrays by position; one loop holds the time
 """The integrator: Runge-Kutta steps of one size, cut by bisection where something happens inside a step.
 
-What can happen: two things touch, a body stops, a sphere has begun to roll, a body comes onto a patch or leaves it.
-A body at rest stays while what pushes it is at most its friction. Nothing of the simulator is used here.
+What can happen: two things touch, a body stops or turns back, a sphere has begun to roll, a body comes onto a patch or
+leaves it. A body at rest stays while what pushes it is at most its friction. Nothing of the simulator is used here.
 """
 
 import numpy as np
@@ -80,14 +80,14 @@ def held(state, k, now, things, laws, patch, released):
 
 @njit(cache=True)
 def turned_back(x, y, start_x, start_y):
-    return x * start_x + y * start_y <= 0 < start_x**2 + start_y**2 or x * x + y * y < 1e-14 < start_x**2 + start_y**2
+    moved = start_x**2 + start_y**2
+    return (moved > 1e-16 and x * start_x + y * start_y <= 0) or x * x + y * y < 1e-14 < moved
 
 
 @njit(cache=True)
-def stops(start, state, k, now, things, laws, mode, patch, released):
-    if mode[k] != MOVES or not turned_back(state[k, 2], state[k, 3], start[k, 2], start[k, 3]):
-        return False
-    return held(state, k, now, things, laws, patch, released)
+def turns(start, state, k, mode):
+    """Whether a body has turned back, or stopped."""
+    return mode[k] == MOVES and turned_back(state[k, 2], state[k, 3], start[k, 2], start[k, 3])
 
 
 @njit(cache=True)
@@ -111,14 +111,12 @@ def closing(state, things, released):
 
 
 @njit(cache=True)
-def happens(start, state, now, things, laws, mode, patch, released):
+def happens(start, state, things, laws, mode, patch, released):
     """Whether something happened that cuts the step."""
     for k in range(len(mode)):
         if not released[k]:
             continue
-        if on_patch(laws, state[k]) != patch[k] or rolls(start, state, k, mode):
-            return True
-        if stops(start, state, k, now, things, laws, mode, patch, released):
+        if on_patch(laws, state[k]) != patch[k] or rolls(start, state, k, mode) or turns(start, state, k, mode):
             return True
     return closing(state, things, released) >= SLOWEST
 
@@ -129,7 +127,7 @@ def settle(start, state, now, things, laws, mode, patch, released):
     for k in range(len(mode)):
         if not released[k]:
             continue
-        if stops(start, state, k, now, things, laws, mode, patch, released):
+        if turns(start, state, k, mode) and held(state, k, now, things, laws, patch, released):
             mode[k] = RESTS
             state[k, 2] = state[k, 3] = state[k, 6] = state[k, 7] = 0.0
         elif rolls(start, state, k, mode):
@@ -201,13 +199,13 @@ def integrate(start, things, laws, times, size, most_contacts):
                 if released[k] and mode[k] == RESTS and not held(state, k, now, things, laws, patch, released):
                     mode[k] = MOVES
             target = step(state, now, length, things, laws, mode, patch, released)
-            if happens(state, target, now + length, things, laws, mode, patch, released):
+            if happens(state, target, things, laws, mode, patch, released):
                 cuts += 1
                 low = 0.0
                 while length - low > TOLERANCE:
                     middle = (low + length) / 2
                     target = step(state, now, middle, things, laws, mode, patch, released)
-                    if happens(state, target, now + middle, things, laws, mode, patch, released):
+                    if happens(state, target, things, laws, mode, patch, released):
                         length = middle
                     else:
                         low = middle

@@ -21,7 +21,7 @@ def moving_moment(videos: tuple[Video, ...], generator: np.random.Generator) -> 
         body, share = int(generator.integers(len(video.shapes))), generator.uniform(0.15, 0.6)
         frame = int(share * video.frames)
         speed = np.linalg.norm(video.motion.states[frame : frame + video.frames // 5, body, 2:4], axis=-1)
-        if speed.min() > 0.2 and video.times[frame] > video.release[body]:
+        if speed.min() > 0.2 and video.times[frame] > video.release[body] and video.in_view[frame, body]:
             return number, body, float(video.times[frame])
 
 
@@ -48,7 +48,7 @@ def in_the_way(videos: tuple[Video, ...], depth: float, generator: np.random.Gen
         body, radius = generator.integers(len(video.shapes)), generator.uniform(0.1, 0.25)
         states = video.motion.states[:, body]
         speed = np.linalg.norm(states[:, 2:4], axis=1)
-        if speed.max() < 0.4 or states[-1, 8] < 0.5:
+        if speed.max() < 0.4 or states[-1, 8] < 0.5 or not video.in_view[-1, body]:
             continue
         last = np.flatnonzero(speed > 0.05)[-1]
         ahead = states[last, 2:4] / speed[last]
@@ -69,24 +69,29 @@ def cutting_off(videos: tuple[Video, ...], depth: float, generator: np.random.Ge
     """One wall or two square to each other; each cuts `depth` m off what bodies reach, where there is room for it."""
     count = int(generator.integers(1, 3))
     best, most_room = 0.0, -np.inf
-    for angle in generator.uniform(0, 2 * np.pi, 12):
-        room = min(_room(videos, angle + k * np.pi / 2)[1] for k in range(count))
+    for angle in generator.uniform(0, 2 * np.pi, 24):
+        room = min(_room(videos, angle + k * np.pi / 2)[2] for k in range(count))
         if room > most_room:
             best, most_room = float(angle), room
     walls = []
     for k in range(count):
         angle = best + k * np.pi / 2
-        reach, room = _room(videos, angle)
+        reach, room, _ = _room(videos, angle)
         walls.append(_wall(angle, reach - min(depth, room)))
     return tuple(walls)
 
 
-def _room(videos: tuple[Video, ...], angle: float) -> tuple[float, float]:
-    """How far bodies reach in a direction, and how much of it no body needs at its release."""
+def _room(videos: tuple[Video, ...], angle: float) -> tuple[float, float, float]:
+    """How far bodies reach in a direction, how much of it no body needs at its release, and that less what is unseen.
+
+    A wall where a body has left the picture would bring it back, which is no small effect however shallow it cuts.
+    """
     ahead = np.array([np.cos(angle), np.sin(angle)])
-    reach = max(float((video.motion.states[..., :2] @ ahead + video.radius).max()) for video in videos)
+    reaches = [video.motion.states[..., :2] @ ahead + video.radius for video in videos]
+    reach = max(float(found.max()) for found in reaches)
+    seen = max(float(found[video.in_view].max()) for found, video in zip(reaches, videos, strict=True))
     start = max(float((video.position @ ahead + np.sqrt(2.0) * video.radius).max()) for video in videos)
-    return reach, reach - start - ROOM
+    return reach, reach - start - ROOM, seen - start - ROOM - 10 * (reach - seen)
 
 
 def _wall(angle: float, distance: float) -> Wall:

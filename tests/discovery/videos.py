@@ -59,8 +59,8 @@ class Video:
         True time of each frame less its stamp, in s.
     distortion
         Of the lens: recorded place r' = r (1 + distortion |r|^2) about `centre`, in 1/m^2.
-    centre
-        Middle of the picture in m.
+    centre, view
+        Middle of the picture and half of its side in m; what is outside is not seen.
     """
 
     shapes: tuple[Shape, ...]
@@ -85,6 +85,7 @@ class Video:
     late: Float[np.ndarray, "time"] | None = None
     distortion: float = 0.0
     centre: tuple[float, float] = (0.0, 0.0)
+    view: float = 4.0
 
     @property
     def stamps(self) -> Float[np.ndarray, "time"]:
@@ -100,6 +101,12 @@ class Video:
     def motion(self) -> "Motion":
         """The exact motion, integrated once."""
         return move(self)
+
+    @property
+    def in_view(self) -> Bool[np.ndarray, "time body"]:
+        """Whether the middle of a body is in the picture; it is also where it has yet to come in."""
+        apart = np.abs(recorded(self, self.motion.states[..., :2]) - np.array(self.centre))
+        return np.asarray((apart < self.view).all(axis=-1))
 
     def governed_by(self, **numbers: float) -> "Video":
         """The video with other numbers in its laws."""

@@ -196,8 +196,8 @@ class Yardstick:
         """Strength at which the cause leaves a wanted residual, in units of the noise.
 
         It is searched between the cause's `least` and `most`. Where no strength leaves as much, or none as little, the
-        one that comes nearest is returned, and where the residual jumps (a contact more or less), the place of the jump: so look
-        at the effect size that was reached, which the truth states.
+        one that comes nearest is returned, and where the residual jumps (a contact more or less), the place of the
+        jump: so look at the effect size that was reached, which the truth states.
         """
         cause = ALL[self.way]
 

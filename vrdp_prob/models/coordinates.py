@@ -32,6 +32,10 @@ class Coordinate:
         Prior in the vector's units.
     scale
         Typical size of a change, for finite differences and damping.
+    group
+        What those have in common that share the number, for example a material; None where it has one owner.
+    others
+        Its further owners.
     """
 
     field: str
@@ -39,6 +43,14 @@ class Coordinate:
     transform: Transform
     prior: Prior
     scale: float = 1.0
+    group: str | None = None
+    others: tuple[int, ...] = ()
+
+    @property
+    def name(self) -> str:
+        """A name with its owner, for example `mass[2]`."""
+        owner = self.owner if self.group is None else self.group
+        return self.field if owner is None else f"{self.field}[{owner}]"
 
     @classmethod
     def of(cls, parameter: Parameter, owner: int | None = None, *, scale: float = 0.1) -> "Coordinate":
@@ -87,7 +99,7 @@ class Coordinates:
     @cached_property
     def names(self) -> tuple[str, ...]:
         """A name for each number, for example `mass[2]`."""
-        return tuple(e.field if e.owner is None else f"{e.field}[{e.owner}]" for e in self.entries)
+        return tuple(entry.name for entry in self.entries)
 
     def mask(self, fields: Iterable[str], owners: Iterable[int] | None = None) -> Bool[np.ndarray, "dimension"]:
         """Which numbers belong to some quantities (and owners)."""
@@ -159,7 +171,10 @@ class Coordinates:
         targets = []
         for transform in {entry.transform: None for entry in self.entries}:
             chosen = [
-                (k, begin[e.field] + (e.owner or 0)) for k, e in enumerate(self.entries) if e.transform is transform
+                (place, begin[entry.field] + owner)
+                for place, entry in enumerate(self.entries)
+                for owner in (entry.owner or 0, *entry.others)
+                if entry.transform is transform
             ]
             places, owners = (torch.tensor(column, dtype=torch.int64) for column in zip(*chosen, strict=True))
             targets.append((transform, places, owners))

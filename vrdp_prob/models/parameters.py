@@ -32,6 +32,8 @@ class Scope(StrEnum):
     """One value per video."""
     BODY = "body"
     """One value per body."""
+    MATERIAL = "material"
+    """One value for all bodies of a material."""
 
 
 LARGEST_LOG = 50.0
@@ -110,7 +112,7 @@ class Parameter:
     default
         Value where nothing is known of the parameter.
     scope
-        Whether there is one value per video or per body.
+        Whether there is one value per video, per body or per material.
     shapes
         Shapes of the bodies whose motion depends on it; all where none are given.
     """

@@ -73,7 +73,7 @@ class Scenery:
             radius=self.radius.expand(count, -1),
             present=torch.ones(count, len(self.shapes), dtype=torch.bool),
             parameters={
-                one.name: quantities[one.name] if one.scope is Scope.BODY else quantities[one.name][:, 0]
+                one.name: quantities[one.name][:, 0] if one.scope is Scope.SHARED else quantities[one.name]
                 for one in model.parameters
             },
             walls=self.walls,

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Float
@@ -30,6 +30,8 @@ DEGREES_PRIOR = Prior(math.log(8.0), 0.8)
 """Degrees of freedom of Student-t noise: from gross outliers (1.7) to nearly Gaussian (38) in the middle 95 %."""
 MOTION = ("x", "y", "velocity_x", "velocity_y", "angle", "spin", "angle_zero")
 """Quantities that say where a body is released, and how it moves there."""
+NOT_STATED = "unknown material"
+"""Group of the bodies whose material nobody stated."""
 SPEED_SD = 3.0
 """Prior standard deviation in m/s of a release velocity."""
 SPIN_SD = 2.0
@@ -147,6 +149,19 @@ def _physics(tracks: Tracks, model: PhysicsModel, structure: Structure) -> Itera
         if parameter.scope is Scope.BODY and parameter.name not in (MASS.name, RESTITUTION.name):
             for body in sorted((structure.moving | structure.meeting).intersection(concerned)):
                 yield Coordinate.of(parameter, body)
+        if parameter.scope is Scope.MATERIAL:
+            for material, bodies in _by_material(tracks).items():
+                if (structure.moving | structure.meeting).intersection(concerned, bodies):
+                    yield replace(Coordinate.of(parameter, bodies[0]), group=material, others=bodies[1:])
+
+
+def _by_material(tracks: Tracks) -> dict[str, tuple[int, ...]]:
+    """Bodies of each material; those of which it is not stated are one of their own."""
+    materials = sorted({body.material or NOT_STATED for body in tracks.bodies})
+    return {
+        material: tuple(i for i, body in enumerate(tracks.bodies) if (body.material or NOT_STATED) == material)
+        for material in materials
+    }
 
 
 def _measurement(tracks: Tracks, noise: NoiseFamily) -> Iterator[Coordinate]:
@@ -175,7 +190,7 @@ def _defaults(tracks: Tracks, model: PhysicsModel) -> dict[str, Float[np.ndarray
     }
     for parameter in model.parameters:
         if parameter.name not in defaults:
-            owners = count if parameter.scope is Scope.BODY else 1
+            owners = 1 if parameter.scope is Scope.SHARED else count
             defaults[parameter.name] = np.full(owners, parameter.default)
     return defaults
 

@@ -28,8 +28,8 @@ FLAT_SD = 1e8
 WALL_DIGITS = 6
 """Walls whose end points agree to so many decimals (m) are one wall."""
 
-Key = tuple[str, tuple[float, ...]]
-"""A shared number: its quantity, and for the restitution of a wall where the wall is."""
+Key = tuple[str, tuple[float | str, ...]]
+"""A shared number: its quantity, and for the restitution of a wall where the wall is, or the name of a material."""
 
 
 @dataclass(frozen=True)
@@ -57,7 +57,7 @@ class SharedNumbers:
     @cached_property
     def names(self) -> tuple[str, ...]:
         """A name for each number."""
-        return tuple(field + (f"({', '.join(f'{x:g}' for x in place)})" if place else "") for field, place in self.keys)
+        return tuple(field + (f"({words})" if (words := place_words(place)) else "") for field, place in self.keys)
 
     @cached_property
     def logarithms(self) -> Bool[np.ndarray, "shared"]:
@@ -222,7 +222,7 @@ def check_names(names: Sequence[str], model: PhysicsModel) -> None:
     InputError
         If the model has no such parameter, or each body has its own.
     """
-    per_video = [parameter.name for parameter in model.parameters if parameter.scope is Scope.SHARED]
+    per_video = [parameter.name for parameter in model.parameters if parameter.scope is not Scope.BODY]
     possible = [*per_video, WALL_RESTITUTION.name, NOISE, ANGLE_NOISE]
     for name in names:
         if name not in possible:
@@ -232,10 +232,17 @@ def check_names(names: Sequence[str], model: PhysicsModel) -> None:
             )
 
 
+def place_words(place: tuple[float | str, ...]) -> str:
+    """Which wall or material a shared number belongs to; empty where it belongs to none."""
+    return ", ".join(part if isinstance(part, str) else f"{part:g}" for part in place)
+
+
 def _key(entry: Coordinate, tracks: Tracks) -> Key | None:
     """What a number of a video's vector may be shared as; None where it is the video's own."""
     if entry.owner is None:
         return entry.field, ()
+    if entry.group is not None:
+        return entry.field, (entry.group,)
     if entry.field != WALL_RESTITUTION.name:
         return None
     wall = tracks.walls[entry.owner]

@@ -14,7 +14,7 @@ from vrdp_prob.errors import InputError
 from vrdp_prob.files import write_atomically
 from vrdp_prob.inference.posterior import Posterior
 from vrdp_prob.inference.samples import Convergence
-from vrdp_prob.inference.several_videos.linking import SharedNumbers
+from vrdp_prob.inference.several_videos.linking import SharedNumbers, place_words
 from vrdp_prob.inference.storage import from_tree, reading, to_tree
 from vrdp_prob.inference.summaries import Summary
 from vrdp_prob.models import model_file
@@ -196,24 +196,25 @@ class SharedPosterior:
     def _named(self, points: Float[np.ndarray, "*batch shared"], axes: tuple[str, ...]) -> xr.Dataset:
         """Values of the shared quantities by name."""
         units = {parameter.name: parameter.unit for parameter in self.model.parameters}
+        keys, entries = self.numbers.keys, self.numbers.entries
         variables: dict[str, Any] = {}
-        walls, restitutions = [], []
-        for place, (key, entry) in enumerate(zip(self.numbers.keys, self.numbers.entries, strict=True)):
-            values = np.exp(points[..., place]) if entry.transform is Transform.LOG else points[..., place]
-            if key[0] == WALL_RESTITUTION.name:
-                walls.append(", ".join(f"{number:g}" for number in key[1]))
-                restitutions.append(values)
-                continue
-            attributes: dict[str, Any] = {"units": units.get(key[0], "1")}
-            if key[0] == NOISE and self.numbers.noise_reference is not None:
-                attributes["reference_m"] = self.numbers.noise_reference
-            variables[key[0]] = (axes, values, attributes)
         coordinates: dict[str, Any] = {
             axis: np.arange(size) for axis, size in zip(axes, points.shape[:-1], strict=True)
         }
-        if walls:
-            variables[WALL_RESTITUTION.name] = ((*axes, "wall"), np.stack(restitutions, axis=-1), {"units": "1"})
-            coordinates["wall"] = ("wall", walls, {"long_name": "x1, y1, x2, y2 in m"})
+        for field in dict.fromkeys(field for field, _ in keys):
+            places = [place for place, (other, _) in enumerate(keys) if other == field]
+            values = points[..., places]
+            values = np.exp(values) if entries[places[0]].transform is Transform.LOG else values
+            attributes: dict[str, Any] = {"units": units.get(field, "1")}
+            if field == NOISE and self.numbers.noise_reference is not None:
+                attributes["reference_m"] = self.numbers.noise_reference
+            labels = [place_words(keys[place][1]) for place in places]
+            if not any(labels):
+                variables[field] = (axes, values[..., 0], attributes)
+                continue
+            axis, meaning = ("wall", "x1, y1, x2, y2 in m") if field == WALL_RESTITUTION.name else ("material", "")
+            variables[field] = ((*axes, axis), values, attributes)
+            coordinates[axis] = (axis, labels, {"long_name": meaning} if meaning else {})
         return xr.Dataset(variables, coordinates)
 
 

@@ -48,7 +48,7 @@ class Layout:
     @classmethod
     def of(cls, parameters: Sequence[Parameter]) -> "Layout":
         """Layout for the parameters of a model."""
-        own = tuple(parameter.name for parameter in parameters if parameter.scope is Scope.BODY)
+        own = tuple(parameter.name for parameter in parameters if parameter.scope is not Scope.SHARED)
         shared = tuple(parameter.name for parameter in parameters if parameter.scope is Scope.SHARED)
         return cls(CONSTANTS + own, shared)
 

@@ -243,7 +243,7 @@ def compile_model(model: PhysicsModel | None = None) -> None:
     """
     physics = PhysicsModel.base() if model is None else model
     one = torch.ones(1, 1, dtype=torch.float64)
-    own = [parameter for parameter in physics.parameters if parameter.scope is Scope.BODY]
+    own = [parameter for parameter in physics.parameters if parameter.scope is not Scope.SHARED]
     shared = [parameter for parameter in physics.parameters if parameter.scope is Scope.SHARED]
     worlds = Worlds(
         shapes=(Shape.CUBE,),

@@ -33,6 +33,7 @@ from vrdp_prob.models.physics import PhysicsModel
 from vrdp_prob.models.simulator.rollout import compile_model
 from vrdp_prob.progress import progress_display
 from vrdp_prob.reasoning import ask, infer
+from vrdp_prob.reasoning.adaptive import check_mc_error
 from vrdp_prob.reasoning.checking import check_question
 from vrdp_prob.report.answer_lines import answer_lines
 from vrdp_prob.report.pipeline import Report, check_questions
@@ -147,6 +148,8 @@ def ask_question(
         raise InputError('the question is empty; ask one, for example "What will happen next?" with --choice options.')
     asked = Question(question, choices=tuple(Choice(number, text) for number, text in enumerate(choice or ())))
     check_options(sampler=sampler, noise=noise, defaults=defaults)
+    if mc_error is not None:
+        check_mc_error(mc_error)
     if checkpoint is not None:
         check_writable(checkpoint)
     physics = _model(model)

@@ -164,6 +164,14 @@ def test_options_are_refused_before_the_video_is_read(
     assert message in refused(capsys, command[0], folder, *command[1:], *words)
 
 
+@pytest.mark.parametrize("error", ["0", "1", "-0.1", "nan"])
+def test_an_error_that_cannot_be_reached_is_refused_before_the_video_is_read(
+    folder: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, error: str
+) -> None:
+    forbid(monkeypatch, "load", "load_all")
+    assert "between 0 and 1" in refused(capsys, "ask", folder, "How many collisions happen?", "--mc-error", error)
+
+
 @pytest.mark.parametrize(
     ("question", "choices", "message"),
     [

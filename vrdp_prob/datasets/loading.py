@@ -81,7 +81,7 @@ def video_names(path: Path | str) -> list[str]:
 def has_tracks(path: Path | str) -> bool:
     """Whether an input states positions, as a tracks folder or annotations do, rather than films."""
     source = _existing(path)
-    return _is_tracks_folder(source) or bool(_annotation_files(source))
+    return _is_tracks_folder(source) or bool(_annotation_paths(source))
 
 
 def video_files(path: Path | str) -> dict[str, Path]:
@@ -117,7 +117,7 @@ def _existing(path: Path | str) -> Path:
         raise InputError(
             f"{source}: a table of positions must be named {TRACKS_FILE} and have an objects.csv beside it; rename it."
         )
-    if source.is_dir() and not (_is_tracks_folder(source) or _annotation_files(source) or video_files(source)):
+    if source.is_dir() and not (_is_tracks_folder(source) or _annotation_paths(source) or video_files(source)):
         raise InputError(f"{source}: the folder holds no tracks.csv, no video and no annotation; check the path.")
     return source
 
@@ -127,9 +127,14 @@ def _is_tracks_folder(path: Path) -> bool:
 
 
 def _annotation_files(path: Path) -> dict[str, Path]:
-    """CLEVRER annotation files by the name of their video."""
-    files = sorted(path.glob(ANNOTATION_PATTERN)) if path.is_dir() else [path] if path.suffix.lower() == ".json" else []
-    return {annotated_video(file): file for file in files}
+    """CLEVRER annotation files by the name of their video, which each has to be read for."""
+    return {annotated_video(file): file for file in _annotation_paths(path)}
+
+
+def _annotation_paths(path: Path) -> list[Path]:
+    if path.is_dir():
+        return sorted(path.glob(ANNOTATION_PATTERN))
+    return [path] if path.suffix.lower() == ".json" else []
 
 
 def _load_file(path: Path, camera: CameraChoice, progress: ProgressDisplay | None) -> Tracks:

@@ -7,7 +7,6 @@ from concurrent.futures import as_completed
 from dataclasses import dataclass
 from functools import cached_property
 from hashlib import sha256
-from importlib.metadata import version
 from pathlib import Path
 
 from vrdp_prob.datasets import (
@@ -27,8 +26,7 @@ from vrdp_prob.evaluation.scores import Interval, Scores, brier_gain
 from vrdp_prob.evaluation.workers import cluster, local_workers
 from vrdp_prob.files import write_atomically
 from vrdp_prob.inference import check_options, default_model
-from vrdp_prob.inference.checkpoint import Checkpoint
-from vrdp_prob.models import model_file
+from vrdp_prob.inference.checkpoint import Checkpoint, run_facts
 from vrdp_prob.models.physics import PhysicsModel
 from vrdp_prob.models.simulator.rollout import compile_model
 from vrdp_prob.progress import ProgressDisplay, SilentProgress
@@ -155,7 +153,7 @@ def evaluate(
         raise InputError(f"input is '{source}'; use {' or '.join(SOURCES)}.")
     if draws < 1 or (processes is not None and processes < 1):
         raise InputError(f"draws is {draws} and processes is {processes}; both must be at least 1.")
-    settings = Settings(model, sampler, seed, draws)
+    settings = Settings(model or default_model(), sampler, seed, draws)
     asked = _asked(Path(questions), scenes)
     tasks = _tasks(Path(folder), asked, source, camera, settings)
     facts = _facts(Path(folder), Path(questions), source, settings)
@@ -163,7 +161,7 @@ def evaluate(
     done = {} if kept is None else _done(kept, tasks)
     waiting = [task for task in tasks if task.scene not in done]
     if waiting and dask is None:
-        compile_model(model or default_model())
+        compile_model(settings.model)
     with (progress or SilentProgress()).stage("Evaluating", total=len(tasks)) as advance:
         advance(len(done))
         several = min(processes or os.cpu_count() or 1, max(len(waiting), 1))
@@ -232,19 +230,18 @@ def _some(folder: Path, tasks: list[Task]) -> list[Task]:
 
 def _facts(folder: Path, questions: Path, source: str | None, settings: Settings) -> dict[str, str]:
     """What the results depend on: another evaluation must not go on from them."""
-    model = settings.model or default_model()
     table = folder / "tracks.csv"
-    return {
-        "folder": str(folder.resolve()),
-        "tracks": sha256(table.read_bytes()).hexdigest() if table.is_file() and source != "videos" else "",
-        "input": str(source),
-        "questions": sha256(questions.read_bytes()).hexdigest(),
-        "model": sha256(model_file.text(model.name, model.effects, model.parameters).encode()).hexdigest(),
-        "sampler": settings.sampler,
-        "seed": str(settings.seed),
-        "draws": str(settings.draws),
-        "version": version("vrdp-prob"),
-    }
+    tracks = sha256(table.read_bytes()).hexdigest() if table.is_file() and source != "videos" else ""
+    return run_facts(
+        settings.model,
+        folder=folder.resolve(),
+        tracks=tracks,
+        input=source,
+        questions=sha256(questions.read_bytes()).hexdigest(),
+        sampler=settings.sampler,
+        seed=settings.seed,
+        draws=settings.draws,
+    )
 
 
 def _done(kept: Checkpoint, tasks: Sequence[Task]) -> dict[str, SceneResult]:

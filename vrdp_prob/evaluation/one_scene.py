@@ -27,7 +27,7 @@ the prior; and the most probable values alone."""
 class Settings:
     """How every video is worked on; see `evaluate`."""
 
-    model: PhysicsModel | None
+    model: PhysicsModel
     sampler: str
     seed: int
     draws: int

@@ -5,7 +5,7 @@ Cooper and Hauskrecht, Obtaining well calibrated probabilities using Bayesian bi
 Increasing the reliability of reliability diagrams, Weather and Forecasting 22 (2007).
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -21,6 +21,10 @@ REPLICATIONS = 2000
 """Replications of calibrated outcomes, and of scenes in the bootstrap."""
 COVERAGES = np.linspace(0.1, 1.0, 10)
 """Shares of the questions that are answered, the surest first."""
+
+
+OfScenes = Sequence[tuple[str, Sequence[float]]]
+"""Values of judgements, each with the scene that it is about."""
 
 
 @dataclass(frozen=True)
@@ -116,16 +120,17 @@ class Scores:
         forecast, outcome = _forecasts(judgements)
         q95, bands = _if_calibrated(forecast, generator)
         measures = {"accuracy_per_option": _per_option, "accuracy_per_question": _per_question, "brier": _brier}
+        values = {name: [(one.scene, measure(one)) for one in judgements] for name, measure in measures.items()}
         return cls(
             questions=len(judgements),
             options=sum(len(judgement.choices) for judgement in judgements),
-            accuracy_per_option=_mean(_per_option(judgements)),
-            accuracy_per_question=_mean(_per_question(judgements)),
-            brier=_mean(_brier(judgements)),
-            log_score=_mean(_log_score(judgements)),
+            accuracy_per_option=_mean(values["accuracy_per_option"]),
+            accuracy_per_question=_mean(values["accuracy_per_question"]),
+            brier=_mean(values["brier"]),
+            log_score=_mean([(one.scene, _log_score(one)) for one in judgements]),
             ece=calibration_error(forecast, outcome),
             ece_if_calibrated_q95=q95,
-            intervals={name: found for name, of in measures.items() if (found := bootstrap(judgements, of, generator))},
+            intervals={name: found for name, given in values.items() if (found := bootstrap(given, generator))},
             reliability=_reliability(forecast, outcome, bands),
             abstention=_abstention(judgements),
             refused=sum(judgement.refused is not None for judgement in judgements),
@@ -142,13 +147,12 @@ def brier_gain(ours: Sequence[Judgement], other: Sequence[Judgement], *, seed: i
     seed
         Seed of the bootstrap over scenes.
     """
-    theirs = {id(mine): its for mine, its in zip(ours, other, strict=True)}
-
-    def gain(chosen: Sequence[Judgement]) -> list[float]:
-        return [b - a for one in chosen for a, b in zip(_brier([one]), _brier([theirs[id(one)]]), strict=True)]
-
-    interval = bootstrap(ours, gain, np.random.default_rng(seed))
-    return float(np.mean(gain(ours))), interval or Interval(np.nan, np.nan)
+    gains = [
+        (mine.scene, [b - a for a, b in zip(_brier(mine), _brier(its), strict=True)])
+        for mine, its in zip(ours, other, strict=True)
+    ]
+    mean, interval = _mean(gains), bootstrap(gains, np.random.default_rng(seed))
+    return np.nan if mean is None else mean, interval or Interval(np.nan, np.nan)
 
 
 def calibration_error(forecast: Float[np.ndarray, "forecast"], outcome: Bool[np.ndarray, "forecast"]) -> float:
@@ -158,20 +162,16 @@ def calibration_error(forecast: Float[np.ndarray, "forecast"], outcome: Bool[np.
     return float(np.abs(difference).sum() / len(forecast))
 
 
-def bootstrap(
-    judgements: Sequence[Judgement],
-    values: Callable[[Sequence[Judgement]], Sequence[float]],
-    generator: np.random.Generator,
-) -> Interval | None:
-    """Interval of the mean of some values of the judgements when scenes are drawn anew; None without any value.
+def bootstrap(values: OfScenes, generator: np.random.Generator) -> Interval | None:
+    """Interval of the mean of values of scenes when scenes are drawn anew; None without any value.
 
     Questions about one scene share its posterior, so scenes are what is independent.
     """
-    by_scene: dict[str, list[Judgement]] = {}
-    for judgement in judgements:
-        by_scene.setdefault(judgement.scene, []).append(judgement)
-    found = [values(scene) for scene in by_scene.values()]
-    sums, counts = np.array([sum(one) for one in found]), np.array([len(one) for one in found])
+    by_scene: dict[str, list[float]] = {}
+    for scene, given in values:
+        by_scene.setdefault(scene, []).extend(given)
+    sums = np.array([sum(given) for given in by_scene.values()])
+    counts = np.array([len(given) for given in by_scene.values()])
     if not counts.sum():
         return None
     chosen = generator.integers(len(sums), size=(REPLICATIONS, len(sums)))
@@ -191,35 +191,26 @@ def _forecasts(
     return np.array([float(p) for p, _ in forecasts]), np.array([bool(right) for _, right in forecasts])
 
 
-def _per_question(judgements: Sequence[Judgement]) -> list[float]:
-    return [float(judgement.right) for judgement in judgements]
+def _per_question(one: Judgement) -> list[float]:
+    return [float(one.right)]
 
 
-def _per_option(judgements: Sequence[Judgement]) -> list[float]:
-    return [
-        float(judgement.refused is None and (probability > 0.5) == right)
-        for judgement in judgements
-        for probability, right in judgement.choices
-    ]
+def _per_option(one: Judgement) -> list[float]:
+    return [float(one.refused is None and (probability > 0.5) == right) for probability, right in one.choices]
 
 
-def _brier(judgements: Sequence[Judgement]) -> list[float]:
-    values: list[float] = []
-    for judgement in judgements:
-        squares = [(probability - right) ** 2 for probability, right in judgement.choices]
-        values += squares or [judgement.squared_error]
-    return values
+def _brier(one: Judgement) -> list[float]:
+    return [(probability - right) ** 2 for probability, right in one.choices] or [one.squared_error]
 
 
-def _log_score(judgements: Sequence[Judgement]) -> list[float]:
-    given: list[float] = []
-    for judgement in judgements:
-        given += [p if right else 1 - p for p, right in judgement.choices] or [judgement.probability]
+def _log_score(one: Judgement) -> list[float]:
+    given = [p if right else 1 - p for p, right in one.choices] or [one.probability]
     return [float(value) for value in np.log(np.maximum(given, SMALLEST_PROBABILITY))]
 
 
-def _mean(values: Sequence[float]) -> float | None:
-    return float(np.mean(values)) if len(values) else None
+def _mean(values: OfScenes) -> float | None:
+    every = [value for _, given in values for value in given]
+    return float(np.mean(every)) if every else None
 
 
 def _bin_of(forecast: Float[np.ndarray, "*forecast"]) -> np.ndarray:
@@ -259,7 +250,7 @@ def _reliability(
 def _abstention(judgements: Sequence[Judgement]) -> tuple[float, ...]:
     """Accuracy of the surest questions; equally sure ones count with their mean."""
     confidence = np.array([judgement.confidence for judgement in judgements])
-    right = np.array(_per_question(judgements))
+    right = np.array([float(judgement.right) for judgement in judgements])
     for value in np.unique(confidence):
         right[confidence == value] = right[confidence == value].mean()
     ordered = right[np.argsort(-confidence, kind="stable")]

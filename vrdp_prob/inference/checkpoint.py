@@ -30,9 +30,13 @@ def fingerprint(tracks: Tracks, model: PhysicsModel, **settings: object) -> dict
         array = np.ascontiguousarray(values.values)
         seen.update(repr(array.tolist()).encode() if array.dtype == object else array.tobytes())
     seen.update(repr((tracks.bodies, tracks.walls)).encode())
+    return {"tracks": seen.hexdigest(), **run_facts(model, **settings)}
+
+
+def run_facts(model: PhysicsModel, **settings: object) -> dict[str, str]:
+    """What a run depends on beside its data, in short texts by name: the model, this version, and the settings."""
     text = model_file.text(model.name, model.effects, model.parameters)
     return {
-        "tracks": seen.hexdigest(),
         "model": sha256(text.encode()).hexdigest(),
         "version": version("vrdp-prob"),
         **{name: str(value) for name, value in settings.items()},

@@ -13,11 +13,7 @@ def first_contacts(rollout: Rollout, world: int) -> Pairs:
 
 def collision_sequences(rollout: Rollout) -> list[Pairs]:
     """For every world its colliding pairs in the order of their first contact."""
-    found: list[dict[tuple[int, int], None]] = [{} for _ in range(len(rollout.outcome))]
-    events = rollout.events.of_kind(RolloutEventKind.COLLISION)
-    for world, first, second in zip(events.world.tolist(), events.first.tolist(), events.second.tolist(), strict=True):
-        found[world][first, second] = None
-    return [tuple(pairs) for pairs in found]
+    return [tuple(dict.fromkeys(contacts)) for contacts in _contacts(rollout)]
 
 
 def wall_contacts(rollout: Rollout, world: int) -> Pairs:
@@ -31,9 +27,16 @@ def courses(rollout: Rollout) -> list[Pairs]:
 
     Within one course the world changes smoothly with the unknowns; descents do not find their way from one to another.
     """
+    return [
+        tuple(pair for place, pair in enumerate(contacts) if contacts[max(place - 2, 0) : place] != [pair] * 2)
+        for contacts in _contacts(rollout)
+    ]
+
+
+def _contacts(rollout: Rollout) -> list[list[tuple[int, int]]]:
+    """For every world the pairs of all its contacts, in order."""
     found: list[list[tuple[int, int]]] = [[] for _ in range(len(rollout.outcome))]
     events = rollout.events.of_kind(RolloutEventKind.COLLISION)
     for world, first, second in zip(events.world.tolist(), events.first.tolist(), events.second.tolist(), strict=True):
-        if found[world][-2:] != [(first, second)] * 2:
-            found[world].append((first, second))
-    return [tuple(pairs) for pairs in found]
+        found[world].append((first, second))
+    return found

@@ -146,24 +146,19 @@ def _log_parameter(
     return Parameter(name, unit, description, Transform.LOG, prior, default=median, scope=scope, shapes=shapes)
 
 
+def restitution_parameter(name: str, description: str, *, scope: Scope = Scope.SHARED) -> Parameter:
+    """A restitution factor, of a body or of something fixed: all have one prior."""
+    prior = Prior(math.log(0.8), 0.35, upper=EDGE)
+    return Parameter(name, "1", description, Transform.LOG, prior, default=0.8, scope=scope)
+
+
 MASS = _log_parameter("mass", "kg", "mass of a body", median=1.0, log_sd=0.7, scope=Scope.BODY)
-RESTITUTION = Parameter(
+RESTITUTION = restitution_parameter(
     "restitution",
-    "1",
     "restitution factor of a body; the coefficient of a pair is the product of both factors",
-    Transform.LOG,
-    Prior(math.log(0.8), 0.35, upper=EDGE),
-    default=0.8,
     scope=Scope.BODY,
 )
-WALL_RESTITUTION = Parameter(
-    "wall_restitution",
-    "1",
-    "restitution factor of a wall",
-    Transform.LOG,
-    Prior(math.log(0.8), 0.35, upper=EDGE),
-    default=0.8,
-)
+WALL_RESTITUTION = restitution_parameter("wall_restitution", "restitution factor of a wall")
 SLIDING_FRICTION = _log_parameter(
     "sliding_friction",
     "1",

@@ -39,8 +39,7 @@ def answer_within(
     InputError
         If `mc_error` is not between 0 and 1, or see `answer_question`.
     """
-    if not 0 < mc_error < 1:
-        raise InputError(f"mc_error is {mc_error:g}; ask for a number between 0 and 1, for example 0.02.")
+    check_mc_error(mc_error)
     answer = answer_question(worlds, question, choices=choices)
     while largest_error(answer) > mc_error:
         if worlds.more is None:
@@ -49,6 +48,18 @@ def answer_within(
         worlds = worlds.more
         answer = answer_question(worlds, question, choices=choices)
     return answer
+
+
+def check_mc_error(mc_error: float) -> None:
+    """Refuse an error that cannot be asked for.
+
+    Raises
+    ------
+    InputError
+        If it is not between 0 and 1.
+    """
+    if not 0 < mc_error < 1:
+        raise InputError(f"mc_error is {mc_error:g}; ask for a number between 0 and 1, for example 0.02.")
 
 
 def largest_error(answer: Answer) -> float:

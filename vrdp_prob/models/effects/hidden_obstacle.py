@@ -8,7 +8,7 @@ from jaxtyping import Float
 from torch import Tensor
 
 from vrdp_prob.models.effects.effect import Effect
-from vrdp_prob.models.parameters import EDGE, Parameter, Prior, Transform
+from vrdp_prob.models.parameters import Parameter, Prior, Transform, restitution_parameter
 from vrdp_prob.models.simulator.obstacle import Obstacle
 
 OBSTACLE_X = Parameter("obstacle_x", "m", "x of the obstacle", Transform.IDENTITY, Prior(0.0, 2.0), default=0.0)
@@ -16,14 +16,7 @@ OBSTACLE_Y = Parameter("obstacle_y", "m", "y of the obstacle", Transform.IDENTIT
 OBSTACLE_RADIUS = Parameter(
     "obstacle_radius", "m", "radius of the obstacle", Transform.LOG, Prior(math.log(0.2), 0.7), default=0.2
 )
-OBSTACLE_RESTITUTION = Parameter(
-    "obstacle_restitution",
-    "1",
-    "restitution factor of the obstacle",
-    Transform.LOG,
-    Prior(math.log(0.8), 0.35, upper=EDGE),
-    default=0.8,
-)
+OBSTACLE_RESTITUTION = restitution_parameter("obstacle_restitution", "restitution factor of the obstacle")
 
 
 class HiddenObstacle(Effect):

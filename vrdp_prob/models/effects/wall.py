@@ -1,6 +1,5 @@
 """A straight wall that nobody sees."""
 
-import math
 from collections.abc import Mapping, Sequence
 from typing import ClassVar
 
@@ -9,7 +8,7 @@ from jaxtyping import Float
 from torch import Tensor
 
 from vrdp_prob.models.effects.effect import Effect
-from vrdp_prob.models.parameters import EDGE, Parameter, Prior, Transform
+from vrdp_prob.models.parameters import Parameter, Prior, Transform, restitution_parameter
 from vrdp_prob.models.simulator.obstacle import Obstacle
 
 HALF_LENGTH = 20.0
@@ -31,14 +30,7 @@ WALL_DIRECTION = Parameter(
     Prior(0.0, 2.0),
     default=0.0,
 )
-HIDDEN_WALL_RESTITUTION = Parameter(
-    "hidden_wall_restitution",
-    "1",
-    "restitution factor of the wall",
-    Transform.LOG,
-    Prior(math.log(0.8), 0.35, upper=EDGE),
-    default=0.8,
-)
+HIDDEN_WALL_RESTITUTION = restitution_parameter("hidden_wall_restitution", "restitution factor of the wall")
 
 
 class Wall(Effect):

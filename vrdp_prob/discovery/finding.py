@@ -1,0 +1,218 @@
+"""What discovery found: the verdict, the causes with their probabilities and gains, the evidence and the bounds."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from enum import StrEnum
+
+from vrdp_prob.models.physics import PhysicsModel
+
+
+class Verdict(StrEnum):
+    """How the search ended."""
+
+    NONE = "none"
+    """The model explains the data."""
+    NAMED = "named"
+    """Causes of the catalogue explain what the model does not."""
+    UNKNOWN = "unknown"
+    """Something is wrong that no cause of the catalogue explains."""
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """What the data say of one parameter, in its unit.
+
+    Parameters
+    ----------
+    mean, sd
+        Of the posterior.
+    q025, q975
+        Ends of its middle 95 %.
+    unit
+        Unit of all four.
+    """
+
+    mean: float
+    sd: float
+    q025: float
+    q975: float
+    unit: str
+
+
+@dataclass(frozen=True)
+class HeldOut:
+    """How well a model predicts videos that it was not fitted to.
+
+    Parameters
+    ----------
+    rmse, rmse_one_second, rmse_end
+        Root mean square error (m) of predicted positions: over the whole video, one second after the release, and in
+        the last frames; None where no video is so long.
+    coverage_50, coverage_90
+        Share of the observations in the middle 50 % and 90 % of their predictive distributions.
+    """
+
+    rmse: float
+    rmse_one_second: float | None
+    rmse_end: float | None
+    coverage_50: float
+    coverage_90: float
+
+
+@dataclass(frozen=True)
+class Gain:
+    """How much better the extended model predicts whole videos that it was not fitted to.
+
+    Parameters
+    ----------
+    before, after
+        Prediction without and with the cause.
+    noise
+        Standard deviation (m) of the measurement noise, below which no error can fall.
+    elpd_difference, elpd_se
+        Difference of the expected log predictive density (nats, summed over the videos), and its standard error over
+        videos.
+    by_video
+        The differences of the single videos.
+    """
+
+    before: HeldOut
+    after: HeldOut
+    noise: float
+    elpd_difference: float
+    elpd_se: float
+    by_video: Mapping[str, float]
+
+
+@dataclass(frozen=True)
+class FoundCause:
+    """A cause of the catalogue that was looked at closely.
+
+    Parameters
+    ----------
+    name
+        Its name in the catalogue.
+    probability
+        That it is part of what the model lacks.
+    sentence
+        What it is and how strong, for a reader.
+    parameters
+        What the data say of its parameters.
+    gain
+        What it adds to the prediction of held-out videos.
+    named
+        Whether it is part of the extended model.
+    """
+
+    name: str
+    probability: float
+    sentence: str
+    parameters: Mapping[str, Estimate]
+    gain: Gain
+    named: bool
+
+
+@dataclass(frozen=True)
+class Check:
+    """A test of what a model leaves unexplained.
+
+    Parameters
+    ----------
+    name
+        What was tested, for example `acceleration along the velocity against speed`.
+    statistic
+        The test statistic, in the units that `sentence` explains.
+    p_value
+        Probability of a statistic at least as extreme if the model is right.
+    significant
+        Whether it counts after false discovery rate control over all checks.
+    sentence
+        What was seen, for a reader.
+    """
+
+    name: str
+    statistic: float
+    p_value: float
+    significant: bool
+    sentence: str
+
+
+@dataclass(frozen=True)
+class UpperBound:
+    """The largest strength of a cause that could have hidden (95 %).
+
+    Parameters
+    ----------
+    name, parameter
+        The cause and its parameter.
+    bound, unit
+        The bound on the parameter's size; None where the data put no bound on it.
+    """
+
+    name: str
+    parameter: str
+    bound: float | None
+    unit: str
+
+
+@dataclass(frozen=True)
+class Description:
+    """What is known of an effect that no cause of the catalogue explains: a description, not a cause.
+
+    Parameters
+    ----------
+    formula
+        Sparse formula of the missing acceleration.
+    explained
+        Share of the missing acceleration's variance in held-out videos that the formula explains.
+    size
+        Root mean square of the missing acceleration (m/s^2).
+    sentences
+        Where, when and how it shows.
+    """
+
+    formula: str
+    explained: float
+    size: float
+    sentences: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Finding:
+    """What the simulation gets wrong in some videos.
+
+    Parameters
+    ----------
+    verdict
+        How the search ended.
+    causes
+        Causes that were looked at closely, the most probable first; those that are part of the extended model lead.
+    checks
+        Tests of the model that was given, and `checks_after` of the extended one.
+    upper_bounds
+        Of every cause that was not named.
+    model, extended
+        The model that was given, and the same with the named causes (itself where none is).
+    description
+        Of what is left unexplained; None where nothing is.
+    videos
+        Names of the videos.
+    notes
+        Limits of the result, in sentences.
+    """
+
+    verdict: Verdict
+    causes: tuple[FoundCause, ...]
+    checks: tuple[Check, ...]
+    checks_after: tuple[Check, ...]
+    upper_bounds: tuple[UpperBound, ...]
+    model: PhysicsModel
+    extended: PhysicsModel
+    videos: tuple[str, ...]
+    description: Description | None = None
+    notes: tuple[str, ...] = field(default=())
+
+    @property
+    def named(self) -> tuple[FoundCause, ...]:
+        """The causes that are part of the extended model."""
+        return tuple(cause for cause in self.causes if cause.named)

@@ -9,7 +9,7 @@ from jaxtyping import Float
 from torch import Tensor
 
 from vrdp_prob.models.likelihood import Likelihood
-from vrdp_prob.models.parameters import MASS, RESTITUTION, WALL_RESTITUTION, Scope
+from vrdp_prob.models.parameters import MASS, RESTITUTION, WALL_RESTITUTION
 from vrdp_prob.models.unknowns import ANGLE_NOISE, DEGREES_OF_FREEDOM, NOISE
 
 UNITS = {
@@ -52,7 +52,7 @@ def named_fields(likelihood: Likelihood, fields: Mapping[str, Float[np.ndarray, 
     for name, parts in PLANAR.items():
         if parts[0] in values:
             variables[name] = ((*PER_BODY, "axis"), np.stack([values.pop(part) for part in parts], axis=-1))
-    shared = {p.name for p in likelihood.model.parameters if p.scope is Scope.SHARED} | {
+    shared = {p.name for p in likelihood.model.parameters if p.scope.per_video} | {
         NOISE,
         ANGLE_NOISE,
         DEGREES_OF_FREEDOM,

@@ -13,7 +13,7 @@ import torch
 from jaxtyping import Bool, Float, Int
 from torch import Tensor
 
-from vrdp_prob.models.parameters import Parameter, Prior, Transform
+from vrdp_prob.models.parameters import Parameter, Prior, Scope, Transform
 
 
 @dataclass(frozen=True)
@@ -36,6 +36,8 @@ class Coordinate:
         What those have in common that share the number, for example a material; None where it has one owner.
     others
         Its further owners.
+    single_video
+        Whether every video has its own even where several are looked at together.
     """
 
     field: str
@@ -45,6 +47,7 @@ class Coordinate:
     scale: float = 1.0
     group: str | None = None
     others: tuple[int, ...] = ()
+    single_video: bool = False
 
     @property
     def name(self) -> str:
@@ -55,7 +58,8 @@ class Coordinate:
     @classmethod
     def of(cls, parameter: Parameter, owner: int | None = None, *, scale: float = 0.1) -> "Coordinate":
         """The number that stands for a parameter of the model."""
-        return cls(parameter.name, owner, parameter.transform, parameter.prior, scale)
+        single = parameter.scope is Scope.VIDEO
+        return cls(parameter.name, owner, parameter.transform, parameter.prior, scale, single_video=single)
 
 
 @dataclass(frozen=True)

@@ -29,11 +29,18 @@ class Scope(StrEnum):
     """What has one value of a parameter each."""
 
     SHARED = "shared"
-    """One value per video."""
+    """One value per video, which several videos have in common."""
+    VIDEO = "video"
+    """One value per video, its own even where several videos are looked at together."""
     BODY = "body"
     """One value per body."""
     MATERIAL = "material"
     """One value for all bodies of a material."""
+
+    @property
+    def per_video(self) -> bool:
+        """Whether there is a single value per video."""
+        return self in (Scope.SHARED, Scope.VIDEO)
 
 
 LARGEST_LOG = 50.0

@@ -8,7 +8,6 @@ import torch
 from jaxtyping import Float
 from torch import Tensor
 
-from vrdp_prob.models.parameters import Scope
 from vrdp_prob.models.physics import PhysicsModel
 from vrdp_prob.models.simulator.worlds import Worlds
 from vrdp_prob.scene import Shape, Tracks
@@ -73,7 +72,7 @@ class Scenery:
             radius=self.radius.expand(count, -1),
             present=torch.ones(count, len(self.shapes), dtype=torch.bool),
             parameters={
-                one.name: quantities[one.name][:, 0] if one.scope is Scope.SHARED else quantities[one.name]
+                one.name: quantities[one.name][:, 0] if one.scope.per_video else quantities[one.name]
                 for one in model.parameters
             },
             walls=self.walls,

@@ -54,11 +54,14 @@ class Structure:
         Bodies that meet others, so that the motion can say something about mass and restitution (and yaw of a cube).
     bouncing
         Bodies that meet walls, which say nothing about a mass, but about the rest.
+    held
+        Quantities (with their owner, None for the video's) that keep their default though the model has them.
     """
 
     moving: frozenset[int]
     colliding: frozenset[int]
     bouncing: frozenset[int] = frozenset()
+    held: frozenset[tuple[str, int | None]] = frozenset()
 
     @property
     def meeting(self) -> frozenset[int]:
@@ -88,7 +91,7 @@ def unknowns(
     if model_error is not None:
         defaults[NOISE] = np.full(1, model_error.noise_scale)
         defaults[ANGLE_NOISE] = np.full(1, model_error.angle_noise_scale)
-    return Coordinates(tuple(entries), defaults)
+    return Coordinates(tuple(one for one in entries if (one.field, one.owner) not in structure.held), defaults)
 
 
 def _motion(tracks: Tracks, structure: Structure) -> Iterator[Coordinate]:
@@ -144,7 +147,7 @@ def _physics(tracks: Tracks, model: PhysicsModel, structure: Structure) -> Itera
     spin_matters = turning or bends or bool(Observations.of(tracks).angle_bodies)
     for parameter in model.parameters:
         concerned = [index for index, body in enumerate(tracks.bodies) if body.shape in parameter.shapes]
-        if parameter.scope is Scope.SHARED and concerned and (spin_matters or parameter.name != ANGULAR_DRAG.name):
+        if parameter.scope.per_video and concerned and (spin_matters or parameter.name != ANGULAR_DRAG.name):
             yield Coordinate.of(parameter)
         if parameter.scope is Scope.BODY and parameter.name not in (MASS.name, RESTITUTION.name):
             for body in sorted((structure.moving | structure.meeting).intersection(concerned)):
@@ -190,7 +193,7 @@ def _defaults(tracks: Tracks, model: PhysicsModel) -> dict[str, Float[np.ndarray
     }
     for parameter in model.parameters:
         if parameter.name not in defaults:
-            owners = 1 if parameter.scope is Scope.SHARED else count
+            owners = 1 if parameter.scope.per_video else count
             defaults[parameter.name] = np.full(owners, parameter.default)
     return defaults
 

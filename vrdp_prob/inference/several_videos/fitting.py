@@ -26,6 +26,8 @@ from vrdp_prob.models.unknowns import Structure, unknowns
 from vrdp_prob.progress import ProgressDisplay, SilentProgress
 from vrdp_prob.scene import Tracks
 
+Owned = tuple[str, int | None]
+"""A number of a video: its name and its owner, None for the video's."""
 Item = TypeVar("Item")
 Result = TypeVar("Result")
 
@@ -65,7 +67,13 @@ class SharedFit:
         return tuple(video.name for video in self.joint.videos)
 
     def under(
-        self, model: PhysicsModel, *, start: Mapping[str, float] | None = None, model_error: bool = True
+        self,
+        model: PhysicsModel,
+        *,
+        start: Mapping[str, float] | None = None,
+        own: Sequence[Mapping[Owned, float]] | None = None,
+        held: Sequence[frozenset[Owned]] | None = None,
+        model_error: bool = True,
     ) -> "SharedFit":
         """The fit of another model, from the values of this one; much faster than a new one.
 
@@ -76,13 +84,19 @@ class SharedFit:
         start
             Where its shared parameters begin, by name and in their units; else where they are now, and new ones at the
             value at which their effect vanishes (or at the middle of their prior where that is infinitely far).
+        own
+            Where further numbers of each video begin, by name and owner and in their units.
+        held
+            Numbers of each video that keep their default though the model has them; those that do now where None.
         model_error
             Whether what the model leaves unexplained is looked for.
         """
         joint = self.joint
+        structures = self.structures
+        if held is not None:
+            structures = tuple(replace(one, held=mine) for one, mine in zip(structures, held, strict=True))
         likelihoods = [
-            plain_likelihood(fit.clues, model, structure)
-            for fit, structure in zip(self.fits, self.structures, strict=True)
+            plain_likelihood(fit.clues, model, structure) for fit, structure in zip(self.fits, structures, strict=True)
         ]
         numbers, videos = link(likelihoods, self.shared)
         first = _vanishing(model) | dict(start or {})
@@ -97,8 +111,14 @@ class SharedFit:
             video.split(old.likelihood.coordinates.carried(joint.point(index), video.likelihood.coordinates))[1]
             for index, (old, video) in enumerate(zip(joint.videos, videos, strict=True))
         ]
+        for video, mine, values in zip(videos, locals_, own or [{}] * len(videos), strict=True):
+            entries = video.likelihood.coordinates.entries
+            for number, place in enumerate(video.local_places):
+                entry = entries[place]
+                if (entry.field, entry.owner) in values:
+                    mine[number] = _coordinate(entry.transform, values[entry.field, entry.owner])
         found = climb(numbers, videos, shared, locals_)
-        return _finished(found, model, self.fits, self.structures, self.shared, model_error=model_error)
+        return _finished(found, model, self.fits, structures, self.shared, model_error=model_error)
 
 
 def fit_together(

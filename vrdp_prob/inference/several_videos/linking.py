@@ -181,7 +181,7 @@ def link(
     found: dict[Key, Coordinate] = {}
     for likelihood in likelihoods:
         for entry in likelihood.coordinates.entries:
-            key = _key(entry, likelihood.tracks)
+            key = shared_key(entry, likelihood.tracks)
             if key is not None and (names is None or entry.field in names):
                 found.setdefault(key, replace(entry, owner=None))
     numbers = SharedNumbers(tuple(found), tuple(found.values()), reference)
@@ -194,7 +194,7 @@ def linked(likelihood: Likelihood, numbers: SharedNumbers) -> LinkedVideo:
     Walls of other videos are not, nor the noise where it was found together with a model error.
     """
     coordinates = likelihood.coordinates
-    places = {_key(entry, likelihood.tracks): place for place, entry in enumerate(coordinates.entries)}
+    places = {shared_key(entry, likelihood.tracks): place for place, entry in enumerate(coordinates.entries)}
     entries, columns, shared_places = list(coordinates.entries), [], []
     for column, (key, entry) in enumerate(zip(numbers.keys, numbers.entries, strict=True)):
         place = places.get(key)
@@ -222,7 +222,7 @@ def check_names(names: Sequence[str], model: PhysicsModel) -> None:
     InputError
         If the model has no such parameter, or each body has its own.
     """
-    per_video = [parameter.name for parameter in model.parameters if parameter.scope is not Scope.BODY]
+    per_video = [parameter.name for parameter in model.parameters if parameter.scope not in (Scope.BODY, Scope.VIDEO)]
     possible = [*per_video, WALL_RESTITUTION.name, NOISE, ANGLE_NOISE]
     for name in names:
         if name not in possible:
@@ -237,10 +237,10 @@ def place_words(place: tuple[float | str, ...]) -> str:
     return ", ".join(part if isinstance(part, str) else f"{part:g}" for part in place)
 
 
-def _key(entry: Coordinate, tracks: Tracks) -> Key | None:
+def shared_key(entry: Coordinate, tracks: Tracks) -> Key | None:
     """What a number of a video's vector may be shared as; None where it is the video's own."""
     if entry.owner is None:
-        return entry.field, ()
+        return None if entry.single_video else (entry.field, ())
     if entry.group is not None:
         return entry.field, (entry.group,)
     if entry.field != WALL_RESTITUTION.name:

@@ -1,11 +1,13 @@
 """A table that is curved."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import ClassVar
 
 from vrdp_prob.models.effects.effect import BodyView, Effect
+from vrdp_prob.models.effects.places import places_around
 from vrdp_prob.models.parameters import Parameter, Prior, Transform
 from vrdp_prob.models.simulator.formula import Scalar
+from vrdp_prob.scene import Tracks
 
 BOWL_STIFFNESS = Parameter(
     "bowl_stiffness",
@@ -23,6 +25,10 @@ BOWL_Y = Parameter(
 )
 
 
+SEARCH_SHARES = (-2.0, -1.0, -0.5, 0.0, 0.5, 1.0, 2.0)
+"""Where the middle is looked for, in half widths of the region where bodies were seen."""
+
+
 class Bowl(Effect):
     """A pull towards one point, in proportion to the distance."""
 
@@ -32,6 +38,10 @@ class Bowl(Effect):
     source: ClassVar = "gravity on a paraboloid, small slopes: bowl_stiffness is g over the radius of curvature"
     parameters: ClassVar = (BOWL_STIFFNESS, BOWL_X, BOWL_Y)
     vanishes_at: ClassVar = {"bowl_stiffness": 0.0}
+
+    def search_points(self, videos: Sequence[Tracks]) -> Sequence[Mapping[str, float]]:
+        """Middles in and around the region where bodies were seen."""
+        return [{"bowl_x": x, "bowl_y": y} for x, y in places_around(videos, SEARCH_SHARES)]
 
     def acceleration(self, time: Scalar, body: BodyView, parameters: Mapping[str, Scalar]) -> tuple[Scalar, Scalar]:
         """Acceleration in m/s^2 towards the lowest point."""

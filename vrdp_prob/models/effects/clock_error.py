@@ -1,20 +1,34 @@
 """A clock that loses frames."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import ClassVar
 
+import numpy as np
 import torch
 from jaxtyping import Float
 from torch import Tensor
 
 from vrdp_prob.models.effects.effect import Effect
-from vrdp_prob.models.parameters import Parameter, Prior, Transform
+from vrdp_prob.models.parameters import Parameter, Prior, Scope, Transform
+from vrdp_prob.scene import Tracks
 
 LOST_TIME = Parameter(
-    "lost_time", "s", "time that passed without a frame", Transform.IDENTITY, Prior(0.0, 0.2), default=0.0
+    "lost_time",
+    "s",
+    "time that passed without a frame",
+    Transform.IDENTITY,
+    Prior(0.0, 0.2),
+    default=0.0,
+    scope=Scope.VIDEO,
 )
 LOST_AT = Parameter(
-    "lost_at", "s", "time stamp after which frames are missing", Transform.IDENTITY, Prior(2.5, 1.5), default=2.5
+    "lost_at",
+    "s",
+    "time stamp after which frames are missing",
+    Transform.IDENTITY,
+    Prior(2.5, 1.5),
+    default=2.5,
+    scope=Scope.VIDEO,
 )
 
 
@@ -30,6 +44,11 @@ class ClockError(Effect):
     source: ClassVar = "definition"
     parameters: ClassVar = (LOST_TIME, LOST_AT)
     vanishes_at: ClassVar = {"lost_time": 0.0}
+
+    def search_points(self, videos: Sequence[Tracks]) -> Sequence[Mapping[str, float]]:
+        """Between any two frames."""
+        times = np.unique(np.concatenate([(one.times[1:] + one.times[:-1]) / 2 for one in videos]).round(6))
+        return [{"lost_at": float(time)} for time in times]
 
     def measured_times(
         self, times: Float[Tensor, "world time"], parameters: Mapping[str, Float[Tensor, "..."]]

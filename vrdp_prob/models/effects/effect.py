@@ -21,6 +21,7 @@ from torch import Tensor
 from vrdp_prob.models.parameters import Parameter
 from vrdp_prob.models.simulator.formula import Scalar
 from vrdp_prob.models.simulator.obstacle import Obstacle
+from vrdp_prob.scene import Tracks
 
 
 @dataclass(frozen=True)
@@ -126,6 +127,13 @@ class Effect:
     def does_something(cls) -> bool:
         """Whether the effect has its own version of any hook."""
         return any(cls.overrides(name) for name in _hooks())
+
+    def search_points(self, videos: Sequence[Tracks]) -> Sequence[Mapping[str, float]]:
+        """Values of parameters from which a search for the effect begins, for an effect that has a place or a time.
+
+        Parameters that are left out begin at the value at which the effect vanishes, or at their default.
+        """
+        return ({},)
 
     def acceleration(self, time: Scalar, body: BodyView, parameters: Mapping[str, Scalar]) -> tuple[Scalar, Scalar]:
         """Acceleration of a body in m/s^2, dry friction apart."""

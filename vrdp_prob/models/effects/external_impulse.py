@@ -1,14 +1,23 @@
 """A kick from outside."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import ClassVar
+
+import numpy as np
 
 from vrdp_prob.models.effects.effect import BodyView, Effect
 from vrdp_prob.models.parameters import Parameter, Prior, Scope, Transform
 from vrdp_prob.models.simulator.formula import Scalar
+from vrdp_prob.scene import Tracks
 
 IMPULSE_TIME = Parameter(
-    "impulse_time", "s", "time at which bodies are kicked", Transform.IDENTITY, Prior(2.5, 1.5), default=2.5
+    "impulse_time",
+    "s",
+    "time at which bodies are kicked",
+    Transform.IDENTITY,
+    Prior(2.5, 1.5),
+    default=2.5,
+    scope=Scope.VIDEO,
 )
 IMPULSE_X = Parameter(
     "impulse_x",
@@ -39,6 +48,11 @@ class ExternalImpulse(Effect):
     source: ClassVar = "definition of an impulse"
     parameters: ClassVar = (IMPULSE_TIME, IMPULSE_X, IMPULSE_Y)
     vanishes_at: ClassVar = {"impulse_x": 0.0, "impulse_y": 0.0}
+
+    def search_points(self, videos: Sequence[Tracks]) -> Sequence[Mapping[str, float]]:
+        """At every second frame."""
+        times = np.unique(np.concatenate([one.times[1:-1:2] for one in videos]).round(6))
+        return [{"impulse_time": float(time)} for time in times]
 
     def kick_time(self, parameters: Mapping[str, Scalar]) -> Scalar:
         """Time in s of the kick."""

@@ -1,13 +1,15 @@
 """A place on the table with another friction."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import ClassVar
 
 from vrdp_prob.models.effects.effect import BodyView, Effect
+from vrdp_prob.models.effects.places import visited
 from vrdp_prob.models.parameters import Parameter, Prior, Transform
 from vrdp_prob.models.simulator.formula import Scalar
 from vrdp_prob.models.simulator.mathematics import length, maximum, where
+from vrdp_prob.scene import Tracks
 
 PATCH_X = Parameter("patch_x", "m", "x of the patch's middle", Transform.IDENTITY, Prior(0.0, 2.0), default=0.0)
 PATCH_Y = Parameter("patch_y", "m", "y of the patch's middle", Transform.IDENTITY, Prior(0.0, 2.0), default=0.0)
@@ -24,6 +26,10 @@ PATCH_FRICTION = Parameter(
 )
 
 
+SEARCH_STEP, SEARCH_RADII = 0.3, (0.3, 0.6)
+"""Distance in m between the places where a patch is looked for, and radii in m that are tried."""
+
+
 class FrictionPatch(Effect):
     """Friction differs inside a disc."""
 
@@ -33,6 +39,14 @@ class FrictionPatch(Effect):
     source: ClassVar = "dry friction of two materials"
     parameters: ClassVar = (PATCH_X, PATCH_Y, PATCH_RADIUS, PATCH_FRICTION)
     vanishes_at: ClassVar = {"patch_friction": 0.0}
+
+    def search_points(self, videos: Sequence[Tracks]) -> Sequence[Mapping[str, float]]:
+        """Places a third of a metre apart wherever bodies were seen, with a small and a large radius."""
+        return [
+            {"patch_x": x, "patch_y": y, "patch_radius": radius}
+            for radius in SEARCH_RADII
+            for x, y in visited(videos, SEARCH_STEP)
+        ]
 
     def boundary(self, body: BodyView, parameters: Mapping[str, Scalar]) -> Scalar:
         """Distance of the centre from the patch in m, negative on it."""

@@ -1,6 +1,6 @@
 """A lens that bends straight lines."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import ClassVar
 
 import torch
@@ -8,7 +8,9 @@ from jaxtyping import Float
 from torch import Tensor
 
 from vrdp_prob.models.effects.effect import Effect
+from vrdp_prob.models.effects.places import places_around
 from vrdp_prob.models.parameters import Parameter, Prior, Transform
+from vrdp_prob.scene import Tracks
 
 DISTORTION = Parameter(
     "distortion",
@@ -22,6 +24,10 @@ LENS_X = Parameter("lens_x", "m", "x of the picture's centre", Transform.IDENTIT
 LENS_Y = Parameter("lens_y", "m", "y of the picture's centre", Transform.IDENTITY, Prior(0.0, 1.0), 0.0)
 
 
+SEARCH_SHARES = (-0.4, -0.2, 0.0, 0.2, 0.4)
+"""Where the centre is looked for, in half widths of the region where bodies were seen."""
+
+
 class LensDistortion(Effect):
     """Positions are recorded farther from the picture's centre than they are, or nearer."""
 
@@ -31,6 +37,10 @@ class LensDistortion(Effect):
     source: ClassVar = "Brown, Close-range camera calibration, Photogrammetric Engineering 37 (1971), first radial term"
     parameters: ClassVar = (DISTORTION, LENS_X, LENS_Y)
     vanishes_at: ClassVar = {"distortion": 0.0}
+
+    def search_points(self, videos: Sequence[Tracks]) -> Sequence[Mapping[str, float]]:
+        """Centres in the inner part of the region where bodies were seen."""
+        return [{"lens_x": x, "lens_y": y} for x, y in places_around(videos, SEARCH_SHARES)]
 
     def measured_positions(
         self,

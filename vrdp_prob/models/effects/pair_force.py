@@ -1,13 +1,14 @@
 """Attraction or repulsion between bodies at a distance."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import ClassVar
 
 from vrdp_prob.models.effects.effect import BodyView, Effect
 from vrdp_prob.models.parameters import Parameter, Prior, Transform
 from vrdp_prob.models.simulator.formula import Scalar
 from vrdp_prob.models.simulator.mathematics import sqrt
+from vrdp_prob.scene import Tracks
 
 PAIR_STRENGTH = Parameter(
     "pair_strength", "N m^2", "strength of the attraction between two bodies", Transform.IDENTITY, Prior(0.0, 0.05), 0.0
@@ -22,6 +23,10 @@ PAIR_SOFTENING = Parameter(
 )
 
 
+SEARCH_SOFTENINGS = (0.05, 0.2, 0.6)
+"""Softening lengths in m with which the force is looked for."""
+
+
 class PairForce(Effect):
     """A force along the line between two bodies that falls with the square of their distance."""
 
@@ -33,6 +38,10 @@ class PairForce(Effect):
     source: ClassVar = "inverse-square law with a softening length: H. C. Plummer, MNRAS 71 (1911)"
     parameters: ClassVar = (PAIR_STRENGTH, PAIR_SOFTENING)
     vanishes_at: ClassVar = {"pair_strength": 0.0}
+
+    def search_points(self, videos: Sequence[Tracks]) -> Sequence[Mapping[str, float]]:
+        """With a short and a long range of the softening."""
+        return [{"pair_softening": length} for length in SEARCH_SOFTENINGS]
 
     def pair_force(
         self, time: Scalar, first: BodyView, second: BodyView, parameters: Mapping[str, Scalar]

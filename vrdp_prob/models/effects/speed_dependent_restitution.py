@@ -1,13 +1,14 @@
 """Restitution that falls with the speed of the impact."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import ClassVar
 
 from vrdp_prob.models.effects.effect import BodyView, Effect
 from vrdp_prob.models.parameters import Parameter, Prior, Transform
 from vrdp_prob.models.simulator.formula import Scalar
 from vrdp_prob.models.simulator.mathematics import exp, log, minimum
+from vrdp_prob.scene import Tracks
 
 RESTITUTION_EXPONENT = Parameter(
     "restitution_exponent",
@@ -27,6 +28,10 @@ RESTITUTION_SPEED = Parameter(
 )
 
 
+SEARCH_SPEEDS = (0.15, 0.5, 1.5)
+"""Closing speeds in m/s from which restitution may fall."""
+
+
 class SpeedDependentRestitution(Effect):
     """Fast impacts lose a larger share of their speed than slow ones."""
 
@@ -38,6 +43,10 @@ class SpeedDependentRestitution(Effect):
     )
     parameters: ClassVar = (RESTITUTION_EXPONENT, RESTITUTION_SPEED)
     vanishes_at: ClassVar = {"restitution_exponent": 0.0}
+
+    def search_points(self, videos: Sequence[Tracks]) -> Sequence[Mapping[str, float]]:
+        """With a fall that begins at slow, middling and fast impacts."""
+        return [{"restitution_speed": speed} for speed in SEARCH_SPEEDS]
 
     def restitution(
         self,

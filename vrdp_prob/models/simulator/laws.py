@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from vrdp_prob.models.effects.effect import BodyView, Effect
-from vrdp_prob.models.parameters import Parameter, Scope
+from vrdp_prob.models.parameters import Parameter
 from vrdp_prob.models.simulator.contact import ContactKind, Feature, contact, contact_geometry, room_on_feature
 from vrdp_prob.models.simulator.formula import Recorder, Scalar, Symbol, depends, vector_jacobian
 from vrdp_prob.models.simulator.machine_code import ARRAY, NUMBER, law_function
@@ -48,8 +48,8 @@ class Layout:
     @classmethod
     def of(cls, parameters: Sequence[Parameter]) -> "Layout":
         """Layout for the parameters of a model."""
-        own = tuple(parameter.name for parameter in parameters if parameter.scope is not Scope.SHARED)
-        shared = tuple(parameter.name for parameter in parameters if parameter.scope is Scope.SHARED)
+        own = tuple(parameter.name for parameter in parameters if not parameter.scope.per_video)
+        shared = tuple(parameter.name for parameter in parameters if parameter.scope.per_video)
         return cls(CONSTANTS + own, shared)
 
 

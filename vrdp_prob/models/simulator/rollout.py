@@ -12,7 +12,6 @@ from jaxtyping import Bool, Float, Int
 from torch import Tensor
 
 from vrdp_prob.errors import InputError
-from vrdp_prob.models.parameters import Scope
 from vrdp_prob.models.physics import PhysicsModel
 from vrdp_prob.models.simulator.arrays import KernelArrays, kernel_arrays
 from vrdp_prob.models.simulator.events import EventTable, Tapes
@@ -243,8 +242,8 @@ def compile_model(model: PhysicsModel | None = None) -> None:
     """
     physics = PhysicsModel.base() if model is None else model
     one = torch.ones(1, 1, dtype=torch.float64)
-    own = [parameter for parameter in physics.parameters if parameter.scope is not Scope.SHARED]
-    shared = [parameter for parameter in physics.parameters if parameter.scope is Scope.SHARED]
+    own = [parameter for parameter in physics.parameters if not parameter.scope.per_video]
+    shared = [parameter for parameter in physics.parameters if parameter.scope.per_video]
     worlds = Worlds(
         shapes=(Shape.CUBE,),
         position=torch.zeros(1, 1, 2, dtype=torch.float64),

@@ -1,0 +1,111 @@
+"""What a faint cause would do to the residuals of a fit, found by simulating worlds with a little of it."""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+
+from vrdp_prob.inference.several_videos.fitting import SharedFit, plain_likelihood
+from vrdp_prob.inference.several_videos.linking import Key, shared_key
+from vrdp_prob.models.coordinates import Coordinate
+from vrdp_prob.models.effects.effect import Effect
+from vrdp_prob.models.parameters import Transform
+
+STEP = 1e-4
+"""Size of a probe in standard deviations of the strength's prior."""
+FAINT = 1e-3
+"""Size of a positive strength that vanishes at 0, as a share of its prior median."""
+
+
+@dataclass(frozen=True)
+class Probe:
+    """What one strength does to the data's residuals of a video.
+
+    Parameters
+    ----------
+    key
+        What the strength is shared as among videos; None where it is the video's own.
+    owner
+        Body that it belongs to, None where it is the video's.
+    field
+        Name of the parameter.
+    directions
+        Derivative of the residuals by the strength where it vanishes, one row for every search point.
+    """
+
+    key: Key | None
+    owner: int | None
+    field: str
+    directions: Float[np.ndarray, "point data"]
+
+
+def probes(fit: SharedFit, index: int, effect: Effect, points: Sequence[Mapping[str, float]]) -> list[Probe]:
+    """Probe one video for a cause at search points.
+
+    Parameters
+    ----------
+    fit
+        Fit of a model without the cause.
+    index
+        Which video.
+    effect
+        The cause.
+    points
+        Values of its parameters where it is looked for.
+    """
+    part, video = fit.fits[index], fit.joint.videos[index]
+    likelihood = plain_likelihood(part.clues, fit.model.with_effect(effect), fit.structures[index])
+    entries = likelihood.coordinates.entries
+    start = video.likelihood.coordinates.carried(fit.joint.point(index), likelihood.coordinates)
+    strengths = {
+        place: _Difference.of(entry, effect.vanishes_at[entry.field])
+        for place, entry in enumerate(entries)
+        if entry.field in effect.vanishes_at
+    }
+    if not strengths:
+        return []
+    batch = []
+    for values in points:
+        base = start.copy()
+        for place, entry in enumerate(entries):
+            if entry.field in values:
+                base[place] = coordinate(entry.transform, values[entry.field])
+        for place, strength in strengths.items():
+            base[place] = (strength.high + strength.low) / 2
+        for place, strength in strengths.items():
+            moved = np.stack([base, base])
+            moved[:, place] = strength.high, strength.low
+            batch.append(moved)
+    count = 2 * len(likelihood.observations.frame) + len(likelihood.observations.angle)
+    residuals = likelihood.residuals(np.concatenate(batch))[:, :count].reshape(len(points), len(strengths), 2, count)
+    found = []
+    for number, (place, strength) in enumerate(strengths.items()):
+        entry = entries[place]
+        difference = (residuals[:, number, 0] - residuals[:, number, 1]) / (strength.distance)
+        directions = np.where(np.isfinite(difference), difference, 0.0)
+        found.append(Probe(shared_key(entry, likelihood.tracks), entry.owner, entry.field, directions))
+    return found
+
+
+def coordinate(transform: Transform, value: float) -> float:
+    """Coordinate in which a value is inferred."""
+    return math.log(value) if transform is Transform.LOG else value
+
+
+@dataclass(frozen=True)
+class _Difference:
+    """The two coordinates between which the residuals are compared, and the distance of their values."""
+
+    high: float
+    low: float
+    distance: float
+
+    @classmethod
+    def of(cls, entry: Coordinate, vanishing: float) -> "_Difference":
+        if entry.transform is Transform.LOG and vanishing == 0.0:
+            faint = FAINT * math.exp(entry.prior.mean)
+            return cls(math.log(2 * faint), math.log(faint), faint)
+        middle, step = coordinate(entry.transform, vanishing), STEP * entry.prior.sd
+        return cls(middle + step, middle - step, 2 * step)

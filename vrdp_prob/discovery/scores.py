@@ -1,0 +1,213 @@
+"""Score tests of causes at the strength at which they vanish, wherever and whenever they may act.
+
+Sources: C. R. Rao, Large sample tests of statistical hypotheses, Proc. Cambridge Phil. Soc. 44 (1948); for a place or
+time that exists only where the cause does, the largest statistic of a scan with its own null distribution: R. B.
+Davies, Hypothesis testing when a nuisance parameter is present only under the alternative, Biometrika 64 (1977).
+"""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+from scipy.stats import chi2
+
+from vrdp_prob.discovery.linear import LinearFit, Score
+from vrdp_prob.discovery.probes import Probe, probes
+from vrdp_prob.inference.several_videos.fitting import SharedFit, in_parallel
+from vrdp_prob.inference.several_videos.linking import Key
+from vrdp_prob.models.effects.effect import Effect
+from vrdp_prob.models.parameters import Scope, Transform
+
+REPLICATIONS = 400
+TAIL = 0.05
+"""Tail probability at which the number of independent places of a scan is read off its null distribution."""
+RANK = 1e-8
+"""Relative information below which a strength cannot be seen at all."""
+SITE_LEVEL = 1e-3
+"""An effect that happens once in a video is there if chance makes a statistic as large, anywhere, less often."""
+LEAST_START = 0.01
+"""Smallest value of a positive strength at which a refit begins, as a share of its default."""
+
+
+@dataclass(frozen=True)
+class Site:
+    """Where and when an effect acts that happens once in a video.
+
+    Parameters
+    ----------
+    video
+        Index of the video.
+    owner
+        Index of the body; None where it concerns the whole video.
+    values
+        First guess of its parameters in their units.
+    chi_square, p_value
+        The statistic, and the probability of one as large at any time if there is nothing.
+    """
+
+    video: int
+    owner: int | None
+    values: Mapping[str, float]
+    chi_square: float
+    p_value: float
+
+
+@dataclass(frozen=True)
+class CauseScore:
+    """What the residuals say of a cause that the model does not have.
+
+    Parameters
+    ----------
+    effect
+        The cause.
+    start
+        First guess of its shared parameters, in their units.
+    sites
+        Where it acts, if it happens once in a video, the clearest first.
+    chi_square, degrees
+        The largest statistic and its number of degrees of freedom.
+    p_value
+        Probability of a statistic as large anywhere if the cause is absent.
+    sd
+        Standard deviations of the strengths, by the name of the parameter.
+    """
+
+    effect: Effect
+    start: Mapping[str, float]
+    sites: tuple[Site, ...]
+    chi_square: float
+    degrees: int
+    p_value: float
+    sd: Mapping[str, float]
+
+
+def happens_once(effect: Effect) -> bool:
+    """Whether an effect happens at one time in one video, so that its parameters are not those of other videos."""
+    return any(parameter.scope is Scope.VIDEO for parameter in effect.parameters)
+
+
+def score_causes(fit: SharedFit, linear: LinearFit, effects: Iterable[Effect], *, seed: int) -> list[CauseScore]:
+    """Scores of causes that have a strength at which they vanish, the least probable by chance first."""
+    found = []
+    for effect in effects:
+        if effect.vanishes_at:
+            scan = _scan_once if happens_once(effect) else _scan_shared
+            found.append(scan(fit, linear, effect, np.random.default_rng(seed)))
+    present = [one for one in found if one is not None]
+    return sorted(present, key=lambda one: (one.p_value, -one.chi_square))
+
+
+def _probed(fit: SharedFit, effect: Effect) -> tuple[Sequence[Mapping[str, float]], list[list[Probe]]]:
+    points = effect.search_points([part.likelihood.tracks for part in fit.fits])
+    return points, in_parallel(lambda index: probes(fit, index, effect, points), range(len(fit.fits)))
+
+
+def _scan_shared(
+    fit: SharedFit, linear: LinearFit, effect: Effect, generator: np.random.Generator
+) -> CauseScore | None:
+    """The largest score of strengths that all videos share."""
+    points, probed = _probed(fit, effect)
+    columns: dict[Key, int] = {}
+    for index, video in enumerate(probed):
+        for probe in video:
+            columns.setdefault(_name(probe, index), len(columns))
+    if not columns:
+        return None
+    directions = []
+    for index, (linear_video, found) in enumerate(zip(linear.videos, probed, strict=True)):
+        block = np.zeros((linear_video.data, len(points), len(columns)))
+        for probe in found:
+            block[:, :, columns[_name(probe, index)]] = probe.directions.T
+        directions.append(block)
+    scores = [_one_sided(linear.score([one[:, p] for one in directions]), effect) for p in range(len(points))]
+    statistics = np.array([score.chi_square for score in scores])
+    best = int(np.argmax(statistics))
+    degrees = _rank(scores[best])
+    if not degrees:
+        return None
+    blocks = [
+        linear_video.without_own(linear_video.padded(one.reshape(len(one), -1))).reshape(-1, *one.shape[1:])
+        for linear_video, one in zip(linear.videos, directions, strict=True)
+    ]
+    p_value = min(1.0, _independent(blocks, degrees, generator) * float(chi2.sf(statistics[best], degrees)))
+    names = [name for name, _ in columns]
+    estimate = dict(zip(names, scores[best].estimate.tolist(), strict=True))
+    start = dict(points[best]) | (_starting(effect, estimate) if len(estimate) == len(names) else {})
+    sd = dict(zip(names, scores[best].sd.tolist(), strict=True))
+    return CauseScore(effect, start, (), float(statistics[best]), degrees, p_value, sd)
+
+
+def _name(probe: Probe, video: int) -> Key:
+    """What a strength is shared as, or whose it is."""
+    return probe.key or (probe.field, (f"video {video}", str(probe.owner)))
+
+
+def _one_sided(score: Score, effect: Effect) -> Score:
+    """The score of a strength that cannot be negative: nothing where the data ask for less than none of it."""
+    positive = any(
+        one.transform is Transform.LOG and effect.vanishes_at.get(one.name) == 0.0 for one in effect.parameters
+    )
+    if positive and len(score.gradient) == 1 and score.gradient[0] < 0:
+        return Score(np.zeros(1), score.information)
+    return score
+
+
+def _starting(effect: Effect, estimate: Mapping[str, float]) -> dict[str, float]:
+    """Where a refit begins: at the estimates, positive where they have to be."""
+    least = {one.name: LEAST_START * one.default for one in effect.parameters if one.transform is Transform.LOG}
+    return {name: max(value, least.get(name, value)) for name, value in estimate.items()}
+
+
+def _rank(score: Score) -> int:
+    size = np.sqrt(np.maximum(np.diag(score.information), 1e-300))
+    return int(np.linalg.matrix_rank(score.information / np.outer(size, size), tol=RANK, hermitian=True))
+
+
+def _independent(
+    blocks: Sequence[Float[np.ndarray, "_ point strength"]], degrees: int, generator: np.random.Generator
+) -> float:
+    """Number of independent places that makes the largest statistic of a scan as large as it is by chance.
+
+    It is read off the scans of noise; the tail beyond them is that of the single statistic.
+    """
+    points, strengths = blocks[0].shape[1:]
+    if points == 1:
+        return 1.0
+    gradients = np.zeros((REPLICATIONS, points, strengths))
+    information = np.zeros((points, strengths, strengths))
+    for block in blocks:
+        noise = generator.standard_normal((REPLICATIONS, len(block)))
+        gradients += (noise @ block.reshape(len(block), -1)).reshape(gradients.shape)
+        information += np.einsum("rps,rpt->pst", block, block)
+    inverse = np.linalg.pinv(information, rcond=RANK, hermitian=True)
+    largest = np.einsum("nps,pst,npt->np", gradients, inverse, gradients).max(axis=1)
+    return max(1.0, TAIL / float(chi2.sf(np.quantile(largest, 1 - TAIL), degrees)))
+
+
+def _scan_once(fit: SharedFit, linear: LinearFit, effect: Effect, generator: np.random.Generator) -> CauseScore | None:
+    """The largest scores of strengths of single videos, and where they are."""
+    points, probed = _probed(fit, effect)
+    sites, all_degrees, sds = [], [], []
+    for index, video in enumerate(probed):
+        for owner in sorted({probe.owner for probe in video}, key=str):
+            mine = [probe for probe in video if probe.owner == owner]
+            scores, block = linear.scores_in(index, np.stack([probe.directions.T for probe in mine], axis=2))
+            best = max(range(len(scores)), key=lambda place: scores[place].chi_square)
+            degrees = _rank(scores[best])
+            if not degrees:
+                continue
+            statistic = scores[best].chi_square
+            p_value = min(1.0, _independent([block], degrees, generator) * float(chi2.sf(statistic, degrees)))
+            fields = [probe.field for probe in mine]
+            values = {**points[best], **dict(zip(fields, scores[best].estimate.tolist(), strict=True))}
+            sites.append(Site(index, owner, values, statistic, p_value))
+            all_degrees.append(degrees)
+            sds.append(dict(zip(fields, scores[best].sd.tolist(), strict=True)))
+    if not sites:
+        return None
+    order = sorted(range(len(sites)), key=lambda k: (sites[k].p_value, -sites[k].chi_square))
+    first = sites[order[0]]
+    p_value = min(1.0, first.p_value * len(sites))
+    clear = tuple(sites[k] for k in order if sites[k].p_value * len(sites) < SITE_LEVEL)
+    return CauseScore(effect, {}, clear, first.chi_square, all_degrees[order[0]], p_value, sds[order[0]])

@@ -1,0 +1,96 @@
+"""A model that is tried on all videos: its fit, and how well it predicts each video from the others."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from jaxtyping import Float
+
+from vrdp_prob.discovery.held_out import Cavity, cavities
+from vrdp_prob.discovery.scores import CauseScore, happens_once
+from vrdp_prob.inference.several_videos.fitting import Owned, SharedFit
+from vrdp_prob.models.effects.effect import Effect
+from vrdp_prob.models.physics import PhysicsModel
+
+
+@dataclass(frozen=True)
+class Trial:
+    """A base model with some causes, fitted to all videos.
+
+    Parameters
+    ----------
+    causes
+        What it has beyond the base model, in the order in which it was found.
+    fit
+        Its fit.
+    """
+
+    causes: tuple[Effect, ...]
+    fit: SharedFit
+
+    @cached_property
+    def cavities(self) -> dict[str, Cavity]:
+        """What all videos but one say, and how probable that one is then."""
+        return cavities(self.fit)
+
+    @property
+    def log_density(self) -> Float[np.ndarray, "video"]:
+        """Log predictive density (nats, up to constants of the tracks) of each video given the others."""
+        return np.array([one.log_density for one in self.cavities.values()])
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the causes."""
+        return tuple(cause.name for cause in self.causes)
+
+    def with_cause(self, score: CauseScore) -> "Trial":
+        """The fit with one more cause, from what its score says of it."""
+        effect = score.effect
+        model = self.fit.model.with_effect(effect)
+        if not happens_once(effect):
+            return Trial((*self.causes, effect), self.fit.under(model, start=score.start, model_error=False))
+        sites = [[site for site in score.sites if site.video == k] for k in range(len(self.fit.fits))]
+        fields = [parameter.name for parameter in effect.parameters]
+        held, own = [], []
+        for part, structure, mine in zip(self.fit.fits, self.fit.structures, sites, strict=True):
+            owners = (None, *range(len(part.likelihood.tracks.bodies)))
+            acting: dict[Owned, float] = {}
+            for site in mine[:1]:
+                acting |= {(name, owner): value for name, value in site.values.items() for owner in (site.owner, None)}
+            every = {(name, owner) for name in fields for owner in owners}
+            held.append(structure.held | frozenset(every - acting.keys()))
+            own.append(acting)
+        return Trial((*self.causes, effect), self.fit.under(model, own=own, held=held, model_error=False))
+
+    def without(self, cause: Effect) -> "Trial":
+        """The fit without one of its causes."""
+        model = self.fit.model
+        effects = tuple(effect for effect in model.effects if effect is not cause)
+        stated = {parameter.name for effect in effects for parameter in effect.parameters}
+        beliefs = {name: belief for name, belief in model.beliefs.items() if name in stated}
+        name = "+".join([part for part in model.name.split("+") if part != cause.name])
+        left = PhysicsModel(name, effects, beliefs)
+        return Trial(tuple(one for one in self.causes if one is not cause), self.fit.under(left, model_error=False))
+
+
+def gain(trial: Trial, base: Trial) -> tuple[float, float]:
+    """Gain (nats) in the predictive density of all videos, and its standard error over videos."""
+    difference = trial.log_density - base.log_density
+    return float(difference.sum()), float(np.sqrt(len(difference)) * difference.std(ddof=1))
+
+
+def weights(
+    trials: Sequence[Trial], log_prior: Sequence[float], generator: np.random.Generator, *, replications: int = 1000
+) -> Float[np.ndarray, "trial"]:
+    """Probabilities of models by their predictive densities, with the videos drawn anew.
+
+    Source: Yao, Vehtari, Simpson and Gelman, Using stacking to average Bayesian predictive distributions, Bayesian
+    Analysis 13 (2018), pseudo-BMA+.
+    """
+    densities = np.array([trial.log_density for trial in trials])
+    shares = generator.dirichlet(np.ones(densities.shape[1]), size=replications) * densities.shape[1]
+    totals = shares @ densities.T + np.asarray(log_prior)
+    totals -= totals.max(axis=1, keepdims=True)
+    found: np.ndarray = (np.exp(totals) / np.exp(totals).sum(axis=1, keepdims=True)).mean(axis=0)
+    return found

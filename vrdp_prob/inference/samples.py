@@ -10,6 +10,7 @@ from jaxtyping import Float
 from torch import Tensor
 
 from vrdp_prob.inference.diagnostics import Reported, Statistics, chain_statistics
+from vrdp_prob.inference.triangles import lower_root
 
 R_HAT_GOAL = 1.01
 ESS_GOAL = 400.0
@@ -46,9 +47,7 @@ class Gaussian:
         """The Gaussian with a given inverse covariance; directions without any curvature are held to variance 1e6."""
         scale = 1 / np.sqrt(np.maximum(np.diag(precision), 1e-12))
         values, vectors = np.linalg.eigh(scale[:, None] * precision * scale)
-        covariance = (vectors / np.maximum(values, 1e-9)) @ vectors.T
-        root = np.linalg.cholesky((scale[:, None] * covariance * scale) + 1e-15 * np.diag(scale**2))
-        return cls(mean, root)
+        return cls(mean, lower_root(scale[:, None] * vectors / np.sqrt(np.maximum(values, 1e-9))))
 
     @property
     def sd(self) -> Float[np.ndarray, "dimension"]:

@@ -1,8 +1,10 @@
 """A Gaussian over shared numbers and the own numbers of many videos, whose precision has the shape of an arrow.
 
 Given the shared numbers the videos know nothing of each other. So each video's own numbers are eliminated by
-themselves (Schur complement), and nothing ever has the size of all videos together. Source: Triggs, McLauchlan,
-Hartley and Fitzgibbon, Bundle adjustment: a modern synthesis, Vision Algorithms (2000), section 6.
+themselves, and nothing ever has the size of all videos together. They are eliminated by an orthogonal transformation of
+the residuals' derivative: where bodies meet several times one number is known a million times better than another, and
+the Schur complement, a difference of products of the derivative, would be all rounding error. Source: Triggs,
+McLauchlan, Hartley and Fitzgibbon, Bundle adjustment: a modern synthesis, Vision Algorithms (2000), section 6.
 """
 
 from collections.abc import Sequence
@@ -13,7 +15,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 from scipy.linalg import solve_triangular
 
-from vrdp_prob.inference.samples import Gaussian
+from vrdp_prob.inference.triangles import lower_root, upper_root
 
 LARGEST_LOGARITHM = 5.0
 LOG_TWO_PI = float(np.log(2 * np.pi))
@@ -27,63 +29,88 @@ class Expansion:
     ----------
     shared_gradient, local_gradient
         First derivatives.
-    shared, cross, local
-        Blocks of the Gauss-Newton curvature; rows of `cross` are the video's own numbers.
+    shared, local
+        Derivatives of residuals (of any number of them), whose products are the Gauss-Newton curvature; the columns of
+        `local` are independent.
     """
 
     shared_gradient: Float[np.ndarray, "shared"]
     local_gradient: Float[np.ndarray, "local"]
-    shared: Float[np.ndarray, "shared shared"]
-    cross: Float[np.ndarray, "local shared"]
-    local: Float[np.ndarray, "local local"]
+    shared: Float[np.ndarray, "residual shared"]
+    local: Float[np.ndarray, "residual local"]
 
     def damped(self, damping: float) -> "Expansion":
         """With every number's curvature larger by a share of it."""
-        return Expansion(
-            self.shared_gradient,
-            self.local_gradient,
-            self.shared + damping * np.diag(np.diag(self.shared)),
-            self.cross,
-            self.local + damping * np.diag(np.diag(self.local)),
-        )
+        triangle, own = self._triangle, self.local.shape[1]
+        rows = np.concatenate([triangle, np.diag(np.sqrt(damping) * np.linalg.norm(triangle, axis=0))])
+        return Expansion(self.shared_gradient, self.local_gradient, rows[:, own:], rows[:, :own])
+
+    @cached_property
+    def _triangle(self) -> Float[np.ndarray, "number number"]:
+        """Upper-triangular root of the curvature, the own numbers first."""
+        return upper_root(np.concatenate([self.local, self.shared], axis=1))
+
+    @property
+    def _blocks(
+        self,
+    ) -> tuple[Float[np.ndarray, "local local"], Float[np.ndarray, "local shared"], Float[np.ndarray, "shared shared"]]:
+        """Of the triangle: own numbers, how they go with the shared ones, and the shared ones by themselves."""
+        own = self.local.shape[1]
+        return self._triangle[:own, :own], self._triangle[:own, own:], self._triangle[own:, own:]
 
     @cached_property
     def local_root(self) -> Float[np.ndarray, "local local"]:
         """Lower-triangular root of the covariance of the video's own numbers, given the shared ones."""
-        return Gaussian.from_precision(np.zeros(len(self.local)), self.local).root
+        return _covariance_root(self._blocks[0])
 
     @cached_property
     def slope(self) -> Float[np.ndarray, "local shared"]:
         """How the best own numbers move with the shared ones."""
-        return -self.local_root @ (self.local_root.T @ self.cross)
+        own, cross, _ = self._blocks
+        slope: np.ndarray = -solve_triangular(own, cross)
+        return slope
 
     def around(self, local: Float[np.ndarray, "local"], logarithms: Bool[np.ndarray, "shared"]) -> "LocalGaussian":
         """The Gaussian of the own numbers around a maximum at which they were expanded."""
         return LocalGaussian(local, self.slope, self.local_root, logarithms)
 
     @cached_property
+    def _pulled(self) -> Float[np.ndarray, "local"]:
+        """Gradient of the own numbers in units of their standard deviations."""
+        pulled: np.ndarray = solve_triangular(self._blocks[0], self.local_gradient, trans="T")
+        return pulled
+
+    @cached_property
     def local_step(self) -> Float[np.ndarray, "local"]:
         """Newton step of the own numbers where the shared ones stay."""
-        return -self.local_root @ (self.local_root.T @ self.local_gradient)
+        step: np.ndarray = -solve_triangular(self._blocks[0], self._pulled)
+        return step
 
     @property
     def reduced(self) -> Float[np.ndarray, "shared shared"]:
-        """Curvature in the shared numbers when the own ones follow them."""
-        reduced = self.shared + self.cross.T @ self.slope
-        return (reduced + reduced.T) / 2
+        """Derivatives of residuals by the shared numbers when the own ones follow them."""
+        return self._blocks[2]
 
     @property
     def reduced_gradient(self) -> Float[np.ndarray, "shared"]:
         """Gradient in the shared numbers when the own ones follow them."""
-        return self.shared_gradient + self.cross.T @ self.local_step
+        return self.shared_gradient - self._blocks[1].T @ self._pulled
 
 
 @dataclass(frozen=True)
 class SharedExpansion:
-    """Expansion of the negative log prior of the shared numbers."""
+    """Expansion of the negative log prior of the shared numbers.
+
+    Parameters
+    ----------
+    gradient
+        First derivative.
+    rows
+        Derivatives of residuals, whose products are the curvature.
+    """
 
     gradient: Float[np.ndarray, "shared"]
-    curvature: Float[np.ndarray, "shared shared"]
+    rows: Float[np.ndarray, "residual shared"]
 
 
 def grown(
@@ -197,14 +224,15 @@ class Expansions:
 
     def damped(self, damping: float) -> "Expansions":
         """With every number's curvature larger by a share of it."""
-        curvature = self.prior.curvature
-        prior = SharedExpansion(self.prior.gradient, curvature + damping * np.diag(np.diag(curvature)))
+        rows = self.prior.rows
+        added = np.diag(np.sqrt(damping) * np.linalg.norm(rows, axis=0))
+        prior = SharedExpansion(self.prior.gradient, np.concatenate([rows, added]))
         return Expansions(prior, tuple(one.damped(damping) for one in self.videos))
 
     @cached_property
-    def curvature(self) -> Float[np.ndarray, "shared shared"]:
-        """Curvature in the shared numbers when all own ones follow."""
-        return self.prior.curvature + sum(one.reduced for one in self.videos)
+    def _triangle(self) -> Float[np.ndarray, "shared shared"]:
+        """Upper-triangular root of the curvature in the shared numbers when all own ones follow."""
+        return upper_root(np.concatenate([self.prior.rows, *(one.reduced for one in self.videos)]))
 
     @cached_property
     def gradient(self) -> Float[np.ndarray, "shared"]:
@@ -214,7 +242,7 @@ class Expansions:
     @cached_property
     def shared_step(self) -> Float[np.ndarray, "shared"]:
         """Newton step of the shared numbers when all own ones follow."""
-        return -_solve(self.curvature, self.gradient)
+        return -self._solve(self.gradient)
 
     @property
     def expected_gain(self) -> float:
@@ -226,10 +254,10 @@ class Expansions:
         self, prior_at: Float[np.ndarray, "shared"], places: Sequence[Float[np.ndarray, "shared"]]
     ) -> Float[np.ndarray, "shared"]:
         """Best shared numbers where each video was expanded around a place of its own, and the prior around another."""
-        pull = self.prior.curvature @ prior_at - self.prior.gradient
+        pull = self.prior.rows.T @ (self.prior.rows @ prior_at) - self.prior.gradient
         for one, place in zip(self.videos, places, strict=True):
-            pull = pull + one.reduced @ place - one.reduced_gradient
-        return _solve(self.curvature, pull)
+            pull = pull + one.reduced.T @ (one.reduced @ place) - one.reduced_gradient
+        return self._solve(pull)
 
     def gaussian(
         self,
@@ -238,14 +266,16 @@ class Expansions:
         logarithms: Bool[np.ndarray, "shared"],
     ) -> ArrowGaussian:
         """The Gaussian around a maximum at which all were expanded."""
-        root = Gaussian.from_precision(shared, self.curvature).root
         blocks = (one.around(local, logarithms) for local, one in zip(locals_, self.videos, strict=True))
-        return ArrowGaussian(shared, root, tuple(blocks), logarithms)
+        return ArrowGaussian(shared, _covariance_root(self._triangle), tuple(blocks), logarithms)
+
+    def _solve(self, vector: Float[np.ndarray, "shared"]) -> Float[np.ndarray, "shared"]:
+        """A vector divided by the curvature in the shared numbers."""
+        pulled = solve_triangular(self._triangle, vector, trans="T")
+        solution: np.ndarray = solve_triangular(self._triangle, pulled)
+        return solution
 
 
-def _solve(
-    precision: Float[np.ndarray, "shared shared"], vector: Float[np.ndarray, "shared"]
-) -> Float[np.ndarray, "shared"]:
-    root = Gaussian.from_precision(np.zeros(len(vector)), precision).root
-    solution: Float[np.ndarray, "shared"] = root @ (root.T @ vector)
-    return solution
+def _covariance_root(triangle: Float[np.ndarray, "number number"]) -> Float[np.ndarray, "number number"]:
+    """Lower-triangular root of the covariance, from an upper-triangular root of the precision."""
+    return lower_root(solve_triangular(triangle, np.eye(len(triangle))))

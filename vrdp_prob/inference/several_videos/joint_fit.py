@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 from scipy.linalg import solve_triangular
 
 from vrdp_prob.inference.least_squares import jacobian, minimise
@@ -26,6 +26,7 @@ from vrdp_prob.inference.several_videos.arrow import (
 )
 from vrdp_prob.inference.several_videos.linking import LinkedVideo, SharedNumbers
 from vrdp_prob.inference.several_videos.prior_mass import log_prior_constant
+from vrdp_prob.models.coordinates import Coordinates
 
 DAMPINGS = 10.0 ** np.array([-2.0, -1.0, 0.0, 1.0, 2.0])
 """Factors on the current damping that one round of trial steps covers."""
@@ -135,19 +136,35 @@ def expand(
     """Expand a video's negative log density; the gradient is exact, the curvature that of its residuals."""
     likelihood, point = video.data, video.points(shared, local)
     _, derivative = jacobian(likelihood.residuals, point, likelihood.coordinates.scale, central=central)
-    curvature = derivative.T @ derivative
     places, noise = noise_curvature(likelihood, point)
-    curvature[places, :] = curvature[:, places] = 0.0
-    curvature[np.ix_(places, places)] = noise
+    derivative[:, places] = 0.0
     _, gradient = evaluate_with_gradient(likelihood.log_density, point[None])
     own, used, columns = video.local_places, video.shared_places, video.shared_columns
-    count = len(shared)
-    shared_gradient, block = np.zeros(count), np.zeros((count, count))
-    cross = np.zeros((len(own), count))
+    rows = [derivative, _noise_rows(places, noise, len(point)), _prior_rows(likelihood.coordinates, derivative, own)]
+    derivative = np.concatenate(rows)
+    shared_gradient, shared_derivative = np.zeros(len(shared)), np.zeros((len(derivative), len(shared)))
     shared_gradient[columns] = -gradient[0, used]
-    block[np.ix_(columns, columns)] = curvature[np.ix_(used, used)]
-    cross[:, columns] = curvature[np.ix_(own, used)]
-    return Expansion(shared_gradient, -gradient[0, own], block, cross, curvature[np.ix_(own, own)])
+    shared_derivative[:, columns] = derivative[:, used]
+    return Expansion(shared_gradient, -gradient[0, own], shared_derivative, derivative[:, own])
+
+
+def _noise_rows(
+    places: Int[np.ndarray, "noise"], curvature: Float[np.ndarray, "noise noise"], dimension: int
+) -> Float[np.ndarray, "noise dimension"]:
+    """Residual derivatives that make up the curvature along the noise scales."""
+    rows = np.zeros((len(places), dimension))
+    rows[:, places] = np.linalg.cholesky(curvature).T
+    return rows
+
+
+def _prior_rows(
+    coordinates: Coordinates, derivative: Float[np.ndarray, "residual dimension"], own: Int[np.ndarray, "local"]
+) -> Float[np.ndarray, "lost dimension"]:
+    """Priors of own numbers whose derivative is lost, since the worlds on the way fail."""
+    lost = own[~coordinates.mask(NOISE_FIELDS)[own] & ~derivative[:, own].any(axis=0)]
+    rows = np.zeros((len(lost), derivative.shape[1]))
+    rows[np.arange(len(lost)), lost] = 1 / coordinates.prior_sd[lost]
+    return rows
 
 
 def expand_prior(numbers: SharedNumbers, shared: Float[np.ndarray, "shared"]) -> SharedExpansion:
@@ -155,7 +172,7 @@ def expand_prior(numbers: SharedNumbers, shared: Float[np.ndarray, "shared"]) ->
     if not len(numbers):
         return SharedExpansion(np.zeros(0), np.zeros((0, 0)))
     residuals, derivative = jacobian(numbers.prior_residuals, shared, numbers.scale, central=True)
-    return SharedExpansion(derivative.T @ residuals, derivative.T @ derivative)
+    return SharedExpansion(derivative.T @ residuals, derivative)
 
 
 def climb(

@@ -87,9 +87,14 @@ class Expansion:
         return step
 
     @property
-    def reduced(self) -> Float[np.ndarray, "shared shared"]:
+    def reduced_rows(self) -> Float[np.ndarray, "shared shared"]:
         """Derivatives of residuals by the shared numbers when the own ones follow them."""
         return self._blocks[2]
+
+    @property
+    def reduced(self) -> Float[np.ndarray, "shared shared"]:
+        """Curvature in the shared numbers when the own ones follow them."""
+        return self.reduced_rows.T @ self.reduced_rows
 
     @property
     def reduced_gradient(self) -> Float[np.ndarray, "shared"]:
@@ -111,6 +116,11 @@ class SharedExpansion:
 
     gradient: Float[np.ndarray, "shared"]
     rows: Float[np.ndarray, "residual shared"]
+
+    @property
+    def curvature(self) -> Float[np.ndarray, "shared shared"]:
+        """Second derivative."""
+        return self.rows.T @ self.rows
 
 
 def grown(
@@ -232,7 +242,7 @@ class Expansions:
     @cached_property
     def _triangle(self) -> Float[np.ndarray, "shared shared"]:
         """Upper-triangular root of the curvature in the shared numbers when all own ones follow."""
-        return upper_root(np.concatenate([self.prior.rows, *(one.reduced for one in self.videos)]))
+        return upper_root(np.concatenate([self.prior.rows, *(one.reduced_rows for one in self.videos)]))
 
     @cached_property
     def gradient(self) -> Float[np.ndarray, "shared"]:
@@ -254,9 +264,9 @@ class Expansions:
         self, prior_at: Float[np.ndarray, "shared"], places: Sequence[Float[np.ndarray, "shared"]]
     ) -> Float[np.ndarray, "shared"]:
         """Best shared numbers where each video was expanded around a place of its own, and the prior around another."""
-        pull = self.prior.rows.T @ (self.prior.rows @ prior_at) - self.prior.gradient
+        pull = self.prior.curvature @ prior_at - self.prior.gradient
         for one, place in zip(self.videos, places, strict=True):
-            pull = pull + one.reduced.T @ (one.reduced @ place) - one.reduced_gradient
+            pull = pull + one.reduced @ place - one.reduced_gradient
         return self._solve(pull)
 
     def gaussian(

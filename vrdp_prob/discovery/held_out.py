@@ -11,8 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
+from vrdp_prob.inference.parallel import in_parallel
 from vrdp_prob.inference.several_videos.arrow import LOG_TWO_PI, Expansion
-from vrdp_prob.inference.several_videos.fitting import SharedFit, in_parallel
+from vrdp_prob.inference.several_videos.fitting import SharedFit
 from vrdp_prob.inference.several_videos.joint_fit import expand, expand_prior
 from vrdp_prob.inference.several_videos.prior_mass import log_prior_constant
 

@@ -15,7 +15,8 @@ from scipy.linalg import cho_factor, cho_solve
 
 from vrdp_prob.inference.least_squares import jacobian
 from vrdp_prob.inference.noise_fit import NOISE_FIELDS
-from vrdp_prob.inference.several_videos.fitting import SharedFit, in_parallel
+from vrdp_prob.inference.parallel import in_parallel
+from vrdp_prob.inference.several_videos.fitting import SharedFit
 from vrdp_prob.inference.several_videos.joint_fit import expand_prior
 from vrdp_prob.inference.several_videos.linking import LinkedVideo
 

@@ -14,7 +14,8 @@ from scipy.stats import chi2
 
 from vrdp_prob.discovery.linear import LinearFit, Score
 from vrdp_prob.discovery.probes import Probe, probes
-from vrdp_prob.inference.several_videos.fitting import SharedFit, in_parallel
+from vrdp_prob.inference.parallel import in_parallel
+from vrdp_prob.inference.several_videos.fitting import SharedFit
 from vrdp_prob.inference.several_videos.linking import Key
 from vrdp_prob.models.effects.effect import Effect
 from vrdp_prob.models.parameters import Scope, Transform

@@ -57,7 +57,11 @@ class Trial:
             owners = (None, *range(len(part.likelihood.tracks.bodies)))
             acting: dict[Owned, float] = {}
             for site in mine[:1]:
-                acting |= {(name, owner): value for name, value in site.values.items() for owner in (site.owner, None)}
+                acting |= {
+                    (name, owner): effect.vanishes_at.get(name, value)
+                    for name, value in site.values.items()
+                    for owner in (site.owner, None)
+                }
             every = {(name, owner) for name in fields for owner in owners}
             held.append(structure.held | frozenset(every - acting.keys()))
             own.append(acting)

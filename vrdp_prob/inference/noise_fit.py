@@ -2,7 +2,7 @@
 
 import numpy as np
 import torch
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 from scipy.optimize import minimize
 from torch import Tensor
 
@@ -15,9 +15,14 @@ NORMAL_MEDIAN = 1.1774
 """Median length of two independent standard normal numbers."""
 
 
-def best_noise(likelihood: Likelihood, point: Float[np.ndarray, "dimension"]) -> Float[np.ndarray, "dimension"]:
-    """The point with the most probable noise for its world; the point itself where its world fails."""
-    places = _places(likelihood)
+def best_noise(
+    likelihood: Likelihood, point: Float[np.ndarray, "dimension"], chosen: Bool[np.ndarray, "dimension"] | None = None
+) -> Float[np.ndarray, "dimension"]:
+    """The point with the most probable noise (that of some coordinates, where chosen) for its world.
+
+    It is the point itself where its world fails.
+    """
+    places = _places(likelihood) if chosen is None else np.flatnonzero(chosen)
     discrepancies = likelihood.discrepancies(torch.from_numpy(point[None]))
     if not len(places) or not bool(torch.isfinite(discrepancies.positions).all()):
         return point

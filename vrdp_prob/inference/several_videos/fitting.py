@@ -1,11 +1,9 @@
 """The joint fit of several videos: each by itself first, then all together, then what the model leaves unexplained."""
 
-import os
+import math
 import zlib
-from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TypeVar
 
 import numpy as np
 from jaxtyping import Float
@@ -16,7 +14,9 @@ from vrdp_prob.inference.map_fit import MapFit, fit_map
 from vrdp_prob.inference.misfit import judge
 from vrdp_prob.inference.mode import Mode
 from vrdp_prob.inference.model_error_fit import TURNS, next_model_error
-from vrdp_prob.inference.several_videos.joint_fit import JointFit, climb, first_guess, with_alternatives
+from vrdp_prob.inference.parallel import in_parallel
+from vrdp_prob.inference.several_videos.ascent import climb
+from vrdp_prob.inference.several_videos.joint_fit import JointFit, first_guess, with_alternatives
 from vrdp_prob.inference.several_videos.linking import LinkedVideo, check_names, link
 from vrdp_prob.models.coordinates import Coordinates
 from vrdp_prob.models.likelihood import Likelihood
@@ -28,8 +28,8 @@ from vrdp_prob.scene import Tracks
 
 Owned = tuple[str, int | None]
 """A number of a video: its name and its owner, None for the video's."""
-Item = TypeVar("Item")
-Result = TypeVar("Result")
+LOG_FAINT = math.log(0.01)
+"""Where the logarithm of a strength begins that is to be found, relative to what is expected of it."""
 
 
 @dataclass(frozen=True)
@@ -99,14 +99,18 @@ class SharedFit:
             plain_likelihood(fit.clues, model, structure) for fit, structure in zip(self.fits, structures, strict=True)
         ]
         numbers, videos = link(likelihoods, self.shared)
-        first = _vanishing(model) | dict(start or {})
         known = dict(zip(joint.numbers.keys, joint.gaussian.mean, strict=True))
-        shared = numbers.prior_mean.copy()
+        vanishing, wanted = _vanishing(model), dict(start or {})
+        shared, towards = numbers.prior_mean.copy(), numbers.prior_mean.copy()
         for place, (key, entry) in enumerate(zip(numbers.keys, numbers.entries, strict=True)):
-            if key in known and key[0] not in (start or {}):
-                shared[place] = known[key]
-            elif key[0] in first and first[key[0]] > entry.transform.support[0]:
-                shared[place] = _coordinate(entry.transform, first[key[0]])
+            if key in known:
+                shared[place] = towards[place] = known[key]
+                continue
+            if key[0] in wanted:
+                shared[place] = towards[place] = _coordinate(entry.transform, wanted[key[0]])
+            if key[0] in vanishing:
+                shared[place] = _nearly_vanished(entry.transform, vanishing[key[0]], towards[place])
+                towards[place] = towards[place] if key[0] in wanted else shared[place]
         locals_ = [
             video.split(old.likelihood.coordinates.carried(joint.point(index), video.likelihood.coordinates))[1]
             for index, (old, video) in enumerate(zip(joint.videos, videos, strict=True))
@@ -117,7 +121,7 @@ class SharedFit:
                 entry = entries[place]
                 if (entry.field, entry.owner) in values:
                     mine[number] = _coordinate(entry.transform, values[entry.field, entry.owner])
-        found = climb(numbers, videos, shared, locals_)
+        found = climb(numbers, videos, shared, locals_, towards=towards)
         return _finished(found, model, self.fits, structures, self.shared, model_error=model_error)
 
 
@@ -209,12 +213,6 @@ def stream(seed: int, video: str) -> np.random.Generator:
     return np.random.default_rng([seed, zlib.crc32(video.encode())])
 
 
-def in_parallel(task: Callable[[Item], Result], items: Sequence[Item]) -> list[Result]:
-    """Results of a task, one thread per processor; the simulator lets threads run side by side."""
-    with ThreadPoolExecutor(max_workers=max(1, min(len(items), os.cpu_count() or 1))) as workers:
-        return list(workers.map(task, items))
-
-
 def _finished(
     joint: JointFit,
     model: PhysicsModel,
@@ -301,6 +299,11 @@ def structure_of(coordinates: Coordinates) -> Structure:
 def _vanishing(model: PhysicsModel) -> dict[str, float]:
     """Values at which the model's effects vanish."""
     return {name: value for effect in model.effects for name, value in effect.vanishes_at.items()}
+
+
+def _nearly_vanished(transform: Transform, value: float, expected: float) -> float:
+    """Coordinate at which a strength vanishes; where that is infinitely far, one far below what is expected."""
+    return expected + LOG_FAINT if transform is Transform.LOG and value == 0.0 else _coordinate(transform, value)
 
 
 def _coordinate(transform: Transform, value: float) -> float:

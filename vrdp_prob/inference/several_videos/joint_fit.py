@@ -28,14 +28,6 @@ from vrdp_prob.inference.several_videos.linking import LinkedVideo, SharedNumber
 from vrdp_prob.inference.several_videos.prior_mass import log_prior_constant
 from vrdp_prob.models.coordinates import Coordinates
 
-DAMPINGS = 10.0 ** np.array([-2.0, -1.0, 0.0, 1.0, 2.0])
-"""Factors on the current damping that one round of trial steps covers."""
-SMALLEST_DAMPING, LARGEST_DAMPING = 1e-9, 1e6
-LOCAL_SHARES = (1.0, 0.3, 0.0)
-"""Shares of its own Newton step among which each video chooses, beside following the shared numbers."""
-ROUNDS = 30
-TOLERANCE = 0.01
-"""Gain (nats) of a step, expected or real, below which the search has converged."""
 LOCAL_ITERATIONS = 8
 SAME_MODE = 1.5
 """Searches that end within so many standard deviations of each other have found the same mode."""
@@ -173,72 +165,6 @@ def expand_prior(numbers: SharedNumbers, shared: Float[np.ndarray, "shared"]) ->
         return SharedExpansion(np.zeros(0), np.zeros((0, 0)))
     residuals, derivative = jacobian(numbers.prior_residuals, shared, numbers.scale, central=True)
     return SharedExpansion(derivative.T @ residuals, derivative)
-
-
-def climb(
-    numbers: SharedNumbers,
-    videos: Sequence[LinkedVideo],
-    shared: Float[np.ndarray, "shared"],
-    locals_: Sequence[Float[np.ndarray, "_"]],
-) -> JointFit:
-    """Climb the joint log posterior from a start."""
-    state = _State(shared, list(locals_), [v.value(shared, x) for v, x in zip(videos, locals_, strict=True)])
-    damping, converged = 1e-3, False
-    for _ in range(ROUNDS):
-        prior = expand_prior(numbers, state.shared)
-        expansions = [expand(v, state.shared, x) for v, x in zip(videos, state.locals, strict=True)]
-        slopes = Expansions(prior, tuple(expansions))
-        expected = slopes.expected_gain
-        trial, damping = _tried(numbers, videos, state, slopes, damping)
-        gain = trial.total(numbers) - state.total(numbers) if trial is not state else 0.0
-        state = trial
-        converged = min(expected, gain) < TOLERANCE and expected < 1.0
-        if converged or damping > LARGEST_DAMPING:
-            break
-    prior = expand_prior(numbers, state.shared)
-    expansions = [expand(v, state.shared, x, central=True) for v, x in zip(videos, state.locals, strict=True)]
-    gaussian = Expansions(prior, tuple(expansions)).gaussian(state.shared, state.locals, numbers.logarithms)
-    return JointFit(numbers, tuple(videos), gaussian, state.total(numbers), converged)
-
-
-@dataclass(frozen=True)
-class _State:
-    shared: Float[np.ndarray, "shared"]
-    locals: list[Float[np.ndarray, "_"]]
-    values: list[float]
-
-    def total(self, numbers: SharedNumbers) -> float:
-        return float(numbers.log_prior(self.shared[None])[0]) + sum(self.values)
-
-
-def _tried(
-    numbers: SharedNumbers, videos: Sequence[LinkedVideo], state: _State, slopes: Expansions, damping: float
-) -> tuple[_State, float]:
-    """The best of several damped steps, or the state as it is, and the next damping."""
-    dampings = np.clip(damping * DAMPINGS, SMALLEST_DAMPING, LARGEST_DAMPING)
-    damped = [slopes, *(slopes.damped(value) for value in dampings)]
-    steps = [np.zeros_like(state.shared), *(one.shared_step for one in damped[1:])]
-    trials = state.shared + np.array(steps)
-    totals = numbers.log_prior(trials)
-    locals_, values = [], []
-    for index, video in enumerate(videos):
-        mine = [one.videos[index] for one in damped]
-        moves = [
-            [one.slope @ step + share * one.local_step for share in LOCAL_SHARES]
-            for one, step in zip(mine, steps, strict=True)
-        ]
-        candidates = state.locals[index] + np.array(moves)
-        repeated = np.repeat(trials, len(LOCAL_SHARES), axis=0)
-        found = video.log_density(repeated, candidates.reshape(-1, candidates.shape[-1])).reshape(len(trials), -1)
-        best = found.argmax(axis=1)
-        locals_.append(candidates[np.arange(len(trials)), best])
-        values.append(found.max(axis=1))
-        totals = totals + values[-1]
-    chosen = int(np.argmax(totals))
-    if not totals[chosen] > state.total(numbers):
-        return state, damping * 1e3
-    after = _State(trials[chosen], [one[chosen] for one in locals_], [float(one[chosen]) for one in values])
-    return after, float(dampings[chosen - 1]) if chosen else damping
 
 
 def first_guess(

@@ -8,7 +8,7 @@ import numpy as np
 from vrdp_prob.discovery.linear import LinearFit
 from vrdp_prob.discovery.proposals import proposals
 from vrdp_prob.discovery.scores import CauseScore, score_causes
-from vrdp_prob.discovery.trials import Trial, gain, weights
+from vrdp_prob.discovery.trials import Trial, gain
 from vrdp_prob.inference.parallel import in_parallel
 from vrdp_prob.inference.several_videos.fitting import SharedFit
 from vrdp_prob.models.effects.effect import Effect
@@ -95,22 +95,21 @@ def search(
     return Search(base, best, tuple(steps), _rivals(best, steps, lesser), lesser)
 
 
-def _step(
-    best: Trial, catalogue: Sequence[Effect], seed: int, progress: ProgressDisplay | None, number: int
-) -> Step:
+def _step(best: Trial, catalogue: Sequence[Effect], seed: int, progress: ProgressDisplay | None, number: int) -> Step:
     linear = LinearFit.of(best.fit)
     scores = score_causes(best.fit, linear, catalogue, seed=seed)
     shortlist = [one for one in scores if one.p_value < SHORTLIST_LEVEL][:MOST_REFITTED]
-    shortlist += proposals(best.fit, scores, catalogue)
+    if shortlist:
+        shortlist += proposals(best.fit, scores, catalogue)
     label = "Trying causes" if number == 0 else f"Trying further causes ({number + 1})"
     with (progress or SilentProgress()).stage(label, total=len(shortlist)) as advance:
 
-        def tried(score: CauseScore) -> Trial:
+        def tried(score: CauseScore) -> Trial | None:
             found = best.with_cause(score)
             advance(1)
             return found
 
-        trials = in_parallel(tried, shortlist)
+        trials = [one for one in in_parallel(tried, shortlist) if one is not None]
     return Step(tuple(scores), tuple(sorted(trials, key=lambda one: -float(one.log_density.sum()))))
 
 

@@ -9,6 +9,7 @@ from jaxtyping import Float
 
 from vrdp_prob.discovery.held_out import Cavity, cavities
 from vrdp_prob.discovery.scores import CauseScore, happens_once
+from vrdp_prob.inference.several_videos.ascent import ImpossibleStartError
 from vrdp_prob.inference.several_videos.fitting import Owned, SharedFit
 from vrdp_prob.models.effects.effect import Effect
 from vrdp_prob.models.physics import PhysicsModel
@@ -44,8 +45,14 @@ class Trial:
         """Names of the causes."""
         return tuple(cause.name for cause in self.causes)
 
-    def with_cause(self, score: CauseScore) -> "Trial":
-        """The fit with one more cause, from what its score says of it."""
+    def with_cause(self, score: CauseScore) -> "Trial | None":
+        """The fit with one more cause, from what its score says of it; None where no world can begin there."""
+        try:
+            return self._extended(score)
+        except ImpossibleStartError:
+            return None
+
+    def _extended(self, score: CauseScore) -> "Trial":
         effect = score.effect
         model = self.fit.model.with_effect(effect)
         if not happens_once(effect):

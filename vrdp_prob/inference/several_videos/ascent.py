@@ -34,6 +34,10 @@ SUSPICIOUS_LOSS = 3.0
 """Loss (nats) of one video under a step from which on it also begins where it was."""
 
 
+class ImpossibleStartError(Exception):
+    """A search was to begin where the world of some video cannot be simulated."""
+
+
 @dataclass(frozen=True)
 class State:
     """Where a search is.
@@ -71,9 +75,16 @@ def climb(
         Where to begin.
     towards
         Shared numbers to which the first step goes, as far as it goes up.
+
+    Raises
+    ------
+    ImpossibleStartError
+        If a video has no world at the start.
     """
     ascent = _Ascent(numbers, tuple(videos))
     state = ascent.settled(shared, [[one] for one in locals_], None)
+    if not np.isfinite(ascent.total(state)):
+        raise ImpossibleStartError
     if towards is not None and not np.array_equal(towards, shared):
         state = ascent.stepped(state, ascent.slopes(state), towards - shared) or state
     state = ascent.with_best_noise(state)

@@ -1,7 +1,7 @@
 """Spheres that slide on the table until they roll."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import ClassVar
 
 from jaxtyping import Float
@@ -10,7 +10,7 @@ from torch import Tensor
 from vrdp_prob.models.effects.effect import BodyView, Effect
 from vrdp_prob.models.parameters import Parameter, Prior, Scope, Transform
 from vrdp_prob.models.simulator.formula import Scalar
-from vrdp_prob.scene import Shape
+from vrdp_prob.scene import Shape, Tracks
 
 SLIP_FRICTION = Parameter(
     "slip_friction",
@@ -33,6 +33,10 @@ RELEASE_ROLLING = Parameter(
 )
 
 
+SEARCH_FRICTIONS = (0.05, 0.2)
+"""Friction coefficients with which slipping is looked for."""
+
+
 class SlipToRoll(Effect):
     """A solid sphere slips against the table's friction until its spin has caught up with its velocity."""
 
@@ -44,6 +48,11 @@ class SlipToRoll(Effect):
     )
     source: ClassVar = "A. Sommerfeld, Mechanics (Lectures on theoretical physics 1), section 27: the billiard ball"
     parameters: ClassVar = (SLIP_FRICTION, RELEASE_ROLLING)
+
+    def search_points(self, videos: Sequence[Tracks]) -> Sequence[Mapping[str, float]]:
+        """With a slippery and with a rough table, where there are spheres."""
+        spheres = any(body.shape is Shape.SPHERE for one in videos for body in one.bodies)
+        return [{"slip_friction": value} for value in SEARCH_FRICTIONS] if spheres else []
 
     def slip_friction(self, time: Scalar, body: BodyView, parameters: Mapping[str, Scalar]) -> Scalar:
         """Friction coefficient while the sphere slips."""

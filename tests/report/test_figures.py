@@ -3,27 +3,11 @@
 from dataclasses import replace
 
 import numpy as np
-import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from vrdp_prob.inference.summaries import Summary
-from vrdp_prob.report.figures import log_axis, path_data, still_figure, unit_axis
+from vrdp_prob.report.figures import path_data, still_figure
 from vrdp_prob.scene import Wall
-
-
-def test_log_axis_gives_equal_ratios_equal_lengths():
-    axis = log_axis([Summary(1.0, 0.1, 0.25, 4.0)])
-    assert axis.place(1.0) - axis.place(0.5) == pytest.approx(axis.place(2.0) - axis.place(1.0), abs=0.02)
-    assert (axis.place(1e-9), axis.place(1e9)) == (0.0, 100.0)
-
-
-def test_axes_hold_their_intervals():
-    wide = Summary(20.0, 9.0, 0.02, 60.0)
-    axis = log_axis([wide])
-    assert 0 < axis.place(wide.q05) < axis.place(wide.q95) < 100
-    assert unit_axis([Summary(1.1, 0.1, 0.9, 1.3)]).high == 1.3
-    assert log_axis([]).ticks == (0.5, 1.0, 2.0)
 
 
 @given(st.integers(0, 2**32 - 1))

@@ -1,13 +1,11 @@
-"""Geometry of the page's static figures: tracks and rollouts as SVG paths, intervals as shares of an axis."""
+"""Geometry of the page's static figures: tracks and rollouts as SVG paths."""
 
-import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float
 
-from vrdp_prob.inference.summaries import Summary
 from vrdp_prob.report.content import ReportContent, WorldContent, WorldKind
 from vrdp_prob.report.wording import color_of, tags
 from vrdp_prob.scene import Camera
@@ -191,46 +189,3 @@ def _thinned(points: Float[np.ndarray, "time 2"], spacing: float) -> Float[np.nd
 
 def _points(points: Float[np.ndarray, "count 2"]) -> list[tuple[float, float]]:
     return [(round(float(u), 1), round(float(v), 1)) for u, v in points]
-
-
-@dataclass(frozen=True)
-class Axis:
-    """A horizontal axis for intervals; places on it are percentages of its width.
-
-    Parameters
-    ----------
-    low, high
-        Its ends.
-    logarithmic
-        Whether equal ratios are equal lengths.
-    ticks
-        Values with a label.
-    """
-
-    low: float
-    high: float
-    logarithmic: bool
-    ticks: tuple[float, ...]
-
-    def place(self, value: float) -> float:
-        """Percentage of the width at which a value stands; values beyond an end stand at that end."""
-        low, high, at = self.low, self.high, min(max(value, self.low), self.high)
-        if self.logarithmic:
-            low, high, at = math.log(low), math.log(high), math.log(at)
-        return round(100 * (at - low) / (high - low), 2)
-
-
-_LOG_TICKS = (0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0)
-
-
-def log_axis(intervals: Sequence[Summary]) -> Axis:
-    """A logarithmic axis that holds all intervals and 1, with ticks at 1, 2 and 5 times powers of ten."""
-    low = max(min([0.5, *(interval.q05 for interval in intervals)]) * 0.9, 1e-3)
-    high = min(max([2.0, *(interval.q95 for interval in intervals)]) * 1.1, 1e3)
-    return Axis(low, high, True, tuple(tick for tick in _LOG_TICKS if low <= tick <= high))
-
-
-def unit_axis(intervals: Sequence[Summary]) -> Axis:
-    """A linear axis from 0 to 1, longer where an interval needs it."""
-    high = max([1.0, *(min(interval.q95, 3.0) for interval in intervals)])
-    return Axis(0.0, high, False, (0.0, 0.25, 0.5, 0.75, 1.0))

@@ -8,8 +8,9 @@ from markupsafe import Markup
 
 from vrdp_prob.inference.summaries import PairSummary, ParameterSummary, Summary
 from vrdp_prob.reasoning.answer import Answer
+from vrdp_prob.report.axes import log_axis, unit_axis
 from vrdp_prob.report.content import AnswerContent, Footage, ReportContent, WorldKind
-from vrdp_prob.report.figures import FIGURE_DRAWS, log_axis, still_figure, unit_axis
+from vrdp_prob.report.figures import FIGURE_DRAWS, still_figure
 from vrdp_prob.report.footage import still_uri
 from vrdp_prob.report.payload import player_data
 from vrdp_prob.report.summary import (

@@ -1,0 +1,182 @@
+"""finding.html: self-contained, safe, complete, and readable on a small screen."""
+
+import re
+from dataclasses import replace
+
+import pytest
+
+from tests.discovery.findings import CHECKS, EVERY_KIND, TILT, named, nothing, unknown, with_a_rest, with_many_videos
+from tests.report.browser import Browser, find_chromium
+from tests.report.outline import Outline
+from vrdp_prob.discovery.page import render
+from vrdp_prob.discovery.summary import lines, summary, verdict_sentence
+from vrdp_prob.discovery.wording import TIMES
+
+DRAWING = """<?xml version="1.0"?>
+<!DOCTYPE svg PUBLIC "-//W3C//DTD SVG 1.1//EN" "http://www.w3.org/Graphics/SVG/1.1/DTD/svg11.dtd">
+<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 9 9"><metadata>http://example.org</metadata>
+<clipPath id="a"><rect width="9" height="9"/></clipPath><g id="b" clip-path="url(#a)"/><use href="#b"/></svg>
+"""
+
+
+def text_of(page):
+    return Outline(page).text
+
+
+@pytest.mark.parametrize("kind", EVERY_KIND)
+def test_needs_nothing_from_outside_and_nests(kind):
+    page = render(EVERY_KIND[kind]())
+    assert text_of(page)
+    assert all(address.startswith("data:") for address in re.findall(r"(?:src|href)=\"([^\"]*)\"", page))
+    assert not re.search(r"@import|https?://|<script", page)
+    assert "default-src 'none'" in page
+    assert "nan%" not in page
+    assert "inf%" not in page
+    assert render(EVERY_KIND[kind]()) == page
+
+
+@pytest.mark.parametrize("kind", EVERY_KIND)
+def test_every_word_of_a_finding_is_told(kind):
+    finding, page = EVERY_KIND[kind](), render(EVERY_KIND[kind]())
+    text = text_of(page)
+    assert page.index(verdict_sentence(finding)[:20]) < page.index("<main>")
+    for words in (verdict_sentence(finding), *summary(finding), *finding.notes):
+        assert words in text
+    for cause in finding.causes:
+        assert cause.sentence in text
+    for check in finding.checks:
+        assert check.sentence in text
+    for bound in finding.upper_bounds:
+        assert bound.parameter in text
+
+
+def test_the_verdict_is_one_sentence_without_intervals():
+    assert verdict_sentence(replace(named(), causes=(TILT,))) == (
+        "These 12 videos show that the table slopes by 0.15 degrees, down towards x = 0.83, y = -0.56."
+    )
+    doubtful = replace(TILT, probability=0.7, sentence="TV pictures shake. They do so often.")
+    assert verdict_sentence(replace(named(), causes=(doubtful,), videos=("a", "b", "c"))) == (
+        "These three videos suggest that TV pictures shake."
+    )
+    assert verdict_sentence(with_a_rest()).endswith("and something else that no cause of the catalogue explains.")
+
+
+def test_an_error_that_rises_is_told_as_it_is():
+    worse = replace(TILT, gain=replace(TILT.gain, before=TILT.gain.after, after=TILT.gain.before))
+    assert "from 5.9 to 12 mm" in summary(replace(named(), causes=(worse,)))[0]
+
+
+def test_named_causes_with_parameters_probability_and_gain():
+    text = text_of(render(named()))
+    assert "surface tilt probability > 99 %" in text
+    assert "Sine of the table's slope, component in which x falls tilt_x 0.00217 0.00188 to 0.00246" in text
+    assert "Law: a = g (tilt_x, tilt_y)" in text
+    assert "without surface tilt 21 % 48 % with surface tilt 38 % 77 %" in text
+    assert "measurement noise, 3.0 mm" in text
+    assert "12 of 12 videos are predicted better." in text
+    assert "Also possible" in text
+    assert "Looked at closely and not needed" in text
+
+
+def test_checks_that_fail_come_first():
+    text = text_of(render(named()))
+    table, _, fold = text.partition("Four checks that show nothing")
+    failing = [check.name for check in CHECKS if check.significant]
+    assert all(name in table and name not in fold for name in failing)
+    assert f"3{TIMES}10⁻³⁸ ✗ 0.62" in table
+    assert f"2{TIMES}10⁻⁴ ✗ 0.0043 ✗" in table
+    assert "With the extended model: Slow contacts still change the spin too much." in table
+    order = [fold.index(check.name) for check in sorted(CHECKS, key=lambda check: check.p_value) if check.name in fold]
+    assert len(order) == 4
+    assert order == sorted(order)
+
+
+def test_a_check_that_fails_only_under_the_extended_model_is_not_folded_away():
+    finding = named()
+    after = tuple(replace(check, significant=check.name == CHECKS[0].name) for check in finding.checks_after)
+    table, _, fold = text_of(render(replace(finding, checks_after=after))).partition("Three checks that show nothing")
+    assert CHECKS[0].name in table
+    assert CHECKS[0].name not in fold
+
+
+def test_bounds_lead_where_nothing_was_found():
+    text = text_of(render(nothing()))
+    assert text.index("What could have hidden") < text.index("Where the model fails")
+    assert "≤ 0.00031" in text
+    assert "no bound" in text
+    assert "<details open>" in render(nothing())
+    assert "The cause" not in text.replace("The causes", "")
+
+
+def test_the_unknown_is_marked_as_a_description():
+    text = text_of(render(unknown()))
+    assert "A description, not a cause" in text
+    assert "a_x = 0.041 sin(6.2 t) - 0.11 v_y" in text
+    assert "follows 61 % of its variance in held-out videos" in text
+    assert "A description, not a cause" in text_of(render(with_a_rest()))
+
+
+def test_many_videos_are_stacked_dots():
+    page = render(with_many_videos())
+    assert page.count("<title>shot_") == 62
+    assert "61 of 62 videos are predicted better." in text_of(page)
+
+
+def test_the_model_file_is_there_to_copy():
+    text = text_of(render(named()))
+    assert 'name = "base+surface_tilt+contact_friction"' in text
+    assert "vrdp-prob report INPUT --model model.toml" in text
+
+
+def test_text_of_a_finding_is_no_html():
+    page = render(EVERY_KIND["at_its_limits"]())
+    assert "<b>&</b>" not in page
+    assert "&lt;b&gt;&amp;&lt;/b&gt;" in page
+
+
+def test_figures_stand_in_the_page_with_names_of_their_own():
+    page = render(named(), {"Along the path": DRAWING, "Across <it>": DRAWING})
+    assert "<?xml" not in page
+    assert "http://" not in page.replace('xmlns="http://www.w3.org/2000/svg"', "")
+    assert page.index("Along the path") < page.index("Across &lt;it&gt;")
+    for index in range(2):
+        assert f'clip-path="url(#figure{index}-a)"' in page
+        assert f'href="#figure{index}-b"' in page
+    identities = re.findall(r' id="([^"]*)"', page)
+    assert len(identities) == len(set(identities))
+    Outline(page)
+
+
+def test_a_figure_that_is_no_svg_is_a_mistake():
+    with pytest.raises(ValueError, match="must be an SVG element"):
+        render(named(), {"Nothing": "<p>a picture</p>"})
+
+
+def test_lines_for_a_terminal_are_lines():
+    for make in EVERY_KIND.values():
+        assert all("\n" not in line and line.strip() for line in lines(make()))
+
+
+@pytest.fixture(scope="module")
+def browser(tmp_path_factory):
+    executable = find_chromium()
+    if executable is None:
+        pytest.skip("no Chromium is installed (chromium, chromium-browser, google-chrome or chrome)")
+    with Browser(executable, tmp_path_factory.mktemp("profile")) as browser:
+        yield browser
+
+
+@pytest.mark.browser
+@pytest.mark.parametrize("width", [360, 500, 1200])
+@pytest.mark.parametrize("kind", EVERY_KIND)
+def test_a_browser_shows_it_without_scrolling_sideways(browser, tmp_path, kind, width):
+    file = tmp_path / "finding.html"
+    file.write_text(render(EVERY_KIND[kind](), {"Along the path": DRAWING}), encoding="utf-8")
+    browser.problems.clear()
+    browser.requests.clear()
+    browser.size(width, 900)
+    browser.open(file)
+    browser.run("document.querySelectorAll('details').forEach((fold) => { fold.open = true; })")
+    assert browser.run("document.documentElement.scrollWidth <= window.innerWidth")
+    assert browser.problems == []
+    assert all(request.startswith(("data:", file.as_uri())) for request in browser.requests)

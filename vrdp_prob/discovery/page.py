@@ -1,0 +1,218 @@
+"""finding.html: what was found, what it is worth, and what could have hidden, on one page that opens from disk."""
+
+import re
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from markupsafe import Markup
+
+from vrdp_prob import __version__
+from vrdp_prob.datasets.folder import some
+from vrdp_prob.discovery.finding import Check, Description, Finding, FoundCause, Verdict
+from vrdp_prob.discovery.gain_figure import error_figure, video_figure
+from vrdp_prob.discovery.summary import POSSIBLE, possible, summary, verdict_sentence
+from vrdp_prob.discovery.wording import (
+    UNDEFINED,
+    bound_words,
+    chance,
+    difference_words,
+    effect_of,
+    estimate_words,
+    number,
+    p_words,
+    parameter_words,
+    title,
+    with_unit,
+)
+from vrdp_prob.models import model_file
+from vrdp_prob.models.physics import PhysicsModel
+from vrdp_prob.report.templating import asset, environment
+from vrdp_prob.report.wording import counted, listed, sentence
+
+NO_FIGURES: Mapping[str, str] = {}
+ALIKE = (
+    "These leave nearly the same traces in such videos. Their probabilities say how well the videos tell them apart; "
+    "other starts, speeds or places would tell more."
+)
+NOT_EXCLUDED = "The likeliest causes of the catalogue. None of them explains the videos well enough to be named."
+
+
+def render(finding: Finding, figures: Mapping[str, str] = NO_FIGURES) -> str:
+    """The page as HTML text; the same finding gives the same text.
+
+    Parameters
+    ----------
+    finding
+        What was found.
+    figures
+        Figures of the residuals: a title and an SVG element as text. One whose root has the class `themed` uses the
+        page's colours (`var(--ink)`, `var(--accent)`, ...); any other stands on white.
+    """
+    named = finding.named
+    values = {
+        "css": asset("page.css"),
+        "verdict": verdict_sentence(finding),
+        "summary": summary(finding),
+        "notes": finding.notes,
+        "video_count": counted(len(finding.videos), "video"),
+        "errors": error_figure(named) if named else None,
+        "description": None if finding.description is None else _description(finding.description),
+        "causes": [{**_cause(cause, finding), "videos": video_figure(cause.gain)} for cause in named],
+        **_others(finding),
+        "coverage": _coverage(named),
+        "checks": _checks(finding),
+        "figures": [(name, _inline(figure, index)) for index, (name, figure) in enumerate(figures.items())],
+        "bounds": _bounds(finding),
+        "bounds_lead": finding.verdict is Verdict.NONE and bool(finding.upper_bounds),
+        **_model(finding),
+    }
+    return environment("vrdp_prob.discovery").get_template("finding.html.j2").render(values)
+
+
+def model_text(model: PhysicsModel) -> str:
+    """Content of a model's file."""
+    return model_file.text(model.name, model.effects, model.parameters)
+
+
+def _cause(cause: FoundCause, finding: Finding) -> dict[str, Any]:
+    effect = effect_of(cause.name, finding.extended)
+    said = chance(cause.probability)
+    return {
+        "title": title(cause.name),
+        "sentence": cause.sentence,
+        "chance": said,
+        "bar": {
+            "probability": round(cause.probability, 6),
+            "place": round(100 * cause.probability, 2),
+            "error_low": 0,
+            "error_high": 0,
+            "chosen": cause.named,
+            "label": f"{title(cause.name)}: {said}",
+        },
+        "parameters": [
+            {
+                "name": name,
+                "words": sentence(parameter_words(name, effect)),
+                **dict(zip(("mean", "interval"), estimate_words(estimate), strict=True)),
+            }
+            for name, estimate in cause.parameters.items()
+        ],
+        "law": effect.law if effect is not None else "",
+        "source": effect.source if effect is not None else "",
+        "difference": difference_words(cause.gain),
+    }
+
+
+def _others(finding: Finding) -> dict[str, Any]:
+    """Causes that were looked at closely and not named."""
+    rejected = [cause for cause in finding.causes if not cause.named and not cause.probability >= POSSIBLE]
+    return {
+        "possible": [_cause(cause, finding) for cause in possible(finding)],
+        "possible_title": "Also possible" if finding.named else "Not excluded",
+        "possible_words": ALIKE if finding.named else NOT_EXCLUDED,
+        "rejected": [_cause(cause, finding) for cause in rejected],
+    }
+
+
+def _coverage(causes: Sequence[FoundCause]) -> list[dict[str, str]]:
+    """Calibration of the predictions, without and with each cause."""
+    return [
+        {
+            "words": f"{word} {title(cause.name)}",
+            "half": _percent(held.coverage_50),
+            "most": _percent(held.coverage_90),
+        }
+        for cause in causes
+        for word, held in (("without", cause.gain.before), ("with", cause.gain.after))
+    ]
+
+
+def _percent(share: float) -> str:
+    return f"{100 * share:.0f} %" if 0 <= share <= 1 else UNDEFINED
+
+
+def _checks(finding: Finding) -> dict[str, Any] | None:
+    """Checks that fail and checks that do not, each by p-value; the extended model's where it differs."""
+    if not finding.checks:
+        return None
+    after = {check.name: check for check in finding.checks_after} if finding.named else {}
+    ordered = sorted(finding.checks, key=lambda check: (not check.significant, not check.p_value >= 0, check.p_value))
+    fails = [check for check in ordered if check.significant or _fails(after.get(check.name))]
+    passes = [check for check in ordered if check not in fails]
+    unremarkable = counted(len(passes), "check") + (" that shows" if len(passes) == 1 else " that show")
+    return {
+        "has_after": bool(after),
+        "failing": [_check(check, after.get(check.name)) for check in fails],
+        "passing": [_check(check, after.get(check.name)) for check in passes],
+        "passing_words": f"{sentence(unremarkable)} nothing",
+    }
+
+
+def _fails(check: Check | None) -> bool:
+    return check is not None and check.significant
+
+
+def _check(check: Check, after: Check | None) -> dict[str, Any]:
+    return {
+        "name": sentence(check.name),
+        "sentence": check.sentence,
+        "p": p_words(check.p_value),
+        "fails": check.significant,
+        "p_after": UNDEFINED if after is None else p_words(after.p_value),
+        "fails_after": _fails(after),
+        "sentence_after": after.sentence if after is not None and after.significant else "",
+    }
+
+
+def _bounds(finding: Finding) -> list[dict[str, Any]]:
+    """Upper bounds by cause, in the order given; causes without any bound last."""
+    groups = []
+    for name in dict.fromkeys(bound.name for bound in finding.upper_bounds):
+        effect = effect_of(name, finding.extended)
+        rows = [
+            {
+                "name": bound.parameter,
+                "words": sentence(parameter_words(bound.parameter, effect)),
+                "bound": bound_words(bound),
+                "is_known": bound_words(bound).startswith("≤"),
+            }
+            for bound in finding.upper_bounds
+            if bound.name == name
+        ]
+        groups.append({"title": title(name), "rows": rows})
+    return sorted(groups, key=lambda group: not any(row["is_known"] for row in group["rows"]))
+
+
+def _description(description: Description) -> dict[str, Any]:
+    return {
+        "sentences": description.sentences,
+        "formula": description.formula,
+        "size": with_unit(number(description.size), "m/s^2"),
+        "explained": _percent(description.explained),
+    }
+
+
+def _model(finding: Finding) -> dict[str, Any]:
+    added = [title(cause.name) for cause in finding.named]
+    if added:
+        words = f"The model that was given, with {listed(added)} added."
+    else:
+        words = "The model that was given, unchanged: nothing is added to it that has no name."
+    return {
+        "model": finding.model.name,
+        "model_words": words,
+        "effects": listed(title(effect.name) for effect in finding.model.effects),
+        "videos": some(finding.videos),
+        "toml": model_text(finding.extended),
+        "version": __version__,
+    }
+
+
+def _inline(figure: str, index: int) -> Markup:
+    """An SVG element to stand in the page, without its prologue and with names that no other figure has."""
+    start, end = figure.find("<svg"), figure.rfind("</svg>")
+    if start < 0 or end < 0:
+        raise ValueError("a figure must be an SVG element as text.")
+    element = re.sub(r"<metadata>.*?</metadata>", "", figure[start : end + len("</svg>")], flags=re.DOTALL)
+    element = re.sub(r'(\bid="|\bhref="#|url\(#)', rf"\g<1>figure{index}-", element)
+    return Markup(element)

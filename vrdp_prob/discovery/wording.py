@@ -1,0 +1,136 @@
+"""Numbers of a finding as a physicist reads them: rounded to what they mean, with their units."""
+
+import math
+from collections.abc import Iterable
+
+from vrdp_prob.discovery.finding import Estimate, Gain, UpperBound
+from vrdp_prob.models.effects.effect import Effect
+from vrdp_prob.models.model_file import known_effects
+from vrdp_prob.models.physics import PhysicsModel
+from vrdp_prob.report.wording import percent
+
+UNDEFINED = "\N{EN DASH}"
+"""Stands where a number is not defined."""
+MINUS = "\N{MINUS SIGN}"
+TIMES = " \N{MULTIPLICATION SIGN} "
+PLAIN_FROM, PLAIN_TO = 1e-4, 1e5
+"""Sizes that are written without a power of ten."""
+SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+UNIT_POWERS = {"^2": "²", "^3": "³"}
+
+
+def number(value: float, precision: float | None = None, *, beside: float = 0.0) -> str:
+    """A number with two digits of a precision, or of its own size.
+
+    Parameters
+    ----------
+    value
+        The number.
+    precision
+        What tells how many digits mean something, for example the standard deviation; the number itself by default.
+    beside
+        Largest number that stands beside this one, in the same power of ten.
+    """
+    if math.isnan(value):
+        return UNDEFINED
+    if math.isinf(value):
+        return "∞" if value > 0 else f"{MINUS}∞"
+    finest = precision if precision and math.isfinite(precision) else abs(value)
+    largest = max(abs(value), finest, beside)
+    if largest == 0:
+        return "0"
+    power = 0 if PLAIN_FROM <= largest < PLAIN_TO else math.floor(math.log10(largest))
+    places = max(1 - math.floor(math.log10(finest)) + power, 0)
+    text = f"{value / 10.0**power:.{places}f}"
+    if float(text) == 0:
+        text = text.removeprefix("-")
+    return text.replace("-", MINUS) + (TIMES + _power_of_ten(power) if power else "")
+
+
+def signed(value: float, precision: float | None = None) -> str:
+    """A difference, with its sign."""
+    return f"+{number(value, precision)}" if value > 0 else number(value, precision)
+
+
+def with_unit(text: str, unit: str) -> str:
+    """A number with its unit, which is left out where it is 1."""
+    return text if unit == "1" or text == UNDEFINED else f"{text} {unit_words(unit)}"
+
+
+def unit_words(unit: str) -> str:
+    """A unit with its powers raised: `m/s^2` as `m/s²`."""
+    for plain, raised in UNIT_POWERS.items():
+        unit = unit.replace(plain, raised)
+    return unit
+
+
+def estimate_words(estimate: Estimate) -> tuple[str, str]:
+    """The mean with its unit, and the 95 % interval."""
+    precision, values = (estimate.q975 - estimate.q025) / 4, (estimate.mean, estimate.q025, estimate.q975)
+    largest = max((abs(value) for value in values if math.isfinite(value)), default=0.0)
+    mean, low, high = (number(value, precision, beside=largest) for value in values)
+    return with_unit(mean, estimate.unit), f"{low} to {high}"
+
+
+def difference_words(gain: Gain) -> str:
+    """The elpd difference with its standard error: `+231 ± 24`."""
+    return f"{signed(gain.elpd_difference, gain.elpd_se)} ± {number(gain.elpd_se)}"
+
+
+def bound_words(bound: UpperBound) -> str:
+    """An upper bound with its unit, or that there is none."""
+    if bound.bound is None or not math.isfinite(bound.bound):
+        return "no bound"
+    digits, times, power = number(bound.bound, bound.bound / 10).partition(TIMES)
+    if "." in digits:
+        digits = digits.rstrip("0").rstrip(".")
+    return f"≤ {with_unit(digits + times + power, bound.unit)}"
+
+
+def chance(probability: float) -> str:
+    """A probability in per cent, never certain."""
+    return percent(min(max(probability, 1e-6), 1 - 1e-6))
+
+
+def p_words(p_value: float) -> str:
+    """A p-value: two digits, and a power of ten where it is small."""
+    if not 0 <= p_value <= 1:
+        return UNDEFINED
+    if p_value == 0:
+        return "< 0.001"
+    if p_value >= 0.001:
+        return f"{p_value:.2g}"
+    digit, power = f"{p_value:.0e}".split("e")
+    return digit + TIMES + _power_of_ten(int(power))
+
+
+def length_unit(lengths: Iterable[float]) -> tuple[float, str]:
+    """Unit in which some lengths (m) are well read, as its factor and its name."""
+    largest = max((length for length in lengths if math.isfinite(length)), default=0.0)
+    return next(
+        (unit for unit in ((1.0, "m"), (1e3, "mm")) if largest * unit[0] >= 1 or largest == 0),
+        (1e6, "µm"),
+    )
+
+
+def title(name: str) -> str:
+    """Name of a cause or parameter as words."""
+    return name.replace("_", " ")
+
+
+def effect_of(name: str, model: PhysicsModel) -> Effect | type[Effect] | None:
+    """The effect of a name, of a model or the catalogue; None for a stranger."""
+    own = next((effect for effect in model.effects if effect.name == name), None)
+    return own if own is not None else known_effects().get(name)
+
+
+def parameter_words(name: str, effect: Effect | type[Effect] | None) -> str:
+    """What a parameter is; one of a single thing, `ratio[metal]`, with that thing."""
+    plain, _, which = name.partition("[")
+    stated = () if effect is None else effect.parameters
+    described = next((parameter.description for parameter in stated if parameter.name == plain), title(plain))
+    return f"{described} ({which.removesuffix(']')})" if which else described
+
+
+def _power_of_ten(power: int) -> str:
+    return f"10{str(power).translate(SUPERSCRIPTS)}"

@@ -5,12 +5,14 @@ Exit code 0: done; 2: input that cannot be used (one line says what, where, and 
 
 import json
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from vrdp_prob import __version__
+from vrdp_prob.command_inputs import model_at, questions_of, scene_range, videos_at
 from vrdp_prob.command_options import (
     CameraOption,
     CheckpointFolder,
@@ -23,20 +25,24 @@ from vrdp_prob.command_options import (
     Seed,
     Video,
 )
-from vrdp_prob.datasets import load, load_all, read_questions, video_files, video_names
+from vrdp_prob.datasets import load, load_all, video_files, video_names
+from vrdp_prob.discovery.checking import check_video_count
+from vrdp_prob.discovery.discover import discover
+from vrdp_prob.discovery.document import to_document as finding_document
+from vrdp_prob.discovery.document import write_finding
+from vrdp_prob.discovery.summary import lines as finding_lines
 from vrdp_prob.errors import InputError
 from vrdp_prob.evaluation import evaluate
 from vrdp_prob.evaluation.document import table, to_document, write_evaluation
 from vrdp_prob.files import check_writable
-from vrdp_prob.inference import check_options, default_model
-from vrdp_prob.models.physics import PhysicsModel
+from vrdp_prob.inference import OPTIONS, check_options, default_model
 from vrdp_prob.models.simulator.rollout import compile_model
 from vrdp_prob.progress import progress_display
 from vrdp_prob.reasoning import ask, infer
 from vrdp_prob.reasoning.adaptive import check_mc_error
 from vrdp_prob.reasoning.checking import check_question
 from vrdp_prob.report.answer_lines import answer_lines
-from vrdp_prob.report.pipeline import Report, check_questions
+from vrdp_prob.report.pipeline import Report
 from vrdp_prob.report.pipeline import report as write_report
 from vrdp_prob.scene import Choice, Question
 
@@ -45,6 +51,8 @@ FAILURE = 1
 INTERRUPTED = 130
 """What the command-line library makes of Ctrl-C."""
 DEFAULT_SAMPLER = "emcee"
+SAMPLER_OF_FITS = "laplace"
+"""What comes nearest to what discovery does."""
 
 app = typer.Typer(
     add_completion=False,
@@ -95,9 +103,9 @@ def report(
     check_writable(out)
     if checkpoint is not None:
         check_writable(checkpoint)
-    physics = _model(model)
+    physics = model_at(model)
     names = [name for name in video_names(path) if video in (None, name)]
-    asked = {name: [] for name in names} if questions is None else _questions_of(questions, names)
+    asked = {name: [] for name in names} if questions is None else questions_of(questions, names)
     videos = load_all(path, videos=None if video is None else [video], camera=camera, progress=progress)
     files = video_files(path)
     for tracks in videos:
@@ -152,7 +160,7 @@ def ask_question(
         check_mc_error(mc_error)
     if checkpoint is not None:
         check_writable(checkpoint)
-    physics = _model(model)
+    physics = model_at(model)
     check_question(asked)
     tracks = load(path, video=video, camera=camera, progress=progress)
     check_question(asked, tracks=tracks)
@@ -173,6 +181,43 @@ def ask_question(
         print(json.dumps({**answer.to_document(), **told}, allow_nan=False))
     else:
         print("\n".join([*answer_lines(answer), *(explanation.sentences if explanation is not None else ())]))
+
+
+@app.command(name="discover")
+def discover_causes(
+    folder: Annotated[
+        Path, typer.Argument(metavar="FOLDER", help="A tracks folder, or a folder of annotations or videos.")
+    ],
+    *,
+    out: Annotated[Path, typer.Option(metavar="DIR", help="Folder of the finding.")] = Path("vrdp-prob-finding"),
+    as_json: Annotated[bool, typer.Option("--json", help="One JSON document on standard output.")] = False,
+    camera: CameraOption = None,
+    model: Model = None,
+    sampler: Annotated[
+        str,
+        typer.Option(
+            metavar="|".join(OPTIONS["sampler"]), help="Of no effect here: causes are compared by fits, without draws."
+        ),
+    ] = SAMPLER_OF_FITS,
+    seed: Seed = 0,
+    quiet: Quiet = False,
+) -> None:
+    """Find what the simulation gets wrong: finding.html, finding.json and the extended model.toml."""
+    progress = progress_display(quiet=quiet)
+    check_options(sampler=sampler)
+    check_writable(out)
+    physics = model_at(model)
+    check_video_count(video_names(folder), source=folder)
+    videos = load_all(folder, camera=camera, progress=progress)
+    finding = discover(videos, model=physics, seed=seed, progress=progress)
+    if sampler != SAMPLER_OF_FITS:
+        note = f"Causes are compared by fits, without draws: --sampler {sampler} changed nothing."
+        finding = replace(finding, notes=(*finding.notes, note))
+    files = write_finding(finding, out)
+    if as_json:
+        print(json.dumps(finding_document(finding, model=files.model), allow_nan=False))
+    elif not quiet:
+        print("\n".join([*finding_lines(finding), *(str(file) for file in files)]))
 
 
 @app.command(name="evaluate")
@@ -207,10 +252,10 @@ def evaluate_answers(
     evaluation = evaluate(
         folder,
         questions,
-        scenes=None if scenes is None else _range(scenes),
+        scenes=None if scenes is None else scene_range(scenes),
         source=source,
         camera=camera,
-        model=_model(model),
+        model=model_at(model),
         sampler=sampler,
         seed=seed,
         out=out,
@@ -257,7 +302,7 @@ def calibrate_camera(
 
     progress = progress_display(quiet=quiet)
     check_writable(out.parent)
-    files = {name: file for path in videos for name, file in _videos_at(path).items()}
+    files = {name: file for path in videos for name, file in videos_at(path).items()}
     known = {tracks.video: tracks for tracks in load_all(positions)}
     unknown = sorted(set(files) - set(known))
     if unknown:
@@ -271,7 +316,7 @@ def calibrate_camera(
 @app.command(name="compile")
 def compile_simulator(model: Model = None) -> None:
     """Compile the simulator now, once per machine, rather than in the first run."""
-    compile_model(default_model() if model is None else _model(model))
+    compile_model(default_model() if model is None else model_at(model))
 
 
 def demo_folder() -> Path:
@@ -325,44 +370,6 @@ def _interrupted() -> int:
 def _refuse(message: str) -> int:
     print(f"vrdp-prob: {' '.join(message.split())}", file=sys.stderr)
     return UNUSABLE_INPUT
-
-
-def _range(text: str) -> tuple[int, int]:
-    """Scenes A to B-1, written A:B."""
-    first, colon, end = text.partition(":")
-    if not colon or not first.isdecimal() or not end.isdecimal() or int(first) >= int(end):
-        raise InputError(f"--scenes is '{text}'; give A:B with A below B, for example 0:30.")
-    return int(first), int(end)
-
-
-def _model(path: Path | None) -> PhysicsModel | None:
-    return None if path is None else PhysicsModel.read(path)
-
-
-def _questions_of(path: Path, names: list[str]) -> dict[str, list[Question]]:
-    """The questions about each video, understood as far as that goes before the video is looked at."""
-    asked = read_questions(path)
-    for name in names:
-        if name not in asked:
-            raise InputError(
-                f"{path}: there is no question about {name}; "
-                "the stem of a scene's 'video_filename' must be the name of the video."
-            )
-        try:
-            check_questions(asked[name])
-        except InputError as error:
-            raise InputError(f"{path}, {name}, {error}") from error
-    return asked
-
-
-def _videos_at(path: Path) -> dict[str, Path]:
-    video_names(path)  # refuses a path at which there is nothing
-    files = video_files(path)
-    if not files:
-        raise InputError(
-            f"{path}: a tracks folder or an annotation is no video; name the videos, and give this with --positions."
-        )
-    return files
 
 
 def _tell(written: Report) -> None:

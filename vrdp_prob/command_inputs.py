@@ -1,0 +1,49 @@
+"""What commands read before their work, and the refusals that come with it."""
+
+from pathlib import Path
+
+from vrdp_prob.datasets import read_questions, video_files, video_names
+from vrdp_prob.errors import InputError
+from vrdp_prob.models.physics import PhysicsModel
+from vrdp_prob.report.pipeline import check_questions
+from vrdp_prob.scene import Question
+
+
+def scene_range(text: str) -> tuple[int, int]:
+    """Scenes A to B-1, written A:B."""
+    first, colon, end = text.partition(":")
+    if not colon or not first.isdecimal() or not end.isdecimal() or int(first) >= int(end):
+        raise InputError(f"--scenes is '{text}'; give A:B with A below B, for example 0:30.")
+    return int(first), int(end)
+
+
+def model_at(path: Path | None) -> PhysicsModel | None:
+    """The model of a file, None where none is named."""
+    return None if path is None else PhysicsModel.read(path)
+
+
+def questions_of(path: Path, names: list[str]) -> dict[str, list[Question]]:
+    """The questions about each video, understood as far as that goes before the video is looked at."""
+    asked = read_questions(path)
+    for name in names:
+        if name not in asked:
+            raise InputError(
+                f"{path}: there is no question about {name}; "
+                "the stem of a scene's 'video_filename' must be the name of the video."
+            )
+        try:
+            check_questions(asked[name])
+        except InputError as error:
+            raise InputError(f"{path}, {name}, {error}") from error
+    return asked
+
+
+def videos_at(path: Path) -> dict[str, Path]:
+    """The video files of a path by their name."""
+    video_names(path)  # refuses a path at which there is nothing
+    files = video_files(path)
+    if not files:
+        raise InputError(
+            f"{path}: a tracks folder or an annotation is no video; name the videos, and give this with --positions."
+        )
+    return files

@@ -1,0 +1,33 @@
+"""What discovery refuses before any work."""
+
+from collections.abc import Collection
+from pathlib import Path
+
+from vrdp_prob.errors import InputError
+
+FEWEST_VIDEOS = 3
+"""Videos without which a gain has no uncertainty: each is predicted from the others, and the spread is over videos."""
+
+
+def check_video_count(videos: Collection[object], *, source: Path | str = "discovery") -> None:
+    """Refuse too few videos.
+
+    Parameters
+    ----------
+    videos
+        The videos, or their names.
+    source
+        Where they come from, for the message.
+
+    Raises
+    ------
+    InputError
+        If there are fewer than three.
+    """
+    count = len(videos)
+    if count < FEWEST_VIDEOS:
+        there_are = "is 1 video" if count == 1 else f"are {count} videos"
+        raise InputError(
+            f"{source}: there {there_are}; what a cause is worth is measured by leaving out whole videos, so give at "
+            f"least {FEWEST_VIDEOS} of the same table."
+        )

@@ -27,7 +27,7 @@ SPIN_CHANGE = "Spin after a contact, against its normal impulse"
 
 
 def held_out(millimetres: float, coverage: tuple[float, float]) -> HeldOut:
-    """A prediction whose error, beyond a noise of 3 mm, is half as large at one second and doubled at the end."""
+    """A prediction whose error, beyond a noise of 3 mm, is half as large one second ahead and doubled at the end."""
     excess = (millimetres**2 - 9.0) ** 0.5
     return HeldOut(
         millimetres / 1000, *(float(np.hypot(3.0, factor * excess)) / 1000 for factor in (0.5, 2.0)), *coverage

@@ -112,7 +112,7 @@ def test_the_unknown_is_marked_as_a_description():
     text = text_of(render(unknown()))
     assert "A description, not a cause" in text
     assert "a_x = 0.041 sin(6.2 t) - 0.11 v_y" in text
-    assert "follows 61 % of its variance in held-out videos" in text
+    assert "follows 61 % of its variance in videos that were left out" in text
     assert "A description, not a cause" in text_of(render(with_a_rest()))
 
 

@@ -1,4 +1,4 @@
-"""Geometry of the figures of a gain: held-out error before and after, and the elpd difference of every video."""
+"""Geometry of the figures of a gain: error in left-out videos before and after, and elpd differences by video."""
 
 import math
 from collections import Counter
@@ -9,7 +9,7 @@ from vrdp_prob.discovery.finding import FoundCause, Gain
 from vrdp_prob.discovery.wording import length_unit, number, signed, title
 from vrdp_prob.report.axes import Axis, linear_axis, size_axis
 
-STRETCHES = {"rmse": "whole video", "rmse_one_second": "after 1 s", "rmse_end": "last frames"}
+STRETCHES = {"rmse": "all frames", "rmse_one_second": "1 s ahead", "rmse_end": "last frames"}
 """Where errors are told of, by the name of their field."""
 MOST_ROWS = 20
 """Videos that have a row each; more are stacked."""

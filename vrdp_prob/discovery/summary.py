@@ -42,7 +42,7 @@ def summary(finding: Finding) -> list[str]:
         told.append(_others(others, beside=finding.named))
     told += [f"{sentence(line)}." for line in (_checks(finding), _rest(finding)) if line]
     if finding.verdict is Verdict.NONE:
-        told.append("No cause of the catalogue predicts videos that were not fitted better.")
+        told.append("No cause of the catalogue predicts videos that are left out better.")
     return told
 
 
@@ -55,7 +55,7 @@ def lines(finding: Finding) -> list[str]:
     """The finding as lines of text for a terminal."""
     told = [verdict_sentence(finding)]
     for cause in finding.named:
-        told.append(f"  {title(cause.name)}: probability {chance(cause.probability)}, {_gain_line(cause.gain)}")
+        told.append(f"  {title(cause.name)}: probability {chance(cause.probability)}; {_gain_line(cause.gain)}")
         for name, estimate in cause.parameters.items():
             mean, interval = estimate_words(estimate)
             told.append(f"      {title(name)} {mean} (95 %: {interval})")
@@ -95,14 +95,12 @@ def _gains(causes: Sequence[FoundCause]) -> str:
         what = "" if parts else " takes the error of predicted positions"
         parts.append(f"{title(cause.name)}{what} from {before} to {after} {unit}")
     *_, noise, unit = errors_words(causes[-1].gain)
-    return f"In videos that were not fitted, {listed(parts)}; the measurement noise is {noise} {unit}."
+    return f"In videos that were left out, {listed(parts)}; the measurement noise is {noise} {unit}."
 
 
 def _gain_line(gain: Gain) -> str:
     before, after, noise, unit = errors_words(gain)
-    return (
-        f"held-out log density {difference_words(gain)} nats, error {before} to {after} {unit} (noise {noise} {unit})"
-    )
+    return f"left-out videos: {difference_words(gain)} nats, error {before} to {after} {unit} (noise {noise} {unit})"
 
 
 def _others(others: Sequence[FoundCause], *, beside: Sequence[FoundCause]) -> str:
@@ -139,5 +137,5 @@ def _rest(finding: Finding) -> str:
     size = with_unit(number(finding.description.size), "m/s^2")
     return (
         f"the missing acceleration is {size} on average (root mean square); a formula that describes it, without "
-        f"saying why, explains {chance(finding.description.explained)} of it in held-out videos"
+        f"saying why, explains {chance(finding.description.explained)} of it in videos that were left out"
     )

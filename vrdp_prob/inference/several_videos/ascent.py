@@ -13,7 +13,7 @@ import torch
 from jaxtyping import Bool, Float
 from scipy.optimize import minimize
 
-from vrdp_prob.inference.least_squares import minimise_all
+from vrdp_prob.inference.least_squares import minimise
 from vrdp_prob.inference.noise_fit import NOISE_FIELDS, best_noise
 from vrdp_prob.inference.parallel import in_parallel
 from vrdp_prob.inference.several_videos.arrow import Expansions, grown
@@ -22,14 +22,23 @@ from vrdp_prob.inference.several_videos.linking import LinkedVideo, SharedNumber
 
 SHARES = (1.0, 0.3, 0.1, 0.02)
 """Shares of a step that are tried until one goes up."""
-ROUNDS = 20
+LOCAL_SHARES = (1.0, 0.3, 0.0)
+"""Shares of a video's own Newton step that are tried."""
+ENOUGH = 0.3
+"""Share of the expected gain with which a step is taken as it is."""
+STEEP = 5.0
+"""Gain (nats) that its own step promises a video which has just looked for its best own numbers, from which on it is
+taken to be at an edge: where two orders of events meet, or a contact just happens."""
+ROUNDS = 12
 LOCAL_ITERATIONS = 10
+LONG = 60
+"""Steps that a video may take after all others have converged."""
 LOCAL_TOLERANCE = 0.02
 """Gain (nats) of a step of one video's own numbers at which it has converged."""
-TOLERANCE = 0.05
-"""Gain (nats) of a round below which the search has converged..."""
+TOLERANCE = 0.5
+"""Gain (nats) of a step, by what is expected of it, below which the search has converged."""
 EXPECTED = 1.0
-"""...if no more than this was expected of it."""
+"""The same where no step goes up."""
 SUSPICIOUS_LOSS = 3.0
 """Loss (nats) of one video under a step from which on it also begins where it was."""
 
@@ -82,28 +91,44 @@ def climb(
         If a video has no world at the start.
     """
     ascent = _Ascent(numbers, tuple(videos))
-    state = ascent.settled(shared, [[one] for one in locals_], None)
+    state = ascent.settled(shared, locals_, None)
     if not np.isfinite(ascent.total(state)):
         raise ImpossibleStartError
     if towards is not None and not np.array_equal(towards, shared):
         state = ascent.stepped(state, ascent.slopes(state), towards - shared) or state
     state = ascent.with_best_noise(state)
-    converged = False
     for _ in range(ROUNDS):
         slopes = ascent.slopes(state)
-        moved = ascent.stepped(state, slopes, np.where(ascent.noise, 0.0, slopes.shared_step))
+        inside = _inside(slopes)
+        smooth = _of(slopes, inside)
+        converged = smooth.expected_gain < TOLERANCE
+        if converged:
+            break
+        moved = ascent.stepped(state, slopes, np.where(ascent.noise, 0.0, smooth.shared_step))
         if moved is None:
-            converged = slopes.expected_gain < EXPECTED
+            converged = smooth.expected_gain < EXPECTED
             break
-        moved = ascent.with_best_noise(moved)
-        gain = ascent.total(moved) - ascent.total(state)
-        state = moved
-        if gain < TOLERANCE:
-            converged = slopes.expected_gain < EXPECTED
-            break
+        state = ascent.with_best_noise(moved)
+    if not inside.all():
+        state = ascent.settled(state.shared, state.locals, state, iterations=LONG, chosen=~inside)
     slopes = ascent.slopes(state, central=True)
     gaussian = slopes.gaussian(state.shared, state.locals, numbers.logarithms)
     return JointFit(numbers, tuple(videos), gaussian, ascent.total(state), converged)
+
+
+def _inside(slopes: Expansions) -> Bool[np.ndarray, "video"]:
+    """Which videos are at a smooth maximum of their own numbers, more or less.
+
+    Others are at an edge or in a narrow bend, and what they say there of the shared numbers is not to be believed.
+    """
+    promised = [-float(one.local_gradient @ one.local_step) / 2 for one in slopes.videos]
+    inside = np.array([gain < STEEP for gain in promised])
+    return inside if inside.any() else np.ones(len(inside), dtype=bool)
+
+
+def _of(slopes: Expansions, chosen: Bool[np.ndarray, "video"]) -> Expansions:
+    """The expansion of some of the videos."""
+    return Expansions(slopes.prior, tuple(one for one, used in zip(slopes.videos, chosen, strict=True) if used))
 
 
 @dataclass(frozen=True)
@@ -118,9 +143,12 @@ class _Ascent:
         """Which of the shared numbers are noise scales."""
         return np.array([field in NOISE_FIELDS for field, _ in self.numbers.keys], dtype=bool)
 
-    def total(self, state: State) -> float:
-        """Joint log posterior."""
-        return float(self.numbers.log_prior(state.shared[None])[0]) + sum(state.values)
+    def total(self, state: State, chosen: Bool[np.ndarray, "video"] | None = None) -> float:
+        """Joint log posterior (of some of the videos)."""
+        values = np.array(state.values)
+        return float(self.numbers.log_prior(state.shared[None])[0]) + float(
+            values.sum() if chosen is None else values[chosen].sum()
+        )
 
     def slopes(self, state: State, *, central: bool = False) -> Expansions:
         """Expansion of the density."""
@@ -132,11 +160,17 @@ class _Ascent:
         return Expansions(expand_prior(self.numbers, state.shared), tuple(found))  # type: ignore[arg-type]
 
     def stepped(self, state: State, slopes: Expansions, step: Float[np.ndarray, "shared"]) -> State | None:
-        """The state after the largest share of a step of the shared numbers that goes up; None where none does."""
+        """A state further up along a step of the shared numbers; None where no share of it goes up.
+
+        Videos follow by their expansions alone where that brings about what was expected, else they search.
+        """
+        straight = self._straight(state, slopes, step)
+        if self.total(straight) - self.total(state) > ENOUGH * slopes.expected_gain:
+            return straight
         for share in SHARES:
             departure = grown(share * step, self.numbers.logarithms)
             starts = [
-                [own + one.slope @ departure + one.local_step]
+                own + one.slope @ departure + one.local_step
                 for own, one in zip(state.locals, slopes.videos, strict=True)
             ]
             moved = self.settled(state.shared + share * step, starts, state)
@@ -144,19 +178,45 @@ class _Ascent:
                 return moved
         return None
 
+    def _straight(self, state: State, slopes: Expansions, step: Float[np.ndarray, "shared"]) -> State:
+        """The best state on the way of a step where each video takes a share of its own Newton step."""
+        shares = np.array(SHARES)
+        shared = state.shared + shares[:, None] * step
+        departures = grown(shares[:, None] * step, self.numbers.logarithms)
+
+        def one(index: int) -> tuple[Float[np.ndarray, "share local"], Float[np.ndarray, "share"]]:
+            slope = slopes.videos[index]
+            own = np.array(LOCAL_SHARES)[:, None] * slope.local_step
+            starts = state.locals[index] + (departures @ slope.slope.T)[:, None] + own
+            repeated = np.repeat(shared, len(LOCAL_SHARES), axis=0)
+            found = self.videos[index].log_density(repeated, starts.reshape(len(repeated), -1))
+            found = found.reshape(len(shares), -1)
+            best = found.argmax(axis=1)
+            return starts[np.arange(len(shares)), best], found.max(axis=1)
+
+        found = in_parallel(one, range(len(self.videos)))
+        totals = self.numbers.log_prior(shared) + np.sum([values for _, values in found], axis=0)
+        best = int(np.argmax(np.where(np.isfinite(totals), totals, -np.inf)))
+        return State(shared[best], tuple(own[best] for own, _ in found), tuple(float(v[best]) for _, v in found))
+
     def settled(
         self,
         shared: Float[np.ndarray, "shared"],
-        starts: Sequence[Sequence[Float[np.ndarray, "_"]]],
+        starts: Sequence[Float[np.ndarray, "_"]],
         before: State | None,
+        *,
+        iterations: int = LOCAL_ITERATIONS,
+        chosen: Bool[np.ndarray, "video"] | None = None,
     ) -> State:
-        """The state with given shared numbers where every video looks for its own best numbers."""
+        """The state with given shared numbers where every video (or some) looks for its own best numbers."""
 
         def one(index: int) -> tuple[Float[np.ndarray, "_"], float]:
             video = self.videos[index]
-            found = _settled(video, shared, starts[index])
+            if chosen is not None and before is not None and not chosen[index]:
+                return before.locals[index], before.values[index]
+            found = _settled(video, shared, starts[index], iterations)
             if before is not None and not found[1] > before.values[index] - SUSPICIOUS_LOSS:
-                found = max(found, _settled(video, shared, [before.locals[index]]), key=lambda pair: pair[1])
+                found = max(found, _settled(video, shared, before.locals[index], iterations), key=lambda pair: pair[1])
             return found
 
         found = in_parallel(one, range(len(self.videos)))
@@ -196,25 +256,22 @@ class _Ascent:
 
 
 def _settled(
-    video: LinkedVideo, shared: Float[np.ndarray, "shared"], starts: Sequence[Float[np.ndarray, "local"]]
+    video: LinkedVideo, shared: Float[np.ndarray, "shared"], start: Float[np.ndarray, "local"], iterations: int
 ) -> tuple[Float[np.ndarray, "local"], float]:
-    """Best own numbers of a video for given shared ones, from several starts, and its log density there."""
+    """Best own numbers of a video for given shared ones, and its log density there."""
     coordinates = video.likelihood.coordinates
     own = np.zeros(len(coordinates), dtype=bool)
     own[video.local_places] = True
     noise = coordinates.mask(NOISE_FIELDS)
-    minima = minimise_all(
+    point = minimise(
         video.data.residuals,
-        video.points(shared, np.array(starts)),
+        video.points(shared, start),
         video.data.coordinates.scale,
         active=own & ~noise,
-        iterations=LOCAL_ITERATIONS,
+        iterations=iterations,
         tolerance=LOCAL_TOLERANCE,
-    )
-    points = [one.point for one in minima]
+    ).point
     if (own & noise).any():
-        points = [best_noise(video.data, point, own & noise) for point in points]
-    locals_ = np.array([video.split(point)[1] for point in points])
-    values = video.log_density(np.tile(shared, (len(locals_), 1)), locals_)
-    best = int(np.argmax(values))
-    return locals_[best], float(values[best])
+        point = best_noise(video.data, point, own & noise)
+    local = video.split(point)[1]
+    return local, video.value(shared, local)

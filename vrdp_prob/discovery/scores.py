@@ -82,6 +82,11 @@ class CauseScore:
     p_value: float
     sd: Mapping[str, float]
 
+    @property
+    def size(self) -> float:
+        """Twice the gain (nats) in log density that the cause promises, over all places where it is clear."""
+        return max(self.chi_square, sum(site.chi_square for site in self.sites))
+
 
 def happens_once(effect: Effect) -> bool:
     """Whether an effect happens at one time in one video, so that its parameters are not those of other videos."""

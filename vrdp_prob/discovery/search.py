@@ -1,7 +1,7 @@
 """Forward selection of causes by how well whole videos are predicted that the model was not fitted to."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -12,15 +12,17 @@ from vrdp_prob.discovery.trials import Trial, gain
 from vrdp_prob.inference.parallel import in_parallel
 from vrdp_prob.inference.several_videos.fitting import SharedFit
 from vrdp_prob.models.effects.effect import Effect
+from vrdp_prob.models.effects.external_impulse import ExternalImpulse
 from vrdp_prob.progress import ProgressDisplay, SilentProgress
 
 SHORTLIST_LEVEL = 0.01
-"""Causes whose score chance makes as large more often are not refitted..."""
-MOST_REFITTED = 6
-"""...nor more of them than this in one step."""
+"""Causes whose score chance makes as large more often are not refitted."""
+HOPEFUL = 0.2
+"""Share of the largest statistic below which a cause cannot be the best one, nor a rival of it."""
+MOST_REFITTED, MOST_RIVALS = 5, 2
 MOST_CAUSES = 5
 FALSE_ALARM = 0.05
-"""Prior probability that the model lacks anything that is not there, shared by all causes."""
+"""Prior odds that the model lacks something; all causes of the catalogue share them alike."""
 
 
 @dataclass(frozen=True)
@@ -30,9 +32,9 @@ class Step:
     Parameters
     ----------
     scores
-        Scores of all causes before the step.
+        Scores of all causes before the step, the least probable by chance first.
     tried
-        Refits, the best first.
+        Refits with one more cause, the best first.
     """
 
     scores: tuple[CauseScore, ...]
@@ -51,17 +53,20 @@ class Search:
         The model with every cause that was found.
     steps
         The steps, the last of which added nothing.
-    rivals
-        For each cause of `best` by name: models of the same size in which another cause takes its place.
     lesser
-        For each cause of `best` by name: the model without it.
+        For each cause of `best`: the model without it.
+    rivals
+        For each cause of `best`: models in which another cause takes its place, as far as any came close.
+    needed
+        Gain (nats) in the predictive density that a cause must bring.
     """
 
     base: Trial
     best: Trial
     steps: tuple[Step, ...]
-    rivals: dict[str, list[Trial]] = field(default_factory=dict)
-    lesser: dict[str, Trial] = field(default_factory=dict)
+    lesser: tuple[Trial, ...]
+    rivals: tuple[tuple[Trial, ...], ...]
+    needed: float
 
 
 def search(
@@ -80,41 +85,86 @@ def search(
     progress
         Told how far the work is.
     """
-    base = best = Trial((), fit)
     needed = float(np.log(len(catalogue) / FALSE_ALARM))
-    steps: list[Step] = []
-    while len(best.causes) < MOST_CAUSES:
-        left = [effect for effect in catalogue if effect.name not in best.names]
-        step = _step(best, left, seed, progress, len(steps))
-        steps.append(step)
-        if not step.tried or gain(step.tried[0], best)[0] < needed:
-            break
-        best = step.tried[0]
-    lesser = {one.name: best.without(one) for one in best.causes} if len(best.causes) > 1 else {}
-    lesser |= {one.name: base for one in best.causes[:1] if len(best.causes) == 1}
-    return Search(base, best, tuple(steps), _rivals(best, steps, lesser), lesser)
+    with (progress or SilentProgress()).stage("Trying causes", total=None) as advance:
+        searcher = _Searcher(tuple(catalogue), seed, needed, advance)
+        chain, steps = [Trial((), fit)], [searcher.first(Trial((), fit))]
+        while len(chain) <= MOST_CAUSES:
+            step = steps[-1] = searcher.tried(chain[-1], steps[-1])
+            if not step.tried or gain(step.tried[0], chain[-1])[0] < needed:
+                break
+            winner = step.tried[0]
+            without = winner.without(winner.causes[-1])
+            if gain(without, chain[-1])[0] > needed:
+                # The refit has found a better course of events, which is no merit of the cause.
+                chain[-1], steps[-1] = without, searcher.first(without)
+                continue
+            chain.append(winner)
+            steps.append(searcher.first(winner))
+        best = chain[-1]
+        lesser = [best.without(cause) for cause in best.causes[:-1]] + chain[-2:-1]
+        rivals = [searcher.rivals(best, number, steps[number], one) for number, one in enumerate(lesser)]
+    return Search(chain[0], best, tuple(steps), tuple(lesser), tuple(rivals), needed)
 
 
-def _step(best: Trial, catalogue: Sequence[Effect], seed: int, progress: ProgressDisplay | None, number: int) -> Step:
-    linear = LinearFit.of(best.fit)
-    scores = score_causes(best.fit, linear, catalogue, seed=seed)
-    shortlist = [one for one in scores if one.p_value < SHORTLIST_LEVEL][:MOST_REFITTED]
-    if shortlist:
-        shortlist += proposals(best.fit, scores, catalogue)
-    label = "Trying causes" if number == 0 else f"Trying further causes ({number + 1})"
-    with (progress or SilentProgress()).stage(label, total=len(shortlist)) as advance:
+@dataclass(frozen=True)
+class _Searcher:
+    """What is looked for."""
 
-        def tried(score: CauseScore) -> Trial | None:
-            found = best.with_cause(score)
-            advance(1)
+    catalogue: tuple[Effect, ...]
+    seed: int
+    needed: float
+    advance: Callable[[int], None]
+
+    def first(self, trial: Trial) -> Step:
+        """A step in which nothing was tried yet."""
+        left = [effect for effect in self.catalogue if effect.name not in trial.names]
+        return Step(tuple(score_causes(trial.fit, LinearFit.of(trial.fit), left, seed=self.seed)), ())
+
+    def tried(self, trial: Trial, step: Step) -> Step:
+        """The step with the causes tried that may be the best one.
+
+        Hidden things are tried only where nothing else explains that bodies change their velocity all at once.
+        """
+        found = self._refitted(trial, _shortlist(step.scores))
+        if _kicked(step.scores) and (
+            not found or gain(found[0], trial)[0] < self.needed or _kicked(self.first(found[0]).scores)
+        ):
+            hidden = proposals(trial.fit, step.scores, self.catalogue)
+            found += self._refitted(trial, [one for one in hidden if one.effect.name not in trial.names])
+        return Step(step.scores, tuple(sorted(found, key=lambda one: -float(one.log_density.sum()))))
+
+    def rivals(self, best: Trial, number: int, step: Step, lesser: Trial) -> tuple[Trial, ...]:
+        """Models in which another cause takes the place of one, as far as it came close when that one was found."""
+        cause = best.causes[number]
+        others = [one for one in step.tried if one.causes[-1].name not in best.names]
+        if number == len(best.causes) - 1:
+            return tuple(others)
+        gained = gain(next(one for one in step.tried if one.causes[-1].name == cause.name), lesser)[0]
+        close = {one.causes[-1].name for one in others if gain(one, lesser)[0] > HOPEFUL * gained}
+        return tuple(self._refitted(lesser, [one for one in step.scores if one.effect.name in close][:MOST_RIVALS]))
+
+    def _refitted(self, trial: Trial, scores: Sequence[CauseScore]) -> list[Trial]:
+        """Fits with one cause more, the best first."""
+
+        def refit(score: CauseScore) -> Trial | None:
+            found = trial.with_cause(score)
+            if found is not None:
+                _ = found.log_density
+            self.advance(1)
             return found
 
-        trials = [one for one in in_parallel(tried, shortlist) if one is not None]
-    return Step(tuple(scores), tuple(sorted(trials, key=lambda one: -float(one.log_density.sum()))))
+        found = [one for one in in_parallel(refit, scores) if one is not None]
+        return sorted(found, key=lambda one: -float(one.log_density.sum()))
 
 
-def _rivals(best: Trial, steps: Sequence[Step], lesser: dict[str, Trial]) -> dict[str, list[Trial]]:
-    """Models in which another cause takes the place of one."""
-    if len(best.causes) == 1:
-        return {best.causes[0].name: [one for one in steps[0].tried if one is not best]}
-    return {}
+def _shortlist(scores: Sequence[CauseScore]) -> list[CauseScore]:
+    """Causes that may be the best one, or come near it."""
+    largest = max((one.size for one in scores), default=0.0)
+    hopeful = [one for one in scores if one.p_value < SHORTLIST_LEVEL and one.size > HOPEFUL * largest]
+    return sorted(hopeful, key=lambda one: -one.size)[:MOST_REFITTED]
+
+
+def _kicked(scores: Sequence[CauseScore]) -> bool:
+    """Whether some body changes its velocity all at once, by what its residuals say."""
+    return any(isinstance(one.effect, ExternalImpulse) and one.sites for one in scores)

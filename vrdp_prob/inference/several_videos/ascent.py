@@ -32,7 +32,7 @@ taken to be at an edge: where two orders of events meet, or a contact just happe
 ROUNDS = 12
 LOCAL_ITERATIONS = 10
 LONG = 60
-"""Steps that a video may take after all others have converged."""
+"""The same for a video at an edge or in a narrow bend."""
 LOCAL_TOLERANCE = 0.02
 """Gain (nats) of a step of one video's own numbers at which it has converged."""
 TOLERANCE = 0.5
@@ -104,13 +104,13 @@ def climb(
         converged = smooth.expected_gain < TOLERANCE
         if converged:
             break
-        moved = ascent.stepped(state, slopes, np.where(ascent.noise, 0.0, smooth.shared_step))
+        moved = ascent.stepped(state, slopes, np.where(ascent.noise, 0.0, smooth.shared_step), ~inside)
         if moved is None:
             converged = smooth.expected_gain < EXPECTED
             break
-        state = ascent.with_best_noise(moved)
-    if not inside.all():
-        state = ascent.settled(state.shared, state.locals, state, iterations=LONG, chosen=~inside)
+        before, state = ascent.total(state), ascent.with_best_noise(moved)
+        if ascent.total(state) - before < TOLERANCE:
+            break
     slopes = ascent.slopes(state, central=True)
     gaussian = slopes.gaussian(state.shared, state.locals, numbers.logarithms)
     return JointFit(numbers, tuple(videos), gaussian, ascent.total(state), converged)
@@ -159,7 +159,13 @@ class _Ascent:
         found = in_parallel(one, range(len(self.videos)))
         return Expansions(expand_prior(self.numbers, state.shared), tuple(found))  # type: ignore[arg-type]
 
-    def stepped(self, state: State, slopes: Expansions, step: Float[np.ndarray, "shared"]) -> State | None:
+    def stepped(
+        self,
+        state: State,
+        slopes: Expansions,
+        step: Float[np.ndarray, "shared"],
+        edge: Bool[np.ndarray, "video"] | None = None,
+    ) -> State | None:
         """A state further up along a step of the shared numbers; None where no share of it goes up.
 
         Videos follow by their expansions alone where that brings about what was expected, else they search.
@@ -173,7 +179,7 @@ class _Ascent:
                 own + one.slope @ departure + one.local_step
                 for own, one in zip(state.locals, slopes.videos, strict=True)
             ]
-            moved = self.settled(state.shared + share * step, starts, state)
+            moved = self.settled(state.shared + share * step, starts, state, patient=edge)
             if self.total(moved) > self.total(state):
                 return moved
         return None
@@ -205,15 +211,13 @@ class _Ascent:
         starts: Sequence[Float[np.ndarray, "_"]],
         before: State | None,
         *,
-        iterations: int = LOCAL_ITERATIONS,
-        chosen: Bool[np.ndarray, "video"] | None = None,
+        patient: Bool[np.ndarray, "video"] | None = None,
     ) -> State:
-        """The state with given shared numbers where every video (or some) looks for its own best numbers."""
+        """The state with given shared numbers where every video looks for its own best numbers, some for longer."""
 
         def one(index: int) -> tuple[Float[np.ndarray, "_"], float]:
             video = self.videos[index]
-            if chosen is not None and before is not None and not chosen[index]:
-                return before.locals[index], before.values[index]
+            iterations = LONG if patient is not None and patient[index] else LOCAL_ITERATIONS
             found = _settled(video, shared, starts[index], iterations)
             if before is not None and not found[1] > before.values[index] - SUSPICIOUS_LOSS:
                 found = max(found, _settled(video, shared, before.locals[index], iterations), key=lambda pair: pair[1])

@@ -13,6 +13,7 @@ from jaxtyping import Float
 
 from vrdp_prob.inference.parallel import in_parallel
 from vrdp_prob.inference.several_videos.arrow import LOG_TWO_PI, Expansion
+from vrdp_prob.inference.several_videos.ascent import STEEP
 from vrdp_prob.inference.several_videos.fitting import SharedFit
 from vrdp_prob.inference.several_videos.joint_fit import expand, expand_prior
 from vrdp_prob.inference.several_videos.prior_mass import log_prior_constant
@@ -64,7 +65,10 @@ def _cavity(
     entries = video.likelihood.coordinates.entries
     own = video.value(mean, local.centre) + local.log_volume + len(local.centre) * LOG_TWO_PI / 2
     own += log_prior_constant(entries[place] for place in video.local_places)
-    gradient, others = one.reduced_gradient, _definite(total - one.reduced)
+    # Where a video is at an edge between two courses of events its gradient says nothing of what lies beyond.
+    inside = -float(one.local_gradient @ one.local_step) / 2 < STEEP
+    gradient = one.reduced_gradient if inside else np.zeros(len(mean))
+    others = _definite(total - one.reduced)
     covariance = np.linalg.inv(others)
     shift = covariance @ gradient
     volume = (np.linalg.slogdet(others)[1] - np.linalg.slogdet(_definite(total))[1]) / 2

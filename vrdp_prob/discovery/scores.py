@@ -72,6 +72,8 @@ class CauseScore:
         Probability of a statistic as large anywhere if the cause is absent.
     sd
         Standard deviations of the strengths, by the name of the parameter.
+    places
+        Number of bodies or videos among which the sites were chosen.
     """
 
     effect: Effect
@@ -81,6 +83,7 @@ class CauseScore:
     degrees: int
     p_value: float
     sd: Mapping[str, float]
+    places: int = 1
 
     @property
     def size(self) -> float:
@@ -216,4 +219,4 @@ def _scan_once(fit: SharedFit, linear: LinearFit, effect: Effect, generator: np.
     first = sites[order[0]]
     p_value = min(1.0, first.p_value * len(sites))
     clear = tuple(sites[k] for k in order if sites[k].p_value * len(sites) < SITE_LEVEL)
-    return CauseScore(effect, {}, clear, first.chi_square, all_degrees[order[0]], p_value, sds[order[0]])
+    return CauseScore(effect, {}, clear, first.chi_square, all_degrees[order[0]], p_value, sds[order[0]], len(sites))

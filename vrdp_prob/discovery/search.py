@@ -127,12 +127,16 @@ class _Searcher:
         Hidden things are tried only where nothing else explains that bodies change their velocity all at once.
         """
         found = self._refitted(trial, _shortlist(step.scores))
-        if _kicked(step.scores) and (
-            not found or gain(found[0], trial)[0] < self.needed or _kicked(self.first(found[0]).scores)
-        ):
+        if _kicked(step.scores) and not self._smooth(trial, found):
             hidden = proposals(trial.fit, step.scores, self.catalogue)
             found += self._refitted(trial, [one for one in hidden if one.effect.name not in trial.names])
         return Step(step.scores, tuple(sorted(found, key=lambda one: -float(one.log_density.sum()))))
+
+    def _smooth(self, trial: Trial, found: Sequence[Trial]) -> bool:
+        """Whether a cause was found that leaves no sudden change of a velocity, and is not itself one."""
+        if not found or gain(found[0], trial)[0] < self.needed:
+            return False
+        return not isinstance(found[0].causes[-1], ExternalImpulse) and not _kicked(self.first(found[0]).scores)
 
     def rivals(self, best: Trial, number: int, step: Step, lesser: Trial) -> tuple[Trial, ...]:
         """Models in which another cause takes the place of one, as far as it came close when that one was found."""

@@ -1,7 +1,7 @@
 """A model that is tried on all videos: its fit, and how well it predicts each video from the others."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -25,10 +25,13 @@ class Trial:
         What it has beyond the base model, in the order in which it was found.
     fit
         Its fit.
+    choices
+        By the name of a cause: logarithm of the number of places among which its own were chosen, for each video.
     """
 
     causes: tuple[Effect, ...]
     fit: SharedFit
+    choices: Mapping[str, Float[np.ndarray, "video"]] = field(default_factory=dict)
 
     @cached_property
     def cavities(self) -> dict[str, Cavity]:
@@ -37,8 +40,12 @@ class Trial:
 
     @property
     def log_density(self) -> Float[np.ndarray, "video"]:
-        """Log predictive density (nats, up to constants of the tracks) of each video given the others."""
-        return np.array([one.log_density for one in self.cavities.values()])
+        """Log predictive density (nats, up to constants of the tracks) of each video given the others.
+
+        An effect that happens once may have happened to any body of any video, which counts against it.
+        """
+        density = np.array([one.log_density for one in self.cavities.values()])
+        return density - sum(self.choices.values(), np.zeros(len(density)))
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -56,23 +63,27 @@ class Trial:
         effect = score.effect
         model = self.fit.model.with_effect(effect)
         if not happens_once(effect):
-            return Trial((*self.causes, effect), self.fit.under(model, start=score.start, model_error=False))
+            fit = self.fit.under(model, start=score.start, model_error=False)
+            return Trial((*self.causes, effect), fit, self.choices)
         sites = [[site for site in score.sites if site.video == k] for k in range(len(self.fit.fits))]
         fields = [parameter.name for parameter in effect.parameters]
         held, own = [], []
         for part, structure, mine in zip(self.fit.fits, self.fit.structures, sites, strict=True):
             owners = (None, *range(len(part.likelihood.tracks.bodies)))
-            acting: dict[Owned, float] = {}
+            values: dict[Owned, float] = {}
             for site in mine[:1]:
-                acting |= {
+                values |= {
                     (name, owner): effect.vanishes_at.get(name, value)
                     for name, value in site.values.items()
                     for owner in (site.owner, None)
                 }
             every = {(name, owner) for name in fields for owner in owners}
-            held.append(structure.held | frozenset(every - acting.keys()))
-            own.append(acting)
-        return Trial((*self.causes, effect), self.fit.under(model, own=own, held=held, model_error=False))
+            held.append(structure.held | frozenset(every - values.keys()))
+            own.append(values)
+        acting = np.array([min(len(mine), 1) for mine in sites])
+        choices = {**self.choices, effect.name: np.log(max(score.places, 1)) * acting}
+        fit = self.fit.under(model, own=own, held=held, model_error=False)
+        return Trial((*self.causes, effect), fit, choices)
 
     def without(self, cause: Effect) -> "Trial":
         """The fit without one of its causes."""
@@ -80,9 +91,11 @@ class Trial:
         effects = tuple(effect for effect in model.effects if effect is not cause)
         stated = {parameter.name for effect in effects for parameter in effect.parameters}
         beliefs = {name: belief for name, belief in model.beliefs.items() if name in stated}
-        name = "+".join([part for part in model.name.split("+") if part != cause.name])
-        left = PhysicsModel(name, effects, beliefs)
-        return Trial(tuple(one for one in self.causes if one is not cause), self.fit.under(left, model_error=False))
+        names = [part for part in model.name.split("+") if part != cause.name]
+        left = PhysicsModel("+".join(names), effects, beliefs)
+        choices = {name: one for name, one in self.choices.items() if name != cause.name}
+        fit = self.fit.under(left, model_error=False)
+        return Trial(tuple(one for one in self.causes if one is not cause), fit, choices)
 
 
 def gain(trial: Trial, base: Trial) -> tuple[float, float]:

@@ -12,7 +12,7 @@ import numpy as np
 from jaxtyping import Float
 
 from vrdp_prob.inference.parallel import in_parallel
-from vrdp_prob.inference.several_videos.arrow import LOG_TWO_PI, Expansion
+from vrdp_prob.inference.several_videos.arrow import LOG_TWO_PI
 from vrdp_prob.inference.several_videos.ascent import STEEP
 from vrdp_prob.inference.several_videos.fitting import SharedFit
 from vrdp_prob.inference.several_videos.joint_fit import expand, expand_prior
@@ -45,10 +45,15 @@ def cavities(fit: SharedFit) -> dict[str, Cavity]:
     expansions = in_parallel(
         lambda k: expand(joint.videos[k], mean, joint.gaussian.locals[k].centre, central=True), range(len(joint.videos))
     )
-    prior = expand_prior(joint.numbers, mean).curvature
-    total = prior + sum(one.reduced for one in expansions)
+    prior = expand_prior(joint.numbers, mean)
+    # Where a video is at an edge between two courses of events its gradient says nothing of what lies beyond.
+    inside = [-float(one.local_gradient @ one.local_step) / 2 < STEEP for one in expansions]
+    gradients = [one.reduced_gradient * ok for one, ok in zip(expansions, inside, strict=True)]
+    total = _definite(prior.curvature + sum(one.reduced for one in expansions))
+    # The search ends a little off the maximum, which matters to what a single video says of a sharp number.
+    rest = np.linalg.solve(total, -(prior.gradient + sum(gradients)))
     return {
-        video.name: _cavity(fit, index, one, total, mean)
+        video.name: _cavity(fit, index, total, gradients[index] + one.reduced @ rest, one.reduced, mean + rest)
         for index, (video, one) in enumerate(zip(joint.videos, expansions, strict=True))
     }
 
@@ -56,22 +61,20 @@ def cavities(fit: SharedFit) -> dict[str, Cavity]:
 def _cavity(
     fit: SharedFit,
     index: int,
-    one: Expansion,
     total: Float[np.ndarray, "shared shared"],
+    gradient: Float[np.ndarray, "shared"],
+    curvature: Float[np.ndarray, "shared shared"],
     mean: Float[np.ndarray, "shared"],
 ) -> Cavity:
     joint = fit.joint
     video, local = joint.videos[index], joint.gaussian.locals[index]
     entries = video.likelihood.coordinates.entries
-    own = video.value(mean, local.centre) + local.log_volume + len(local.centre) * LOG_TWO_PI / 2
+    own = video.value(joint.gaussian.mean, local.centre) + local.log_volume + len(local.centre) * LOG_TWO_PI / 2
     own += log_prior_constant(entries[place] for place in video.local_places)
-    # Where a video is at an edge between two courses of events its gradient says nothing of what lies beyond.
-    inside = -float(one.local_gradient @ one.local_step) / 2 < STEEP
-    gradient = one.reduced_gradient if inside else np.zeros(len(mean))
-    others = _definite(total - one.reduced)
+    others = _definite(total - curvature)
     covariance = np.linalg.inv(others)
     shift = covariance @ gradient
-    volume = (np.linalg.slogdet(others)[1] - np.linalg.slogdet(_definite(total))[1]) / 2
+    volume = (np.linalg.slogdet(others)[1] - np.linalg.slogdet(total)[1]) / 2
     return Cavity(mean + shift, covariance, float(own + volume - gradient @ shift / 2))
 
 

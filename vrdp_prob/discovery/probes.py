@@ -59,10 +59,11 @@ def probes(fit: SharedFit, index: int, effect: Effect, points: Sequence[Mapping[
     likelihood = plain_likelihood(part.clues, fit.model.with_effect(effect), fit.structures[index])
     entries = likelihood.coordinates.entries
     start = video.likelihood.coordinates.carried(fit.joint.point(index), likelihood.coordinates)
+    vanishing = vanishing_values(fit, effect)
     strengths = {
-        place: _Difference.of(entry, effect.vanishes_at[entry.field])
+        place: _Difference.of(entry, vanishing[entry.field])
         for place, entry in enumerate(entries)
-        if entry.field in effect.vanishes_at
+        if entry.field in vanishing
     }
     if not strengths:
         return []
@@ -83,9 +84,18 @@ def probes(fit: SharedFit, index: int, effect: Effect, points: Sequence[Mapping[
     found = []
     for number, (place, strength) in enumerate(strengths.items()):
         entry = entries[place]
-        difference = (residuals[:, number, 0] - residuals[:, number, 1]) / (strength.distance)
+        difference = (residuals[:, number, 0] - residuals[:, number, 1]) / strength.distance
         directions = np.where(np.isfinite(difference), difference, 0.0)
         found.append(Probe(shared_key(entry, likelihood.tracks), entry.owner, entry.field, directions))
+    return found
+
+
+def vanishing_values(fit: SharedFit, effect: Effect) -> dict[str, float]:
+    """Values of parameters at which nothing is left of an effect, given what a fit without it has found."""
+    found = dict(effect.vanishes_at)
+    for name, other in effect.vanishes_like.items():
+        if (value := fit.value(other)) is not None:
+            found[name] = value
     return found
 
 
@@ -108,4 +118,5 @@ class _Difference:
             faint = FAINT * math.exp(entry.prior.mean)
             return cls(math.log(2 * faint), math.log(faint), faint)
         middle, step = coordinate(entry.transform, vanishing), STEP * entry.prior.sd
-        return cls(middle + step, middle - step, 2 * step)
+        per_value = vanishing if entry.transform is Transform.LOG else 1.0
+        return cls(middle + step, middle - step, 2 * step * per_value)

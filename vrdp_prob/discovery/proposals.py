@@ -1,75 +1,104 @@
-"""First guesses of causes that have no strength at which they vanish: what stands in the way, and spheres that slip.
+"""First guesses of hidden things that stand in the way of bodies.
 
-Hidden things leave their mark where a body changes its velocity though nothing seen is near. The scan for kicks finds
-these places; the change of the velocity is square to the surface that the body met.
+They leave their mark where a body changes its velocity though nothing seen is near. A fit with kicks finds these
+places; the change of the velocity is square to the surface that the body met.
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 import torch
+from jaxtyping import Float
 
-from vrdp_prob.discovery.scores import CauseScore, Site
+from vrdp_prob.discovery.scores import CauseScore
 from vrdp_prob.inference.several_videos.fitting import SharedFit
 from vrdp_prob.models.effects.effect import Effect
-from vrdp_prob.models.effects.external_impulse import ExternalImpulse
 from vrdp_prob.models.effects.hidden_obstacle import HiddenObstacle
 from vrdp_prob.models.effects.wall import Wall
+from vrdp_prob.models.parameters import RESTITUTION
 
-MOST_SITES = 3
-"""Kicks, the clearest first, that are tried as contacts with something unseen."""
+MOST_KICKS = 3
+"""Kicks, the strongest first, from which hidden things are guessed."""
 RADII = (0.12, 0.25)
 """Radii in m with which a hidden disc is tried."""
-EARLY = 0.004
-"""Distance in m by which a hidden surface is put before the place of a kick, so that the fitted path meets it."""
+SLOWEST = 0.02
+"""Speed in m/s across a surface below which nothing is said of its restitution."""
+EARLY = 0.001
+"""Distance in m by which a surface is put before the place of a kick, so that the body is sure to meet it."""
 
 
-def proposals(fit: SharedFit, scores: Sequence[CauseScore], catalogue: Sequence[Effect]) -> list[CauseScore]:
-    """Starts of refits of causes that have no score.
+def hidden_things(kicked: SharedFit, catalogue: Sequence[Effect], p_value: float) -> list[CauseScore]:
+    """Starts of refits in which something unseen did what a fit puts down to kicks.
 
     Parameters
     ----------
-    fit
-        Fit of a model without them.
-    scores
-        Scores of the other causes.
+    kicked
+        Fit of a model with kicks.
     catalogue
         Causes that are looked for.
+    p_value
+        Of the kicks.
     """
-    kicks = next((one for one in scores if isinstance(one.effect, ExternalImpulse)), None)
+    return [
+        CauseScore(effect, start, (), 0.0, 0, p_value, {})
+        for effect in catalogue
+        if isinstance(effect, (Wall, HiddenObstacle))
+        for kick in _kicks(kicked)
+        for start in _surfaces(kicked, kick, effect)
+    ]
+
+
+@dataclass(frozen=True)
+class _Kick:
+    """A change (m/s) of the velocity of a body of a video at a time (s)."""
+
+    video: int
+    body: int
+    time: float
+    change: Float[np.ndarray, "2"]
+
+
+def _kicks(fit: SharedFit) -> list[_Kick]:
+    """The kicks of a fit, the strongest first."""
     found = []
-    for effect in catalogue:
-        if isinstance(effect, (Wall, HiddenObstacle)) and kicks is not None:
-            starts = [start for site in kicks.sites[:MOST_SITES] for start in _behind(fit, site, effect)]
-            found += [_start(effect, start, kicks.p_value) for start in starts]
-        elif not effect.vanishes_at:
-            found += [
-                _start(effect, start, 1.0)
-                for start in effect.search_points([one.likelihood.tracks for one in fit.fits])
-            ]
-    return found
+    for index, video in enumerate(fit.joint.videos):
+        places, point = video.likelihood.coordinates.places, fit.joint.point(index)
+        for field, body in places:
+            if field == "impulse_x" and body is not None:
+                change = point[[places["impulse_x", body], places["impulse_y", body]]]
+                found.append(_Kick(index, body, float(point[places["impulse_time", None]]), change))
+    return sorted(found, key=lambda one: -float(np.linalg.norm(one.change)))[:MOST_KICKS]
 
 
-def _start(effect: Effect, start: Mapping[str, float], p_value: float) -> CauseScore:
-    return CauseScore(effect, start, (), 0.0, 0, p_value, {})
-
-
-def _behind(fit: SharedFit, site: Site, effect: Effect) -> list[dict[str, float]]:
-    """What may have thrown a body back at the time of a kick."""
-    body = site.owner
-    assert body is not None
-    video = fit.joint.videos[site.video]
+def _surfaces(fit: SharedFit, kick: _Kick, effect: Effect) -> Iterator[dict[str, float]]:
+    """What may have thrown a body back."""
+    video = fit.joint.videos[kick.video]
     tracks = video.likelihood.tracks
-    point = torch.from_numpy(fit.joint.point(site.video)[None])
-    path = video.likelihood.predicted(point)[0, :, body, :2]
-    time = site.values["impulse_time"]
-    place = np.array([np.interp(time, tracks.times, path[:, axis]) for axis in range(2)])
-    change = np.array([site.values["impulse_x"], site.values["impulse_y"]])
-    into = -change / max(float(np.linalg.norm(change)), 1e-12)
-    radius = tracks.bodies[body].radius or 0.0
+    path = video.likelihood.predicted(torch.from_numpy(fit.joint.point(kick.video)[None]))[0, :, kick.body, :2]
+    before = int(np.clip(np.searchsorted(tracks.times, kick.time) - 1, 1, len(tracks.times) - 1))
+    velocity = (path[before] - path[before - 1]) / (tracks.times[before] - tracks.times[before - 1])
+    place = path[before] + velocity * (kick.time - tracks.times[before])
+    into = -kick.change / max(float(np.linalg.norm(kick.change)), 1e-12)
+    arriving = float(velocity @ into)
+    leaving = float(np.linalg.norm(kick.change)) - arriving
+    factor = RESTITUTION.default
+    if arriving > SLOWEST:
+        factor = float(np.clip(leaving / arriving / RESTITUTION.default, 0.05, 0.95))
+    radius = (tracks.bodies[kick.body].radius or 0.0) - EARLY
     if isinstance(effect, Wall):
-        distance = float(place @ into) + radius - EARLY
-        return [{"hidden_wall_distance": distance, "hidden_wall_direction": math.atan2(into[1], into[0])}]
-    centres = [(place + (radius + size - EARLY) * into, size) for size in RADII]
-    return [{"obstacle_x": float(c[0]), "obstacle_y": float(c[1]), "obstacle_radius": size} for c, size in centres]
+        yield {
+            "hidden_wall_distance": float(place @ into) + radius,
+            "hidden_wall_direction": math.atan2(into[1], into[0]),
+            "hidden_wall_restitution": factor,
+        }
+        return
+    for size in RADII:
+        x, y = place + (radius + size) * into
+        yield {
+            "obstacle_x": float(x),
+            "obstacle_y": float(y),
+            "obstacle_radius": size,
+            "obstacle_restitution": factor,
+        }

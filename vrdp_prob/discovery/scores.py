@@ -100,7 +100,7 @@ def score_causes(fit: SharedFit, linear: LinearFit, effects: Iterable[Effect], *
     """Scores of causes that have a strength at which they vanish, the least probable by chance first."""
     found = []
     for effect in effects:
-        if effect.vanishes_at:
+        if effect.vanishes_at or effect.vanishes_like:
             scan = _scan_once if happens_once(effect) else _scan_shared
             found.append(scan(fit, linear, effect, np.random.default_rng(seed)))
     present = [one for one in found if one is not None]

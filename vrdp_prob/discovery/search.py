@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from vrdp_prob.discovery.linear import LinearFit
-from vrdp_prob.discovery.proposals import proposals
+from vrdp_prob.discovery.proposals import hidden_things
 from vrdp_prob.discovery.scores import CauseScore, score_causes
 from vrdp_prob.discovery.trials import Trial, gain
 from vrdp_prob.inference.parallel import in_parallel
@@ -127,9 +127,9 @@ class _Searcher:
         Hidden things are tried only where nothing else explains that bodies change their velocity all at once.
         """
         found = self._refitted(trial, _shortlist(step.scores))
-        if _kicked(step.scores) and not self._smooth(trial, found):
-            hidden = proposals(trial.fit, step.scores, self.catalogue)
-            found += self._refitted(trial, [one for one in hidden if one.effect.name not in trial.names])
+        kicks = next((one for one in step.scores if isinstance(one.effect, ExternalImpulse) and one.sites), None)
+        if kicks is not None and not self._smooth(trial, found):
+            found += self._hidden(trial, found, kicks)
         return Step(step.scores, tuple(sorted(found, key=lambda one: -float(one.log_density.sum()))))
 
     def _smooth(self, trial: Trial, found: Sequence[Trial]) -> bool:
@@ -137,6 +137,20 @@ class _Searcher:
         if not found or gain(found[0], trial)[0] < self.needed:
             return False
         return not isinstance(found[0].causes[-1], ExternalImpulse) and not _kicked(self.first(found[0]).scores)
+
+    def _hidden(self, trial: Trial, found: Sequence[Trial], kicks: CauseScore) -> list[Trial]:
+        """Fits with something unseen in the place of kicks."""
+        kicked = next((one for one in found if one.causes[-1] is kicks.effect), None)
+        kicked = kicked or next(iter(self._refitted(trial, [kicks])), None)
+        if kicked is None:
+            return []
+        left = [effect for effect in self.catalogue if effect.name not in trial.names]
+        starts = hidden_things(kicked.fit, left, kicks.p_value)
+
+        def refit(score: CauseScore) -> Trial | None:
+            return kicked.with_cause_in_place(score)
+
+        return self._all(refit, starts)
 
     def rivals(self, best: Trial, number: int, step: Step, lesser: Trial) -> tuple[Trial, ...]:
         """Models in which another cause takes the place of one, as far as it came close when that one was found."""
@@ -150,15 +164,15 @@ class _Searcher:
 
     def _refitted(self, trial: Trial, scores: Sequence[CauseScore]) -> list[Trial]:
         """Fits with one cause more, the best first."""
+        return self._all(trial.with_cause, scores)
 
-        def refit(score: CauseScore) -> Trial | None:
-            found = trial.with_cause(score)
-            if found is not None:
-                _ = found.log_density
+    def _all(self, refit: Callable[[CauseScore], Trial | None], scores: Sequence[CauseScore]) -> list[Trial]:
+        def done(score: CauseScore) -> Trial | None:
+            found = refit(score)
             self.advance(1)
             return found
 
-        found = [one for one in in_parallel(refit, scores) if one is not None]
+        found = [one for one in in_parallel(done, scores) if one is not None]
         return sorted(found, key=lambda one: -float(one.log_density.sum()))
 
 

@@ -12,6 +12,7 @@ from vrdp_prob.discovery.scores import CauseScore, happens_once
 from vrdp_prob.inference.several_videos.ascent import ImpossibleStartError
 from vrdp_prob.inference.several_videos.fitting import Owned, SharedFit
 from vrdp_prob.models.effects.effect import Effect
+from vrdp_prob.models.parameters import Scope
 from vrdp_prob.models.physics import PhysicsModel
 
 
@@ -59,11 +60,28 @@ class Trial:
         except ImpossibleStartError:
             return None
 
+    def with_cause_in_place(self, score: CauseScore) -> "Trial | None":
+        """The fit with a cause in the place of the last one, from where that has brought the videos."""
+        last = self.causes[-1]
+        left = self._model_without(last).with_effect(score.effect)
+        choices = {name: one for name, one in self.choices.items() if name != last.name}
+        try:
+            fit = self.fit.under(left, start=score.start, model_error=False)
+        except ImpossibleStartError:
+            return None
+        return Trial((*self.causes[:-1], score.effect), fit, choices)
+
     def _extended(self, score: CauseScore) -> "Trial":
         effect = score.effect
         model = self.fit.model.with_effect(effect)
         if not happens_once(effect):
-            fit = self.fit.under(model, start=score.start, model_error=False)
+            own_fields = [one.name for one in effect.parameters if one.scope is Scope.BODY]
+            bodies = [range(len(part.likelihood.tracks.bodies)) for part in self.fit.fits]
+            starts: list[dict[Owned, float]] = [
+                {(name, body): score.start[name] for name in own_fields if name in score.start for body in these}
+                for these in bodies
+            ]
+            fit = self.fit.under(model, start=score.start, own=starts, model_error=False)
             return Trial((*self.causes, effect), fit, self.choices)
         sites = [[site for site in score.sites if site.video == k] for k in range(len(self.fit.fits))]
         fields = [parameter.name for parameter in effect.parameters]
@@ -87,15 +105,18 @@ class Trial:
 
     def without(self, cause: Effect) -> "Trial":
         """The fit without one of its causes."""
+        left = self._model_without(cause)
+        choices = {name: one for name, one in self.choices.items() if name != cause.name}
+        fit = self.fit.under(left, model_error=False)
+        return Trial(tuple(one for one in self.causes if one is not cause), fit, choices)
+
+    def _model_without(self, cause: Effect) -> PhysicsModel:
         model = self.fit.model
         effects = tuple(effect for effect in model.effects if effect is not cause)
         stated = {parameter.name for effect in effects for parameter in effect.parameters}
         beliefs = {name: belief for name, belief in model.beliefs.items() if name in stated}
         names = [part for part in model.name.split("+") if part != cause.name]
-        left = PhysicsModel("+".join(names), effects, beliefs)
-        choices = {name: one for name, one in self.choices.items() if name != cause.name}
-        fit = self.fit.under(left, model_error=False)
-        return Trial(tuple(one for one in self.causes if one is not cause), fit, choices)
+        return PhysicsModel("+".join(names), effects, beliefs)
 
 
 def gain(trial: Trial, base: Trial) -> tuple[float, float]:

@@ -66,6 +66,14 @@ class SharedFit:
         """Names of the videos."""
         return tuple(video.name for video in self.joint.videos)
 
+    def value(self, name: str) -> float | None:
+        """Most probable value of a number that all videos share, in its unit; None where they share no such number."""
+        place = next((k for k, key in enumerate(self.joint.numbers.keys) if key == (name, ())), None)
+        if place is None:
+            return None
+        mean = float(self.joint.gaussian.mean[place])
+        return math.exp(mean) if self.joint.numbers.logarithms[place] else mean
+
     def under(
         self,
         model: PhysicsModel,
@@ -100,7 +108,7 @@ class SharedFit:
         ]
         numbers, videos = link(likelihoods, self.shared)
         known = dict(zip(joint.numbers.keys, joint.gaussian.mean, strict=True))
-        vanishing, wanted = _vanishing(model), dict(start or {})
+        vanishing, wanted = self._vanishing(model), dict(start or {})
         shared, towards = numbers.prior_mean.copy(), numbers.prior_mean.copy()
         for place, (key, entry) in enumerate(zip(numbers.keys, numbers.entries, strict=True)):
             if key in known:
@@ -123,6 +131,12 @@ class SharedFit:
                     mine[number] = _coordinate(entry.transform, values[entry.field, entry.owner])
         found = climb(numbers, videos, shared, locals_, towards=towards)
         return _finished(found, model, self.fits, structures, self.shared, model_error=model_error)
+
+    def _vanishing(self, model: PhysicsModel) -> dict[str, float]:
+        """Values at which the model's effects vanish, given what is known now."""
+        likes = [pair for effect in model.effects for pair in effect.vanishes_like.items()]
+        alike = {name: value for name, other in likes if (value := self.value(other)) is not None}
+        return {name: value for effect in model.effects for name, value in effect.vanishes_at.items()} | alike
 
 
 def fit_together(
@@ -294,11 +308,6 @@ def structure_of(coordinates: Coordinates) -> Structure:
     }
     # A weighed body that meets others counts among those that meet walls: it has the same unknowns.
     return Structure(moving=owners["velocity_x"], colliding=owners[MASS.name], bouncing=owners[RESTITUTION.name])
-
-
-def _vanishing(model: PhysicsModel) -> dict[str, float]:
-    """Values at which the model's effects vanish."""
-    return {name: value for effect in model.effects for name, value in effect.vanishes_at.items()}
 
 
 def _nearly_vanished(transform: Transform, value: float, expected: float) -> float:

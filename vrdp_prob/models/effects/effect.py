@@ -115,6 +115,8 @@ class Effect:
     """Its parameters."""
     vanishes_at: ClassVar[Mapping[str, float]] = {}
     """Values of parameters at which the effect is gone, so that the model without it is nested."""
+    vanishes_like: ClassVar[Mapping[str, str]] = {}
+    """Parameters, each with the one of another effect that leaves nothing of this one where both are equal."""
     spin_matters: ClassVar[bool] = False
     """Whether the path of a body in free flight depends on its spin, which is then unknown where nobody saw it."""
 

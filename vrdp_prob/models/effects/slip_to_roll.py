@@ -33,10 +33,6 @@ RELEASE_ROLLING = Parameter(
 )
 
 
-SEARCH_FRICTIONS = (0.05, 0.2)
-"""Friction coefficients with which slipping is looked for."""
-
-
 class SlipToRoll(Effect):
     """A solid sphere slips against the table's friction until its spin has caught up with its velocity."""
 
@@ -48,11 +44,11 @@ class SlipToRoll(Effect):
     )
     source: ClassVar = "A. Sommerfeld, Mechanics (Lectures on theoretical physics 1), section 27: the billiard ball"
     parameters: ClassVar = (SLIP_FRICTION, RELEASE_ROLLING)
+    vanishes_like: ClassVar = {"slip_friction": "rolling_resistance"}
 
     def search_points(self, videos: Sequence[Tracks]) -> Sequence[Mapping[str, float]]:
-        """With a slippery and with a rough table, where there are spheres."""
-        spheres = any(body.shape is Shape.SPHERE for one in videos for body in one.bodies)
-        return [{"slip_friction": value} for value in SEARCH_FRICTIONS] if spheres else []
+        """With spheres that are released without rolling; they slow down as rolling ones do if the frictions agree."""
+        return ({"release_rolling": 0.0},)
 
     def slip_friction(self, time: Scalar, body: BodyView, parameters: Mapping[str, Scalar]) -> Scalar:
         """Friction coefficient while the sphere slips."""

@@ -6,12 +6,12 @@ efficient score (Cox and Hinkley, Theoretical Statistics, 1974, section 9.3).
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 from jaxtyping import Float
-from scipy.linalg import cho_factor, cho_solve
+from scipy.stats import chi2
 
 from vrdp_prob.inference.least_squares import jacobian
 from vrdp_prob.inference.noise_fit import NOISE_FIELDS
@@ -22,6 +22,8 @@ from vrdp_prob.inference.several_videos.linking import LinkedVideo
 
 RIDGE = 1e-9
 """Relative size below which what unknowns do counts as nothing."""
+RANK = 1e-8
+"""Relative information below which a strength cannot be seen at all."""
 
 
 @dataclass(frozen=True)
@@ -67,6 +69,11 @@ class LinearVideo:
         kept: np.ndarray = basis[:, values > RIDGE * values.max(initial=0.0)]
         return kept
 
+    @property
+    def absorbed(self) -> float:
+        """Mean sum of squares that the own unknowns absorb of the data's residuals if these are noise."""
+        return float((self._basis[: self.data] ** 2).sum())
+
     def without_own(
         self, directions: Float[np.ndarray, "residual direction"]
     ) -> Float[np.ndarray, "residual direction"]:
@@ -78,6 +85,10 @@ class LinearVideo:
     def reduced_shared(self) -> Float[np.ndarray, "residual shared"]:
         """Derivatives by the shared unknowns when the video's own ones follow."""
         return self.without_own(self.shared)
+
+    def freed(self, data: Float[np.ndarray, "data extra"]) -> "LinearVideo":
+        """The video with further own unknowns of which nothing is known beforehand."""
+        return replace(self, own=np.concatenate([self.own, self.padded(data)], axis=1))
 
     def padded(self, data: Float[np.ndarray, "data direction"]) -> Float[np.ndarray, "residual direction"]:
         """Directions of the data's residuals, continued by zeros for the prior."""
@@ -99,20 +110,50 @@ class Score:
     gradient: Float[np.ndarray, "strength"]
     information: Float[np.ndarray, "strength strength"]
 
+    @cached_property
+    def _root(self) -> Float[np.ndarray, "strength known"]:
+        """Root of the covariance of the strengths, in the directions of which something is known."""
+        size = np.sqrt(np.maximum(np.diag(self.information), 1e-300))
+        values, vectors = np.linalg.eigh(self.information / np.outer(size, size))
+        known = values > RANK
+        root: np.ndarray = vectors[:, known] / np.sqrt(values[known]) / size[:, None]
+        return root
+
     @property
     def estimate(self) -> Float[np.ndarray, "strength"]:
         """Most probable strengths, to first order."""
-        return np.linalg.lstsq(self.information, self.gradient, rcond=1e-10)[0]
+        return self._root @ (self._root.T @ self.gradient)
 
     @property
     def sd(self) -> Float[np.ndarray, "strength"]:
         """Standard deviation of the strengths."""
-        return np.sqrt(np.maximum(np.diag(np.linalg.pinv(self.information, rcond=1e-10)), 0.0))
+        return np.linalg.norm(self._root, axis=1)
+
+    @property
+    def degrees(self) -> int:
+        """Number of independent strengths of which something is known."""
+        return self._root.shape[1]
 
     @property
     def chi_square(self) -> float:
-        """Score statistic: chi-square with one degree per strength if there is nothing."""
-        return float(self.gradient @ self.estimate)
+        """Score statistic: chi-square with one degree per known strength if there is nothing."""
+        return float(((self._root.T @ self.gradient) ** 2).sum())
+
+    @property
+    def p_value(self) -> float:
+        """Probability of as large a statistic if there is nothing; 1 where nothing is known."""
+        return float(chi2.sf(self.chi_square, self.degrees)) if self.degrees else 1.0
+
+    def of(self, chosen: Sequence[int], given: Sequence[int] = ()) -> "Score":
+        """The score of some of the strengths, where some others may differ from zero, and no more."""
+        inside, known = np.array(chosen, dtype=int), np.array(given, dtype=int)
+        information = self.information[np.ix_(inside, inside)]
+        others = Score(self.gradient[known], self.information[np.ix_(known, known)])
+        pulled = others._root.T @ self.information[np.ix_(known, inside)]
+        gradient = self.gradient[inside] - pulled.T @ (others._root.T @ others.gradient)
+        left = information - pulled.T @ pulled
+        seen = np.diag(left) > RANK * np.diag(information)
+        return Score(np.where(seen, gradient, 0.0), np.where(np.outer(seen, seen), left, 0.0))
 
 
 @dataclass(frozen=True)
@@ -141,26 +182,55 @@ class LinearFit:
         )
         return cls(tuple(videos), prior.gradient, prior.curvature)
 
+    def sharing(self, directions: Sequence[Float[np.ndarray, "_ extra"]]) -> "LinearFit":
+        """The fit of a model with further shared unknowns of which nothing is known beforehand."""
+        videos = tuple(
+            replace(video, shared=np.concatenate([video.shared, video.padded(one)], axis=1))
+            for video, one in zip(self.videos, directions, strict=True)
+        )
+        room = (0, videos[0].shared.shape[1] - len(self.prior_gradient))
+        return LinearFit(videos, np.pad(self.prior_gradient, room), np.pad(self.prior, room))
+
     @cached_property
-    def _factor(self) -> tuple[np.ndarray, bool]:
+    def _root(self) -> Float[np.ndarray, "shared known"]:
+        """Root of the covariance of the shared unknowns, in the directions of which something is known."""
         curvature = self.prior + sum(video.reduced_shared.T @ video.reduced_shared for video in self.videos)
-        found: tuple[np.ndarray, bool] = cho_factor(curvature + RIDGE * np.diag(np.diag(curvature) + 1e-300))
-        return found
+        size = np.sqrt(np.maximum(np.diag(curvature), 1e-300))
+        values, vectors = np.linalg.eigh(curvature / np.outer(size, size))
+        known = values > RIDGE
+        root: np.ndarray = vectors[:, known] / np.sqrt(values[known]) / size[:, None]
+        return root
+
+    def _step(self, gradient: Float[np.ndarray, "shared column"]) -> Float[np.ndarray, "shared column"]:
+        """Step of the shared unknowns."""
+        step: np.ndarray = self._root @ (self._root.T @ gradient)
+        return step
 
     @cached_property
     def left(self) -> tuple[Float[np.ndarray, "residual"], ...]:
         """The residuals when all unknowns are at their best, one array per video."""
-        return self.left_of([video.residuals for video in self.videos], self.prior_gradient)
+        left = self.left_of([video.residuals[:, None] for video in self.videos], self.prior_gradient[:, None])
+        return tuple(one[:, 0] for one in left)
+
+    @cached_property
+    def degrees(self) -> float:
+        """Number of the data's residuals, less what the unknowns can absorb of noise."""
+        absorbed = sum(video.absorbed for video in self.videos)
+        shared = [video.reduced_shared[: video.data] for video in self.videos]
+        gram = np.asarray(sum(one.T @ one for one in shared))
+        return sum(video.data for video in self.videos) - absorbed - float(np.trace(self._step(gram)))
 
     def left_of(
-        self, residuals: Sequence[Float[np.ndarray, "_"]], prior_gradient: Float[np.ndarray, "shared"]
-    ) -> tuple[Float[np.ndarray, "_"], ...]:
-        """What all unknowns together leave of some residuals."""
-        reduced = [video.without_own(one[:, None])[:, 0] for video, one in zip(self.videos, residuals, strict=True)]
+        self,
+        residuals: Sequence[Float[np.ndarray, "_ column"]],
+        prior_gradient: Float[np.ndarray, "shared column"],
+    ) -> tuple[Float[np.ndarray, "_ column"], ...]:
+        """What all unknowns together leave of some residuals, each column by itself."""
+        reduced = [video.without_own(one) for video, one in zip(self.videos, residuals, strict=True)]
         gradient = prior_gradient + sum(
             video.reduced_shared.T @ one for video, one in zip(self.videos, reduced, strict=True)
         )
-        step = cho_solve(self._factor, gradient)
+        step = self._step(gradient)
         return tuple(one - video.reduced_shared @ step for video, one in zip(self.videos, reduced, strict=True))
 
     def score(self, directions: Sequence[Float[np.ndarray, "_ strength"] | None]) -> Score:
@@ -172,7 +242,7 @@ class LinearFit:
         ]
         gradient = -sum(reduced.T @ left for _, reduced, left in pairs)
         cross = sum(video.reduced_shared.T @ reduced for video, reduced, _ in pairs)
-        information = sum(reduced.T @ reduced for _, reduced, _ in pairs) - cross.T @ cho_solve(self._factor, cross)
+        information = sum(reduced.T @ reduced for _, reduced, _ in pairs) - cross.T @ self._step(cross)
         return Score(np.asarray(gradient), np.asarray((information + information.T) / 2))
 
     def scores_in(
@@ -184,7 +254,7 @@ class LinearFit:
         reduced = video.without_own(video.padded(directions.reshape(count, -1)))
         gradient = -(reduced.T @ left).reshape(places, strengths)
         cross = (video.reduced_shared.T @ reduced).reshape(-1, places, strengths)
-        solved = cho_solve(self._factor, cross.reshape(len(cross), -1)).reshape(cross.shape)
+        solved = self._step(cross.reshape(len(cross), -1)).reshape(cross.shape)
         blocks = reduced.reshape(-1, places, strengths)
         information = np.einsum("rps,rpt->pst", blocks, blocks) - np.einsum("kps,kpt->pst", cross, solved)
         return [Score(g, (i + i.T) / 2) for g, i in zip(gradient, information, strict=True)], blocks

@@ -170,7 +170,7 @@ def expand_prior(numbers: SharedNumbers, shared: Float[np.ndarray, "shared"]) ->
 def first_guess(
     numbers: SharedNumbers,
     videos: Sequence[LinkedVideo],
-    starts: Sequence[Float[np.ndarray, "start _"]],
+    starts: Sequence[Float[np.ndarray, "_ _"]],
 ) -> tuple[Float[np.ndarray, "shared"], list[Float[np.ndarray, "_"]]]:
     """Shared numbers that the videos' own fits agree on best, and each video's own numbers for them.
 
@@ -220,7 +220,7 @@ def settle(
     return found[int(np.argmax(video.log_density(np.tile(shared, (len(found), 1)), np.array(found))))]
 
 
-def with_alternatives(fit: JointFit, starts: Sequence[Float[np.ndarray, "start _"]]) -> JointFit:
+def with_alternatives(fit: JointFit, starts: Sequence[Float[np.ndarray, "_ _"]]) -> JointFit:
     """A fit with the further modes of each video's own numbers that are reached from some vectors of it."""
     found = (
         local_modes(video, fit.numbers, fit.gaussian.mean, video.split(points)[1], fit.gaussian.locals[index])

@@ -126,7 +126,7 @@ class LinkedVideo:
         return self._with_priors({int(place): Prior(0.0, FLAT_SD) for place in self.shared_places})
 
     def points(
-        self, shared: Float[np.ndarray, "*batch shared"], local: Float[np.ndarray, "*batch local"]
+        self, shared: Float[np.ndarray, "*#batch shared"], local: Float[np.ndarray, "*#batch local"]
     ) -> Float[np.ndarray, "*batch dimension"]:
         """Vectors of this video; a batch of one is spread over the other's."""
         batch = np.broadcast_shapes(shared.shape[:-1], local.shape[:-1])

@@ -1,0 +1,28 @@
+"""Joint fits of generated videos, made once for all tests that look at them."""
+
+from functools import cache
+
+from tests.discovery.data_set import DataSet, Wanted, draw
+from tests.discovery.measurement import Measurement
+from tests.discovery.scenes import Setting
+from vrdp_prob.inference.several_videos.fitting import SharedFit, fit_together
+from vrdp_prob.models.effects.body_friction import BodyFriction
+from vrdp_prob.models.physics import PhysicsModel
+
+SMALL = Setting(videos=3, bodies=3, frames=70)
+
+
+@cache
+def fitted(
+    way: str | None = None,
+    effect_size: float = 5.0,
+    *,
+    seed: int,
+    setting: Setting = SMALL,
+    measurement: Measurement | None = None,
+) -> tuple[DataSet, SharedFit]:
+    """Videos in which a cause is hidden (none: a null), and the fit of the base model with own frictions."""
+    wanted = [] if way is None else [Wanted(way, effect_size=effect_size)]
+    data = draw(wanted, seed=seed, setting=setting, measurement=measurement)
+    model = PhysicsModel.base().with_effect(BodyFriction())
+    return data, fit_together(data.tracks, model=model, model_error=False)

@@ -1,0 +1,130 @@
+"""What the checks say of videos with and without a hidden effect."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.stats import kstest
+
+from tests.discovery.fitted import fitted
+from tests.discovery.measurement import Measurement
+from tests.discovery.scenes import Setting
+from vrdp_prob.discovery.checks import run_checks
+from vrdp_prob.discovery.finding import Check
+from vrdp_prob.discovery.free_flight import FreeFlight
+from vrdp_prob.discovery.free_flight_checks import QUESTIONS
+from vrdp_prob.discovery.residual_model import ResidualModel
+
+LARGER = Setting(videos=4, bodies=4)
+PAIRS = Setting(videos=3, bodies=2, frames=60)
+WELL_FITTED = 1.5
+"""Largest chi-square per number at which a fit counts as one that found its maximum."""
+GENERAL = ("memory of the residuals", "size of the residuals")
+"""Checks that say that something is wrong, and not what."""
+
+
+def by_name(checks: tuple[Check, ...]) -> Mapping[str, Check]:
+    return {check.name: check for check in checks}
+
+
+def leading(checks: tuple[Check, ...]) -> str:
+    """Name of the check that names a cause and is the most significant."""
+    return next(check.name for check in checks if check.significant and check.name not in GENERAL)
+
+
+def test_a_null_leaves_nothing_significant() -> None:
+    _, fit = fitted(seed=1)
+    checks = run_checks(fit, seed=0)
+    assert not [check for check in checks if check.significant]
+    assert len(checks) >= 18
+    assert len(by_name(checks)) == len(checks)
+    assert [check.p_value for check in checks] == sorted(check.p_value for check in checks)
+    assert all(np.isfinite([check.p_value, check.statistic]).all() for check in checks)
+
+
+def test_the_same_seed_gives_the_same_checks() -> None:
+    _, fit = fitted(seed=1)
+    assert run_checks(fit, seed=3) == run_checks(fit, seed=3)
+
+
+def noise_in_place(model: ResidualModel, generator: np.random.Generator) -> ResidualModel:
+    """Pure noise in the place of what was measured, and of what is believed beforehand."""
+    videos = tuple(
+        replace(video, linear=replace(video.linear, residuals=video.drawn(1, generator)[:, 0]))
+        for video in model.videos
+    )
+    values, vectors = np.linalg.eigh(model.linear.prior)
+    pull = vectors @ (np.sqrt(np.maximum(values, 0)) * generator.standard_normal(len(values)))
+    linear = replace(model.linear, videos=tuple(video.linear for video in videos), prior_gradient=pull)
+    return ResidualModel(linear, videos)
+
+
+def test_p_values_of_free_flight_are_uniform_under_the_fitted_model() -> None:
+    _, fit = fitted(seed=1)
+    generator = np.random.default_rng(0)
+    names = [(question.names, question.given) for question in QUESTIONS]
+    found: list[list[float]] = []
+    model = ResidualModel.of(fit)
+    for _ in range(40):
+        flight = FreeFlight.of(noise_in_place(model, generator))
+        parts = [flight.part(*one) for one in names]
+        found.append([part.score.p_value for part in parts if part.score.degrees])
+    assert all(kstest(column, "uniform").pvalue > 1e-3 for column in np.array(found).T)
+
+
+def test_a_tilt_is_a_push_in_one_direction_of_its_size() -> None:
+    data, fit = fitted("surface_tilt", seed=2, setting=PAIRS)
+    checks = run_checks(fit, seed=0)
+    assert leading(checks) == "push in one direction"
+    found = by_name(checks)["push in one direction"]
+    assert found.statistic == pytest.approx(9.81 * data.truth.causes[0].strength, rel=0.15)
+    assert "the same everywhere" in found.sentence
+    assert found.p_value < 1e-8
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("way", "names"),
+    [
+        ("linear_drag", ("acceleration along the velocity against speed",)),
+        ("cubic_drag", ("acceleration along the velocity against speed",)),
+        ("grain", ("acceleration along the velocity against the direction of motion",)),
+        ("shaking", ("push against time",)),
+        ("placed_field", ("acceleration across the velocity against place",)),
+        ("pair_force", ("acceleration against the distance to other bodies",)),
+        ("vortex", ("push against place", "acceleration across the velocity against speed")),
+        ("contact_friction", ("tangential against normal impulse",)),
+        ("clock_error", ("time stamps: lost frames",)),
+    ],
+)
+def test_the_check_that_leads_is_that_of_the_effect(way: str, names: tuple[str, ...]) -> None:
+    _, fit = fitted(way, 4.0, seed=5, setting=LARGER)
+    assert leading(run_checks(fit, seed=0)) in names
+
+
+@pytest.mark.slow
+def test_masses_and_angles_that_are_measured_are_used() -> None:
+    measurement = Measurement(masses=True, angles=True)
+    _, fit = fitted("contact_friction", 4.0, seed=6, setting=LARGER, measurement=measurement)
+    checks = by_name(run_checks(fit, seed=0))
+    assert {"spin change at contacts", "momentum at contacts", "friction of the bodies against mass"} <= set(checks)
+    assert checks["tangential against normal impulse"].significant
+    assert checks["spin change at contacts"].significant
+    assert checks["spin change at contacts"].statistic > 0
+
+
+@pytest.mark.slow
+def test_false_alarms_are_as_rare_as_stated() -> None:
+    alarms, p_values = [], []
+    for seed in range(200, 240):
+        _, fit = fitted(seed=seed)
+        if max(part.misfit.chi_square for part in fit.fits) > WELL_FITTED:
+            continue
+        checks = run_checks(fit, seed=0)
+        alarms.append(any(check.significant for check in checks))
+        p_values.append(by_name(checks)["push in one direction"].p_value)
+    assert len(alarms) > 20
+    # At a rate of 5 % more than 6 of 40 alarms have a probability below 1 %.
+    assert sum(alarms) <= 6
+    assert kstest(p_values, "uniform").pvalue > 1e-3

@@ -1,0 +1,182 @@
+"""Whether what the fit found of single bodies depends on what they are, or on how fast they met.
+
+Restitution and friction of single bodies are unknowns of the fit. So a law that the model lacks hides in them: each
+body's fitted value follows its speed, its material or its mass. The values are regressed on these; the bodies' own
+scatter is estimated beside it, and the F test needs no replications.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+
+from vrdp_prob.discovery.finding import Check
+from vrdp_prob.discovery.fitted_contacts import FittedContacts
+from vrdp_prob.discovery.free_flight import FRICTION
+from vrdp_prob.discovery.free_flight_checks import SEEN
+from vrdp_prob.discovery.residual_model import ResidualModel
+from vrdp_prob.discovery.scatter_regression import Dependence, dependence
+from vrdp_prob.discovery.words import number, opposite
+from vrdp_prob.inference.several_videos.fitting import SharedFit
+from vrdp_prob.models.parameters import RESTITUTION
+from vrdp_prob.scene import Body, Shape
+
+LARGEST_SD = 0.3
+"""Values that are known no better (standard deviation of the logarithm) tell nothing."""
+SLOWEST = 1e-3
+"""Slowest approach in m/s that is told apart."""
+
+
+@dataclass(frozen=True)
+class OwnValues:
+    """Logarithms of a quantity that every body has for itself, in all videos.
+
+    Parameters
+    ----------
+    values, covariance
+        The fitted logarithms.
+    bodies
+        Video and body that each belongs to.
+    """
+
+    values: Float[np.ndarray, "number"]
+    covariance: Float[np.ndarray, "number number"]
+    bodies: tuple[tuple[int, int], ...]
+
+    @classmethod
+    def of(cls, fit: SharedFit, field: str) -> "OwnValues":
+        """Those of a fit."""
+        values, blocks, bodies = [], [], []
+        for index, video in enumerate(fit.joint.videos):
+            local = fit.joint.gaussian.locals[index]
+            entries = [video.likelihood.coordinates.entries[place] for place in video.local_places]
+            mine = [k for k, entry in enumerate(entries) if entry.field == field and entry.owner is not None]
+            values += [float(local.centre[k]) for k in mine]
+            blocks.append((local.root @ local.root.T)[np.ix_(mine, mine)])
+            bodies += [(index, int(entries[k].owner or 0)) for k in mine]
+        covariance = np.zeros((len(values), len(values)))
+        first = 0
+        for block in blocks:
+            covariance[first : first + len(block), first : first + len(block)] = block
+            first += len(block)
+        return cls(np.array(values), covariance, tuple(bodies))
+
+
+@dataclass(frozen=True)
+class Rebounds:
+    """Restitutions of pairs of bodies that met, as the fit has them.
+
+    Parameters
+    ----------
+    logarithm, covariance
+        Logarithms of the products of the two bodies' factors.
+    closing_speed
+        Speeds in m/s at which they met; the geometric mean where they did so several times.
+    owners
+        Which bodies' factors are in which product.
+    """
+
+    logarithm: Float[np.ndarray, "pair"]
+    covariance: Float[np.ndarray, "pair pair"]
+    closing_speed: Float[np.ndarray, "pair"]
+    owners: Float[np.ndarray, "pair number"]
+
+    @classmethod
+    def of(cls, fit: SharedFit, contacts: Sequence[FittedContacts]) -> "Rebounds":
+        """Those that are known well enough."""
+        own = OwnValues.of(fit, RESTITUTION.name)
+        place = {body: k for k, body in enumerate(own.bodies)}
+        owners, speeds = [], []
+        for index, one in enumerate(contacts):
+            for pair in np.unique(one.bodies, axis=0):
+                row = np.zeros(len(own.values))
+                row[[place[index, body] for body in pair.tolist() if (index, body) in place]] = 1.0
+                owners.append(row)
+                met = (one.bodies == pair).all(axis=1)
+                speeds.append(float(np.exp(np.log(np.maximum(one.events.closing_speed[met], SLOWEST)).mean())))
+        rows = np.array(owners).reshape(-1, len(own.values))
+        covariance = rows @ own.covariance @ rows.T
+        known = np.flatnonzero(np.diag(covariance) < LARGEST_SD**2)
+        return cls((rows @ own.values)[known], covariance[np.ix_(known, known)], np.array(speeds)[known], rows[known])
+
+
+def body_checks(fit: SharedFit, model: ResidualModel) -> Iterator[Check]:
+    """All checks of fitted values of single bodies."""
+    yield from _restitution_check(Rebounds.of(fit, [FittedContacts.of(video.motion) for video in model.videos]))
+    yield from _friction_checks(fit, model)
+
+
+def _restitution_check(rebounds: Rebounds) -> Iterator[Check]:
+    speed = np.log(rebounds.closing_speed)
+    known = np.ones((len(speed), 1))
+    found = dependence(rebounds.logarithm, rebounds.covariance, rebounds.owners, known, speed[:, None])
+    if found is None:
+        return
+    slope, sd = float(found.slope[0]), float(found.sd[0])
+    slow, fast = np.exp(np.quantile(speed, [0.1, 0.9]))
+    middle = float(np.exp(np.average(rebounds.logarithm)))
+    low, high = (middle * (v / np.exp(speed.mean())) ** slope for v in (slow, fast))
+    sentence = (
+        f"Restitution {opposite(slope, 'falls', 'grows')} with the approach speed: {number(low)} at {number(slow)} "
+        f"m/s, {number(high)} at {number(fast)} m/s."
+        if found.p_value < SEEN
+        else f"Nothing seen; a power of {number(1.96 * sd)} of the approach speed would have shown."
+    )
+    yield Check("restitution against approach speed", slope, found.p_value, False, sentence)
+
+
+def _friction_checks(fit: SharedFit, model: ResidualModel) -> Iterator[Check]:
+    own = OwnValues.of(fit, FRICTION)
+    keep = np.flatnonzero(np.diag(own.covariance) < LARGEST_SD**2)
+    if not len(keep):
+        return
+    bodies = [model.videos[video].motion.tracks.bodies[body] for video, body in (own.bodies[k] for k in keep)]
+    rolls = np.array([body.shape is Shape.SPHERE for body in bodies])
+    known = np.stack([rolls, ~rolls], axis=1).astype(float)
+    known = known[:, known.any(axis=0)]
+
+    def asked(columns: Sequence[Float[np.ndarray, "number"]]) -> Dependence | None:
+        covariance = own.covariance[np.ix_(keep, keep)]
+        return dependence(own.values[keep], covariance, np.eye(len(keep)), known, np.stack(columns, axis=1))
+
+    materials = sorted({body.material for body in bodies if body.material is not None})
+    if len(materials) > 1:
+        found = asked([_indicator(bodies, material) for material in materials[1:]])
+        yield from _friction_check("material", found, _material_words(found, materials))
+    if {Shape.CUBE, Shape.CYLINDER} <= {body.shape for body in bodies}:
+        found = asked([np.array([float(body.shape is Shape.CUBE) for body in bodies])])
+        yield from _friction_check("shape", found, f"that of cubes is {_more(found)} than that of cylinders")
+    if all(body.mass is not None for body in bodies):
+        found = asked([np.log([body.mass or 1.0 for body in bodies])])
+        power = 0.0 if found is None else float(found.slope[0])
+        yield from _friction_check("mass", found, f"it goes with the mass to the power {number(power)}")
+
+
+def _friction_check(name: str, found: Dependence | None, words: str) -> Iterator[Check]:
+    if found is None:
+        return
+    sentence = (
+        f"The fitted friction of the bodies depends on their {name}: {words}."
+        if found.p_value < SEEN
+        else f"Nothing seen; {number(100 * 1.96 * float(found.sd.max()))} % would have shown."
+    )
+    yield Check(f"friction of the bodies against {name}", float(found.slope[0]), found.p_value, False, sentence)
+
+
+def _indicator(bodies: Sequence[Body], material: str) -> Float[np.ndarray, "number"]:
+    return np.array([float(body.material == material) for body in bodies])
+
+
+def _material_words(found: Dependence | None, materials: Sequence[str]) -> str:
+    slopes = [] if found is None else found.slope.tolist()
+    return ", ".join(
+        f"that of {name} is {number(100 * abs(np.expm1(slope)))} % {opposite(slope, 'smaller', 'larger')} than that of "
+        f"{materials[0]}"
+        for name, slope in zip(materials[1:], slopes, strict=False)
+    )
+
+
+def _more(found: Dependence | None) -> str:
+    slope = 0.0 if found is None else float(found.slope[0])
+    return f"{number(100 * abs(float(np.expm1(slope))))} % {opposite(slope, 'smaller', 'larger')}"

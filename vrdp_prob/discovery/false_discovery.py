@@ -1,0 +1,35 @@
+"""False discovery rate control over many checks."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+from vrdp_prob.discovery.finding import Check
+
+RATE = 0.05
+"""Largest share of false ones among the checks that count (and probability of any where nothing is wrong)."""
+
+
+def significant(p_values: Float[np.ndarray, "check"], rate: float = RATE) -> Bool[np.ndarray, "check"]:
+    """Which of many p-values count.
+
+    Source: Y. Benjamini and Y. Hochberg, Controlling the false discovery rate, J. R. Statist. Soc. B 57 (1995). It
+    holds for positively dependent tests (Benjamini and Yekutieli, Ann. Statist. 29, 2001); tests of the same residuals
+    are dependent in other ways too, so the rate where nothing is wrong is measured, in the tests.
+    """
+    count = len(p_values)
+    order = np.argsort(p_values, kind="stable")
+    below = p_values[order] <= rate * np.arange(1, count + 1) / max(count, 1)
+    last = int(np.flatnonzero(below).max(initial=-1))
+    result = np.zeros(count, dtype=bool)
+    result[order[: last + 1]] = True
+    return result
+
+
+def controlled(checks: Sequence[Check]) -> tuple[Check, ...]:
+    """The same checks, those marked that count, the most significant first."""
+    marks = significant(np.array([check.p_value for check in checks], dtype=float))
+    marked = [replace(check, significant=bool(mark)) for check, mark in zip(checks, marks, strict=True)]
+    return tuple(sorted(marked, key=lambda check: check.p_value))

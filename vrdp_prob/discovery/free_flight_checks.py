@@ -1,0 +1,253 @@
+"""Whether bodies in free flight are pushed by anything that the model lacks, and by what it depends on.
+
+Each check asks for a few patterns of missing acceleration in all videos at once. In the linear model the amplitudes of
+patterns are Gaussian under the fitted model; their chi-square is the limit of endlessly many replications.
+"""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from vrdp_prob.discovery.finding import Check
+from vrdp_prob.discovery.free_flight import FreeFlight, Part
+from vrdp_prob.discovery.words import by, direction_words, number, opposite
+
+SEEN = 0.01
+"""Probability by chance below which a sentence says what was seen."""
+
+
+@dataclass(frozen=True)
+class Question:
+    """A check of free flight.
+
+    Parameters
+    ----------
+    name
+        Its name.
+    names, given
+        The patterns it looks for, and those that may show besides.
+    sentence
+        What was seen.
+    """
+
+    name: str
+    names: tuple[str, ...]
+    sentence: Callable[[Part], str]
+    given: tuple[str, ...] = ()
+
+
+PUSH = ("push x", "push y")
+
+QUESTIONS = (
+    Question(
+        "push in one direction",
+        PUSH,
+        lambda part: (
+            f"bodies are pushed by {number(part.size)} m/s^2 towards {_direction(part, PUSH)}, the same everywhere"
+        ),
+    ),
+    Question(
+        "push against place",
+        ("push x x", "push x y", "push y x", "push y y"),
+        lambda part: (
+            f"bodies are pushed by {number(part.size)} m/s^2 (root mean square) in directions that change "
+            f"with the place: {_spreading(part)}"
+        ),
+        PUSH,
+    ),
+    Question(
+        "push against speed",
+        ("push x speed", "push y speed"),
+        lambda part: (
+            f"bodies are pushed towards {_direction(part, ('push x speed', 'push y speed'))}, the more the "
+            f"faster they are: by {number(_length(part, ('push x speed', 'push y speed')))} m/s^2 per m/s"
+        ),
+        PUSH,
+    ),
+    Question(
+        "acceleration along the velocity against speed",
+        ("along speed", "along slowness"),
+        lambda part: (
+            f"along their velocity bodies are accelerated by {number(part.size)} m/s^2 (root mean square) "
+            f"in a way that changes with speed: {_by_speed(part)}"
+        ),
+    ),
+    Question(
+        "acceleration along the velocity against the direction of motion",
+        ("along cosine", "along sine", "across cosine", "across sine"),
+        lambda part: (
+            f"the resistance depends on the direction of motion, by {number(part.size)} m/s^2 (root mean square)"
+        ),
+    ),
+    Question(
+        "acceleration along the velocity against place",
+        ("along x", "along y", "along distance"),
+        lambda part: (
+            f"along their velocity bodies are accelerated by {number(part.size)} m/s^2 (root mean square) in "
+            f"a way that changes with the place: {by(part.estimate('along x'), 'm/s^2 per m along x')}, "
+            f"{by(part.estimate('along y'), 'm/s^2 per m along y')}"
+        ),
+    ),
+    Question(
+        "acceleration along the velocity against time",
+        ("along time",),
+        lambda part: (
+            "along their velocity the acceleration of bodies changes in the course of the video, by "
+            f"{by(part.estimate('along time'), 'm/s^2 per s')}"
+        ),
+    ),
+    Question(
+        "acceleration along the velocity against the way travelled",
+        ("along way",),
+        lambda part: (
+            "along their velocity the acceleration of bodies changes with the way that they have travelled, "
+            f"by {by(part.estimate('along way'), 'm/s^2 per m')}"
+        ),
+    ),
+    Question(
+        "acceleration along the velocity against spin",
+        ("along spin",),
+        lambda part: (
+            "along their velocity bodies are accelerated the more they spin, by "
+            f"{by(part.estimate('along spin'), 'm/s^2 per rad/s')}"
+        ),
+    ),
+    Question(
+        "acceleration along the velocity against shape",
+        ("along cube",),
+        lambda part: (
+            f"cubes are slowed {opposite(part.estimate('along cube'), 'more', 'less')} than cylinders, by "
+            f"{number(part.size)} m/s^2"
+        ),
+    ),
+    Question(
+        "acceleration along the velocity against material",
+        ("along material",),
+        lambda part: f"bodies of one material are slowed more than others, by {number(part.size)} m/s^2",
+    ),
+    Question(
+        "acceleration along the velocity against mass",
+        ("along mass",),
+        lambda part: (
+            f"heavy bodies are slowed {opposite(part.estimate('along mass'), 'more', 'less')} than light "
+            f"ones, by {number(part.size)} m/s^2"
+        ),
+    ),
+    Question(
+        "acceleration across the velocity against speed",
+        ("across", "across speed"),
+        lambda part: (
+            f"bodies are pushed sideways by {number(part.size)} m/s^2 (root mean square): "
+            f"{by(part.estimate('across'), 'm/s^2 to the left')} and {by(part.estimate('across speed'), 'per m/s')}"
+        ),
+    ),
+    Question(
+        "acceleration across the velocity against place",
+        ("across speed x", "across speed y"),
+        lambda part: (
+            f"bodies are pushed sideways by {number(part.size)} m/s^2 (root mean square) in a way that "
+            "changes with the place"
+        ),
+        ("across", "across speed"),
+    ),
+    Question(
+        "acceleration across the velocity against time",
+        ("across speed time",),
+        lambda part: (
+            f"bodies are pushed sideways in a way that changes in the course of the video, by "
+            f"{number(part.size)} m/s^2 (root mean square)"
+        ),
+        ("across", "across speed"),
+    ),
+    Question(
+        "acceleration across the velocity against spin",
+        ("across speed spin",),
+        lambda part: (
+            "bodies that spin counter-clockwise are pushed to the "
+            f"{opposite(part.estimate('across speed spin'), 'right', 'left')}, by "
+            f"{number(abs(part.estimate('across speed spin')))} m/s^2 per m/s and rad/s"
+        ),
+    ),
+    Question(
+        "acceleration against the distance to other bodies",
+        ("others", "others square"),
+        lambda part: f"bodies {_pull(part)} each other: {number(part.size)} m/s^2 (root mean square)",
+    ),
+)
+
+
+def free_flight_checks(flight: FreeFlight) -> list[Check]:
+    """All checks of free flight that these videos allow."""
+    parts = [(question, flight.part(question.names, question.given)) for question in QUESTIONS]
+    found = [(question, part, part.score.p_value) for question, part in parts if part.score.degrees]
+    found += _shaking(flight)
+    if not found:
+        return []
+    strongest = min(found, key=lambda one: one[2])[0]
+    return [_check(flight, question, part, p_value, strongest) for question, part, p_value in found]
+
+
+def _shaking(flight: FreeFlight) -> Iterator[tuple[Question, Part, float]]:
+    """Whether the table shakes, at whatever frequency."""
+    parts = {
+        (name, frequency): flight.part(_phases(name), PUSH) for name, frequency in flight.scales.frequencies.items()
+    }
+    known = {key: part for key, part in parts.items() if part.score.degrees}
+    if not known:
+        return
+    name, frequency = min(known, key=lambda key: known[key].score.p_value)
+    best = known[name, frequency]
+
+    def sentence(part: Part) -> str:
+        times = "once" if round(frequency, 1) == 1 else f"{number(frequency)} times"
+        return f"all bodies are pushed to and fro {times} a second, by {number(part.size)} m/s^2 (root mean square)"
+
+    question = Question("push against time", _phases(name), sentence, PUSH)
+    yield question, best, min(1.0, len(known) * best.score.p_value)
+
+
+def _phases(name: str) -> tuple[str, ...]:
+    return tuple(f"{name} {phase} {axis}" for phase in ("cosine", "sine") for axis in "xy")
+
+
+def _check(flight: FreeFlight, question: Question, part: Part, p_value: float, strongest: Question) -> Check:
+    """A check with what was seen, and whether the strongest one is enough to explain it."""
+    if p_value >= SEEN:
+        sentence = f"Nothing seen; {number(part.visible)} m/s^2 would have shown."
+    else:
+        found = question.sentence(part)
+        sentence = f"{found[0].upper()}{found[1:]}."
+        given = {*question.given, *strongest.names}
+        if question is not strongest and flight.part(question.names, tuple(given)).score.p_value >= SEEN:
+            sentence += f" Nothing is left of it beside what was found for '{strongest.name}'."
+    return Check(question.name, part.size, p_value, False, sentence)
+
+
+def _length(part: Part, names: Sequence[str]) -> float:
+    return float(np.linalg.norm([part.estimate(name) for name in names]))
+
+
+def _direction(part: Part, names: Sequence[str]) -> str:
+    x, y = (part.estimate(name) for name in names)
+    return direction_words(x, y)
+
+
+def _spreading(part: Part) -> str:
+    xx, xy, yx, yy = (part.estimate(f"push {a} {b}") for a in "xy" for b in "xy")
+    away, turn = (xx + yy) / 2, (yx - xy) / 2
+    outward = opposite(away, "towards a middle", "away from a middle")
+    around = opposite(turn, "clockwise", "counter-clockwise")
+    return f"{number(abs(away))} m/s^2 per m {outward}, {number(abs(turn))} m/s^2 per m around it {around}"
+
+
+def _by_speed(part: Part) -> str:
+    return by(part.estimate("along speed"), "m/s^2 per m/s") + (
+        f", and {by(part.estimate('along slowness'), 'm/s^2 near rest')}"
+    )
+
+
+def _pull(part: Part) -> str:
+    found = part.fields @ part.score.estimate
+    toward = part.fields.sum(axis=2)
+    return opposite(float((found * toward).sum()), "repel", "attract")

@@ -2,11 +2,31 @@
 
 from collections.abc import Sequence
 
+import numpy as np
+
 from vrdp_prob.discovery.checking import check_video_count
-from vrdp_prob.discovery.finding import Finding
+from vrdp_prob.discovery.checks import run_checks
+from vrdp_prob.discovery.estimates import cause_sentence, estimates, upper_bounds
+from vrdp_prob.discovery.finding import Check, Finding, FoundCause, Gain, HeldOut, UpperBound, Verdict
+from vrdp_prob.discovery.forecast import held_out
+from vrdp_prob.discovery.search import Search, search
+from vrdp_prob.discovery.trials import Trial, gain, weights
+from vrdp_prob.inference import default_model
+from vrdp_prob.inference.several_videos.fitting import fit_together
+from vrdp_prob.models.effects.effect import Effect
+from vrdp_prob.models.model_file import known_effects
 from vrdp_prob.models.physics import PhysicsModel
+from vrdp_prob.models.simulator.rollout import compile_model
 from vrdp_prob.progress import ProgressDisplay
 from vrdp_prob.scene import Tracks
+
+EXPLAINED = 0.5
+"""Share of what the model left unexplained beyond the noise that the named causes must explain, for a verdict."""
+
+LEFT_LEVEL = 0.005
+"""Probability, over all checks, with which a model that explains everything is taken to leave something."""
+LEAST_SHARE = 0.01
+"""Probability from which a cause is told of that could take the place of a named one."""
 
 
 def discover(
@@ -14,6 +34,7 @@ def discover(
     *,
     model: PhysicsModel | None = None,
     seed: int = 0,
+    catalogue: Sequence[Effect] | None = None,
     progress: ProgressDisplay | None = None,
 ) -> Finding:
     """Say whether a model explains some videos, and if not, which causes it lacks.
@@ -26,14 +47,115 @@ def discover(
         The physics that is put to the test.
     seed
         Seed of all randomness: the same seed gives the same finding.
+    catalogue
+        Causes that are looked for; all that the package knows and the model has not where None.
     progress
         Told how far the work is.
 
     Raises
     ------
     InputError
-        If there are fewer than three videos.
+        If there are fewer than three videos, two have one name, or a video shows no motion.
     """
-    del model, seed, progress
     check_video_count(videos)
-    raise NotImplementedError("the search is not written yet.")
+    physics = default_model() if model is None else model
+    compile_model(physics)
+    fit = fit_together(videos, model=physics, seed=seed, model_error=False, progress=progress)
+    found = search(fit, _catalogue(physics, catalogue), seed=seed, progress=progress)
+    checks = run_checks(found.base.fit, seed=seed)
+    after = run_checks(found.best.fit, seed=seed) if found.best.causes else checks
+    causes = _causes(found, seed)
+    return Finding(
+        verdict=_verdict(found, after),
+        causes=tuple(causes),
+        checks=checks,
+        checks_after=after,
+        upper_bounds=tuple(_bounds(found)),
+        model=physics,
+        extended=found.best.fit.model,
+        videos=tuple(tracks.video for tracks in videos),
+        notes=tuple(_notes(found)),
+    )
+
+
+def _catalogue(model: PhysicsModel, catalogue: Sequence[Effect] | None) -> list[Effect]:
+    present = {effect.name for effect in model.effects}
+    known = [effect() for effect in known_effects().values()] if catalogue is None else catalogue
+    return [effect for effect in known if effect.name not in present]
+
+
+def _verdict(found: Search, after: Sequence[Check]) -> Verdict:
+    left = min((check.p_value for check in after), default=1.0) * len(after) < LEFT_LEVEL
+    if not found.best.causes:
+        return Verdict.UNKNOWN if left else Verdict.NONE
+    before, now = _excess(found.base), _excess(found.best)
+    return Verdict.UNKNOWN if left and now > (1 - EXPLAINED) * before else Verdict.NAMED
+
+
+def _excess(trial: Trial) -> float:
+    """Variance of the residuals beyond that of the noise, in units of the noise."""
+    return max(float(np.mean([part.misfit.chi_square for part in trial.fit.fits])) - 1.0, 0.0)
+
+
+def _causes(found: Search, seed: int) -> list[FoundCause]:
+    """The causes of the best model, and those that could take the place of one."""
+    named: list[FoundCause] = []
+    others: list[FoundCause] = []
+    for number, (lesser, rivals) in enumerate(zip(found.lesser, found.rivals, strict=True)):
+        best_of = {one.causes[-1].name: one for one in reversed(rivals)}
+        trials = [found.best, lesser, *best_of.values()]
+        log_prior = [-found.needed, 0.0] + [-found.needed] * len(best_of)
+        shares = weights(trials, log_prior, np.random.default_rng(seed))
+        named.append(_cause(found.best, found.best.causes[number], lesser, float(shares[0]), named=True))
+        for rival, share in zip(best_of.values(), shares[2:], strict=True):
+            if share >= LEAST_SHARE:
+                others.append(_cause(rival, rival.causes[-1], lesser, float(share), named=False))
+    named.sort(key=lambda one: -one.probability)
+    return named + sorted(others, key=lambda one: -one.probability)
+
+
+def _cause(trial: Trial, effect: Effect, lesser: Trial, probability: float, *, named: bool) -> FoundCause:
+    values = estimates(trial.fit, effect)
+    return FoundCause(
+        name=effect.name,
+        probability=min(max(probability, 0.0), 1.0),
+        sentence=cause_sentence(effect, values),
+        parameters=values,
+        gain=_gain(lesser, trial),
+        named=named,
+    )
+
+
+def _gain(before: Trial, after: Trial) -> Gain:
+    difference, error = gain(after, before)
+    videos = after.fit.videos
+    return Gain(
+        before=_held_out(before),
+        after=_held_out(after),
+        noise=float(np.median([part.clues.noise for part in after.fit.fits])),
+        elpd_difference=difference,
+        elpd_se=error,
+        by_video=dict(zip(videos, (after.log_density - before.log_density).tolist(), strict=True)),
+    )
+
+
+def _held_out(trial: Trial) -> HeldOut:
+    joint = trial.fit.joint
+    points = [joint.point(index) for index in range(len(joint.videos))]
+    return held_out(joint.videos, points, list(trial.cavities.values()))
+
+
+def _bounds(found: Search) -> list[UpperBound]:
+    named = set(found.best.names)
+    return [
+        bound for score in found.steps[-1].scores if score.effect.name not in named for bound in upper_bounds(score)
+    ]
+
+
+def _notes(found: Search) -> list[str]:
+    notes = []
+    if not found.best.fit.joint.converged:
+        notes.append(
+            "The joint fit ended before it had converged: some video is at the edge between two courses of events."
+        )
+    return notes

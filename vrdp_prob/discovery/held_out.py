@@ -53,24 +53,27 @@ def cavities(fit: SharedFit) -> dict[str, Cavity]:
     # The search ends a little off the maximum, which matters to what a single video says of a sharp number.
     rest = np.linalg.solve(total, -(prior.gradient + sum(gradients)))
     return {
-        video.name: _cavity(fit, index, total, gradients[index] + one.reduced @ rest, one.reduced, mean + rest)
+        video.name: _cavity(_own(fit, index), total, gradients[index] + one.reduced @ rest, one.reduced, mean + rest)
         for index, (video, one) in enumerate(zip(joint.videos, expansions, strict=True))
     }
 
 
+def _own(fit: SharedFit, index: int) -> float:
+    """Log density of a video with its own unknowns integrated out, at the most probable shared ones."""
+    joint = fit.joint
+    video, local = joint.videos[index], joint.gaussian.locals[index]
+    entries = video.likelihood.coordinates.entries
+    own = video.value(joint.gaussian.mean, local.centre) + local.log_volume + len(local.centre) * LOG_TWO_PI / 2
+    return own + log_prior_constant(entries[place] for place in video.local_places)
+
+
 def _cavity(
-    fit: SharedFit,
-    index: int,
+    own: float,
     total: Float[np.ndarray, "shared shared"],
     gradient: Float[np.ndarray, "shared"],
     curvature: Float[np.ndarray, "shared shared"],
     mean: Float[np.ndarray, "shared"],
 ) -> Cavity:
-    joint = fit.joint
-    video, local = joint.videos[index], joint.gaussian.locals[index]
-    entries = video.likelihood.coordinates.entries
-    own = video.value(joint.gaussian.mean, local.centre) + local.log_volume + len(local.centre) * LOG_TWO_PI / 2
-    own += log_prior_constant(entries[place] for place in video.local_places)
     others = _definite(total - curvature)
     covariance = np.linalg.inv(others)
     shift = covariance @ gradient

@@ -1,0 +1,81 @@
+"""What a fit says of the parameters of a cause, in their units, and how large a cause may be that was not named."""
+
+import math
+from collections.abc import Mapping
+
+import numpy as np
+
+from vrdp_prob.discovery.finding import Estimate, UpperBound
+from vrdp_prob.discovery.scores import CauseScore
+from vrdp_prob.inference.several_videos.fitting import SharedFit
+from vrdp_prob.inference.several_videos.linking import place_words
+from vrdp_prob.models.effects.effect import Effect
+from vrdp_prob.models.parameters import Transform
+
+MIDDLE = 1.959964
+"""Standard deviations from the middle of a normal distribution to the ends of its middle 95 %."""
+ONE_SIDED = 1.644854
+"""The same to the end of its lower 95 %."""
+
+
+def estimates(fit: SharedFit, effect: Effect) -> dict[str, Estimate]:
+    """Parameters of an effect by name, with the material, or the body and video, that each belongs to.
+
+    Parameters
+    ----------
+    fit
+        Fit of a model with the effect.
+    effect
+        The effect.
+    """
+    units = {parameter.name: parameter for parameter in effect.parameters}
+    found: dict[str, Estimate] = {}
+    joint = fit.joint
+    for place, key in enumerate(joint.numbers.keys):
+        if key[0] in units:
+            words = place_words(key[1])
+            name = f"{key[0]}[{words}]" if words else key[0]
+            mean, sd = joint.gaussian.mean[place], joint.gaussian.sd[place]
+            found[name] = _estimate(units[key[0]].transform, float(mean), float(sd), units[key[0]].unit)
+    for index, video in enumerate(joint.videos):
+        coordinates, point = video.likelihood.coordinates, joint.point(index)
+        sd = np.sqrt(np.diag(np.linalg.inv(joint.precision(index))))
+        for place in video.local_places:
+            entry = coordinates.entries[place]
+            if entry.field in units:
+                body = "" if entry.owner is None else f"{video.likelihood.tracks.bodies[entry.owner].id} in "
+                found[f"{entry.field}[{body}{video.name}]"] = _estimate(
+                    entry.transform, float(point[place]), float(sd[place]), units[entry.field].unit
+                )
+    return found
+
+
+def _estimate(transform: Transform, mean: float, sd: float, unit: str) -> Estimate:
+    low, high = mean - MIDDLE * sd, mean + MIDDLE * sd
+    if transform is Transform.IDENTITY:
+        return Estimate(mean, sd, low, high, unit)
+    middle = math.exp(mean + sd**2 / 2)
+    return Estimate(middle, middle * math.sqrt(math.expm1(sd**2)), math.exp(low), math.exp(high), unit)
+
+
+def cause_sentence(effect: Effect, found: Mapping[str, Estimate]) -> str:
+    """What a cause is and how strong."""
+    shown = [name for name in found if name.split("[")[0] in {*effect.vanishes_at, *effect.vanishes_like}]
+    parts = [f"{name} = {found[name].mean:.3g} +- {found[name].sd:.2g} {_unit(found[name].unit)}" for name in shown]
+    return f"{effect.sentence} {'; '.join(part.strip() for part in parts)}." if parts else effect.sentence
+
+
+def _unit(unit: str) -> str:
+    return "" if unit == "1" else unit
+
+
+def upper_bounds(score: CauseScore) -> list[UpperBound]:
+    """How large the strengths of a cause may be (95 %), where it would fit best."""
+    units = {parameter.name: parameter.unit for parameter in score.effect.parameters}
+    values = dict(score.sites[0].values) if score.sites else dict(score.start)
+    vanishing = score.effect.vanishes_at
+    bounds = []
+    for name, sd in score.sd.items():
+        away = abs(values.get(name, vanishing.get(name, 0.0)) - vanishing.get(name, 0.0))
+        bounds.append(UpperBound(score.effect.name, name, away + ONE_SIDED * sd, units[name]))
+    return bounds

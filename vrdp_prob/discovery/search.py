@@ -11,6 +11,7 @@ from vrdp_prob.discovery.scores import CauseScore, score_causes
 from vrdp_prob.discovery.trials import Trial, gain
 from vrdp_prob.inference.parallel import in_parallel
 from vrdp_prob.inference.several_videos.fitting import SharedFit
+from vrdp_prob.inference.several_videos.population import with_learned_spreads
 from vrdp_prob.models.effects.effect import Effect
 from vrdp_prob.models.effects.external_impulse import ExternalImpulse
 from vrdp_prob.progress import ProgressDisplay, SilentProgress
@@ -86,6 +87,7 @@ def search(
         Told how far the work is.
     """
     needed = float(np.log(len(catalogue) / FALSE_ALARM))
+    fit = fit.under(with_learned_spreads(fit), model_error=False)
     with (progress or SilentProgress()).stage("Trying causes", total=None) as advance:
         searcher = _Searcher(tuple(catalogue), seed, needed, advance)
         chain, steps = [Trial((), fit)], [searcher.first(Trial((), fit))]

@@ -28,10 +28,6 @@ from vrdp_prob.scene import Tracks
 
 Owned = tuple[str, int | None]
 """A number of a video: its name and its owner, None for the video's."""
-ODD = 1.4
-"""Squared residuals, in those of most videos and of noise, from which on a video is looked at again..."""
-LOOKS = 4
-"""...so many times at most."""
 LOG_FAINT = math.log(0.01)
 """Where the logarithm of a strength begins that is to be found, relative to what is expected of it."""
 
@@ -185,7 +181,7 @@ def fit_together(
             advance(1)
             return found
 
-        fits = _looked_at_again(in_parallel(fit, videos), model, seed)
+        fits = in_parallel(fit, videos)
     structures = tuple(structure_of(one.likelihood.coordinates) for one in fits)
     likelihoods = [plain_likelihood(fit.clues, model, one) for fit, one in zip(fits, structures, strict=True)]
     numbers, linked = link(likelihoods, shared)
@@ -193,27 +189,6 @@ def fit_together(
     names = None if shared is None else tuple(shared)
     found = _finished(joint, model, fits, structures, names, model_error=model_error)
     return replace(found, joint=_with_modes(found.joint, fits))
-
-
-def _looked_at_again(fits: Sequence[MapFit], model: PhysicsModel, seed: int) -> list[MapFit]:
-    """The fits, where videos that are explained much worse than most are searched anew from other seeds.
-
-    One video in fifty is missed by a search; several videos show which, since they are of one table.
-    """
-    ratios = np.array([one.misfit.chi_square for one in fits])
-    odd = ratios > np.maximum(ODD, ODD * np.median(ratios))
-
-    def best(index: int) -> MapFit:
-        found = fits[index]
-        for attempt in range(1, LOOKS if odd[index] else 1):
-            tracks = found.clues.tracks
-            again = fit_map(tracks, model, stream(seed + attempt, tracks.video))
-            found = min(found, again, key=lambda one: one.misfit.chi_square)
-            if found.misfit.chi_square < ODD * np.median(ratios):
-                break
-        return found
-
-    return in_parallel(best, range(len(fits)))
 
 
 def _with_modes(joint: JointFit, fits: Sequence[MapFit]) -> JointFit:

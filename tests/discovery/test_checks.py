@@ -14,14 +14,13 @@ from vrdp_prob.discovery.checks import run_checks
 from vrdp_prob.discovery.finding import Check
 from vrdp_prob.discovery.free_flight import FreeFlight
 from vrdp_prob.discovery.free_flight_checks import QUESTIONS
+from vrdp_prob.discovery.measurement_checks import GENERAL
 from vrdp_prob.discovery.residual_model import ResidualModel
 
 LARGER = Setting(videos=4, bodies=4)
 PAIRS = Setting(videos=3, bodies=2, frames=60)
 WELL_FITTED = 1.5
 """Largest chi-square per number at which a fit counts as one that found its maximum."""
-GENERAL = ("memory of the residuals", "size of the residuals")
-"""Checks that say that something is wrong, and not what."""
 
 
 def by_name(checks: tuple[Check, ...]) -> Mapping[str, Check]:

@@ -6,6 +6,7 @@ direction of their impulse is known from the motion after them alone.
 """
 
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float
@@ -76,6 +77,40 @@ def _patterns(model: ResidualModel, flight: FreeFlight, contacts: Sequence[Fitte
         yield from _turn_check(part("turn", "grow"))
     yield from _distance_check(part("grow", "rub"), contacts)
     yield from _momentum_check(part("together", "rub", "grow"), sum(len(one) for one in clear))
+
+
+@dataclass(frozen=True)
+class Rubbing:
+    """Tangential impulses that a model misses.
+
+    Parameters
+    ----------
+    normal
+        Normal impulse in kg m/s of each contact of which the direction is known.
+    ratio, sd
+        Missing tangential impulse (to the left of the normal) over the normal one, and its standard deviation.
+    """
+
+    normal: Float[np.ndarray, "contact"]
+    ratio: Float[np.ndarray, "contact"]
+    sd: Float[np.ndarray, "contact"]
+
+
+def rubbing(model: ResidualModel, flight: FreeFlight, contacts: Sequence[FittedContacts]) -> Rubbing:
+    """Tangential impulses, each by itself, beside all patterns of free flight."""
+    clear = [one.where(one.known_normal) for one in contacts]
+    vague = [one.where(~one.known_normal) for one in contacts]
+    changes = {
+        "rub": _one_after_another([_rubbing_each(one) for one in clear]),
+        "anything": _one_after_another([one.pushed_anyhow() for one in vague]),
+    }
+    rows = {
+        name: [video.rows(one) for video, one in zip(model.videos, parts, strict=True)]
+        for name, parts in changes.items()
+    }
+    score, places = joined(model.sharing(flight.rows), rows)
+    part = score.of(places["rub"], places["anything"])
+    return Rubbing(np.concatenate([one.events.impulse for one in clear]), part.estimate, part.sd)
 
 
 def _slipping(contacts: FittedContacts, *, moving: bool = True) -> Float[np.ndarray, "time body 3 column"]:

@@ -13,6 +13,8 @@ from vrdp_prob.discovery.finding import Check
 from vrdp_prob.discovery.free_flight import FreeFlight, Part
 from vrdp_prob.discovery.words import by, direction_words, number, opposite
 
+BESIDE = "Nothing is left of it beside"
+"""How the sentence of a check begins that another check explains."""
 SEEN = 0.01
 """Probability by chance below which a sentence says what was seen."""
 
@@ -220,7 +222,7 @@ def _check(flight: FreeFlight, question: Question, part: Part, p_value: float, s
         sentence = f"{found[0].upper()}{found[1:]}."
         given = {*question.given, *strongest.names}
         if question is not strongest and flight.part(question.names, tuple(given)).score.p_value >= SEEN:
-            sentence += f" Nothing is left of it beside what was found for '{strongest.name}'."
+            sentence += f" {BESIDE} what was found for '{strongest.name}'."
     return Check(question.name, part.size, p_value, False, sentence)
 
 

@@ -18,6 +18,12 @@ FASTEST_SHAKING = 0.25
 DECAY = 0.4
 """Share of the typical speed over which what acts on slow bodies alone fades."""
 
+SYMBOLS = (
+    "SI units; v velocity, u = v/|v|, n is u turned to the left, phi the direction of v, ex and ey along the axes, t "
+    "time since the first frame, s way travelled, omega spin, r to each other body, m mass"
+)
+"""What the symbols of formulas mean."""
+
 Field = Callable[[FittedMotion], Float[np.ndarray, "time body 2"]]
 
 
@@ -31,13 +37,13 @@ class Pattern:
         Name, unique among all patterns.
     field
         Accelerations for amplitude 1, of all bodies at all frames.
-    unit
-        Unit of the amplitude; the product with the field is in m/s^2.
+    formula
+        The field as part of a formula in SI units (see `SYMBOLS`).
     """
 
     name: str
     field: Field
-    unit: str
+    formula: str
 
 
 @dataclass(frozen=True)
@@ -75,6 +81,15 @@ class Scales:
     own_friction: bool
 
     @property
+    def place_words(self) -> tuple[str, str]:
+        """The place relative to the middle, along x and y, as part of a formula."""
+        x, y = (
+            f"({letter} {'-' if value >= 0 else '+'} {abs(value):.2f})"
+            for letter, value in zip("xy", self.middle, strict=True)
+        )
+        return x, y
+
+    @property
     def frequencies(self) -> dict[str, float]:
         """Frequencies in Hz of shaking that is looked for, by the name of their patterns."""
         slowest = SLOWEST_SHAKING / self.longest
@@ -103,26 +118,28 @@ class Scales:
 
 def patterns(scales: Scales) -> Iterator[Pattern]:
     """All patterns that videos of such scales can show."""
+    places = scales.place_words
     for axis, letter in enumerate("xy"):
-        yield Pattern(f"push {letter}", _push(axis), "m/s^2")
-        yield Pattern(f"push {letter} speed", _push(axis, lambda m: m.speed), "1/s")
+        yield Pattern(f"push {letter}", _push(axis), f"e{letter}")
+        yield Pattern(f"push {letter} speed", _push(axis, lambda m: m.speed), f"|v| e{letter}")
         for other, name in enumerate("xy"):
-            yield Pattern(f"push {letter} {name}", _push(axis, _place(scales, other)), "1/s^2")
-    for name, factor, unit in _factors(scales):
-        yield Pattern(f"along {name}", _along(factor), unit)
-    yield Pattern("across", _across(lambda m: np.ones_like(m.speed)), "m/s^2")
-    yield Pattern("across speed", _across(lambda m: m.speed), "1/s")
+            yield Pattern(f"push {letter} {name}", _push(axis, _place(scales, other)), f"{places[other]} e{letter}")
+    for name, factor, words in _factors(scales):
+        yield Pattern(f"along {name}", _along(factor), f"{words} u")
+    yield Pattern("across", _across(lambda m: np.ones_like(m.speed)), "n")
+    yield Pattern("across speed", _across(lambda m: m.speed), "|v| n")
     for axis, letter in enumerate("xy"):
-        yield Pattern(f"across speed {letter}", _across(_turning(_place(scales, axis))), "1/(m s)")
-    yield Pattern("across speed time", _across(_turning(_clock)), "1/s^2")
-    yield Pattern("across cosine", _across(_heading(np.cos)), "m/s^2")
-    yield Pattern("across sine", _across(_heading(np.sin)), "m/s^2")
+        yield Pattern(f"across speed {letter}", _across(_turning(_place(scales, axis))), f"{places[axis]} |v| n")
+    yield Pattern("across speed time", _across(_turning(_clock)), "t |v| n")
+    yield Pattern("across cosine", _across(_heading(np.cos)), "cos(2 phi) n")
+    yield Pattern("across sine", _across(_heading(np.sin)), "sin(2 phi) n")
     if scales.turning:
-        yield Pattern("across speed spin", _across(_turning(lambda m: m.spin)), "1")
-    unit = "m^3/s^2 kg" if scales.weighed else "m^3/s^2"
-    yield Pattern("others square", _towards_others(2, weighed=scales.weighed), unit)
+        yield Pattern("across speed spin", _across(_turning(lambda m: m.spin)), "omega |v| n")
+    mass = "/m" if scales.weighed else ""
+    softened = f"(r^2 + {SOFTENING:g}^2)"
+    yield Pattern("others square", _towards_others(2, weighed=scales.weighed), f"sum r/{softened}^1.5{mass}")
     yield from _shaking(scales)
-    yield Pattern("others", _towards_others(1, weighed=scales.weighed), "m^2/s^2")
+    yield Pattern("others", _towards_others(1, weighed=scales.weighed), f"sum r/{softened}")
 
 
 def _shaking(scales: Scales) -> Iterator[Pattern]:
@@ -130,34 +147,37 @@ def _shaking(scales: Scales) -> Iterator[Pattern]:
     for name, frequency in scales.frequencies.items():
         rate = 2 * np.pi * frequency
         for axis, letter in enumerate("xy"):
-            yield Pattern(f"{name} cosine {letter}", _push(axis, _wave(np.cos, rate)), "m/s^2")
-            yield Pattern(f"{name} sine {letter}", _push(axis, _wave(np.sin, rate)), "m/s^2")
+            for phase, function in (("cosine", np.cos), ("sine", np.sin)):
+                words = f"{phase[:3]}({rate:.2f} t) e{letter}"
+                yield Pattern(f"{name} {phase} {letter}", _push(axis, _wave(function, rate)), words)
 
 
 Factor = Callable[[FittedMotion], Float[np.ndarray, "time body"]]
 
 
 def _factors(scales: Scales) -> Iterator[tuple[str, Factor, str]]:
-    """What an acceleration along the velocity may depend on."""
-    yield "speed", lambda m: m.speed, "1/s"
-    yield "slowness", lambda m: np.exp(-m.speed / (DECAY * scales.speed)), "m/s^2"
-    yield "cosine", _heading(np.cos), "m/s^2"
-    yield "sine", _heading(np.sin), "m/s^2"
-    yield "x", _place(scales, 0), "1/s^2"
-    yield "y", _place(scales, 1), "1/s^2"
-    yield "distance", lambda m: _place(scales, 0)(m) ** 2 + _place(scales, 1)(m) ** 2, "1/(m s^2)"
-    yield "time", _clock, "m/s^3"
-    yield "way", _way, "1/s^2"
+    """What an acceleration along the velocity may depend on, and the words of a formula for it."""
+    decay = DECAY * scales.speed
+    x, y = scales.place_words
+    yield "speed", lambda m: m.speed, "|v|"
+    yield "slowness", lambda m: np.exp(-m.speed / decay), f"exp(-|v|/{decay:.2g})"
+    yield "cosine", _heading(np.cos), "cos(2 phi)"
+    yield "sine", _heading(np.sin), "sin(2 phi)"
+    yield "x", _place(scales, 0), x
+    yield "y", _place(scales, 1), y
+    yield "distance", lambda m: _place(scales, 0)(m) ** 2 + _place(scales, 1)(m) ** 2, f"({x}^2 + {y}^2)"
+    yield "time", _clock, "t"
+    yield "way", _way, "s"
     if scales.turning:
-        yield "spin", lambda m: np.abs(m.spin), "m/s"
+        yield "spin", lambda m: np.abs(m.spin), "|omega|"
     if scales.own_friction:
         return
     if {Shape.CUBE, Shape.CYLINDER} <= scales.shapes:
-        yield "cube", _of_body(lambda body: float(body.shape is Shape.CUBE)), "m/s^2"
+        yield "cube", _of_body(lambda body: float(body.shape is Shape.CUBE)), "[cube]"
     for material in scales.materials[1:]:
-        yield f"material {material}", _of_body(_is_made_of(material)), "m/s^2"
+        yield f"material {material}", _of_body(_is_made_of(material)), f"[{material}]"
     if scales.weighed:
-        yield "mass", _of_body(lambda body: float(np.log(body.mass or 1.0))), "m/s^2"
+        yield "mass", _of_body(lambda body: float(np.log(body.mass or 1.0))), "log(m)"
 
 
 def _push(axis: int, factor: Factor | None = None) -> Field:

@@ -90,6 +90,10 @@ class LinearVideo:
         """The video with further own unknowns of which nothing is known beforehand."""
         return replace(self, own=np.concatenate([self.own, self.padded(data)], axis=1))
 
+    def alone(self) -> "LinearVideo":
+        """The video where the shared unknowns are its own, too."""
+        return replace(self, own=np.concatenate([self.own, self.shared], axis=1), shared=self.shared[:, :0])
+
     def padded(self, data: Float[np.ndarray, "data direction"]) -> Float[np.ndarray, "residual direction"]:
         """Directions of the data's residuals, continued by zeros for the prior."""
         return np.concatenate([data, np.zeros((len(self.residuals) - self.data, data.shape[1]))])

@@ -15,6 +15,8 @@ from vrdp_prob.discovery.residual_model import ResidualModel, VideoResiduals
 from vrdp_prob.discovery.words import number, opposite
 from vrdp_prob.inference.free_flight import CUBIC_NOISE_GAIN, NORMAL_MAD
 
+MEMORY, SIZE = GENERAL = ("memory of the residuals", "size of the residuals")
+"""Checks that say that something is wrong, and not what."""
 GROSS = 1e-4
 """A position is grossly off if noise puts it as far from those before and after less often."""
 FEWEST = 30
@@ -206,7 +208,7 @@ def _noise_checks(model: ResidualModel, replicas: Replicas) -> Iterator[Check]:
         if p_value < SEEN
         else "What is left in neighbouring frames is as independent as noise."
     )
-    yield Check("memory of the residuals", correlation, p_value, False, sentence)
+    yield Check(MEMORY, correlation, p_value, False, sentence)
     rough, drawn_rough = np.concatenate(fourths), np.concatenate(drawn_fourths)
     if len(rough) < FEWEST:
         return
@@ -220,7 +222,17 @@ def _noise_checks(model: ResidualModel, replicas: Replicas) -> Iterator[Check]:
         if p_value < SEEN
         else "Residuals are as large as the roughness of the tracks."
     )
-    yield Check("size of the residuals", float(np.sqrt(ratio)), p_value, False, sentence)
+    yield Check(SIZE, float(np.sqrt(ratio)), p_value, False, sentence)
+
+
+def roughness(model: ResidualModel) -> float:
+    """Mean square of the residuals if they were as large as the roughness of the tracks; that of all where unknown."""
+    differences = [
+        _third_difference(left[: video.positions].reshape(-1, 2, 1), _runs(video, 4)).ravel()
+        for video, left in zip(model.videos, model.left, strict=True)
+    ]
+    rough = np.concatenate(differences)
+    return min(_squared_sd(rough), model.dispersion) if len(rough) >= FEWEST else model.dispersion
 
 
 def _runs(video: VideoResiduals, length: int, *, near_contacts: bool = False) -> Int[np.ndarray, "length run"]:

@@ -1,0 +1,142 @@
+"""What is known of an effect that no cause of the catalogue explains: where it shows, its size, a sparse formula."""
+
+from collections.abc import Iterator
+
+import numpy as np
+from jaxtyping import Float
+
+from vrdp_prob.discovery.checks import run_checks
+from vrdp_prob.discovery.finding import Check, Description
+from vrdp_prob.discovery.free_flight import FreeFlight
+from vrdp_prob.discovery.free_flight_checks import BESIDE
+from vrdp_prob.discovery.free_flight_patterns import SYMBOLS, Pattern
+from vrdp_prob.discovery.measurement_checks import GENERAL, roughness
+from vrdp_prob.discovery.missing_acceleration import Separate, Windows, missing_acceleration
+from vrdp_prob.discovery.residual_model import ResidualModel
+from vrdp_prob.discovery.sparse_formula import SparseFormula, sparse_formula
+from vrdp_prob.discovery.words import number
+from vrdp_prob.inference.several_videos.fitting import SharedFit
+
+CLEARLY = 1.5
+"""Ratio of sizes from which on one part of the motion is said to show more of an effect than another."""
+NOTABLE = 0.1
+"""Share below which a part of what is unexplained is not worth a word."""
+MOST_CHECKS = 2
+"""Checks that are quoted."""
+
+
+def describe(fit: SharedFit, *, seed: int) -> Description:
+    """Describe what a joint fit leaves unexplained.
+
+    Parameters
+    ----------
+    fit
+        The fit.
+    seed
+        Seed of the replications of the checks that are quoted.
+
+    Returns
+    -------
+    The description. Its formula is the sum of the fewest state terms whose error in left-out videos is within one
+    standard error of the smallest (orthogonal matching pursuit, whole videos left out); it tells what the missing
+    acceleration is like, not what causes it.
+    """
+    model = ResidualModel.of(fit)
+    flight = FreeFlight.of(model)
+    noise = roughness(model)
+    windows = missing_acceleration(flight.model, noise)
+    shown = [k for k, one in enumerate(flight.patterns) if _may_show(flight, one)]
+    separate = Separate.of(flight.model, [rows[:, shown] for rows in flight.rows], noise)
+    found = sparse_formula(separate)
+    places = [shown[k] for k in found.terms]
+    formula = _formula([flight.patterns[k] for k in places], found.coefficients)
+    sentences = [
+        *_share_sentences(model, flight.model, noise),
+        *_window_sentences(windows),
+        *_formula_sentences(found, formula),
+        *_check_sentences(run_checks(fit, seed=seed)),
+    ]
+    return Description(formula, found.explained, float(np.sqrt(2)) * windows.size, tuple(sentences))
+
+
+def _may_show(flight: FreeFlight, pattern: Pattern) -> bool:
+    """Whether a pattern may be a term: of shaking only the frequency that shows most."""
+    if not pattern.name.startswith("shaking"):
+        return True
+    names = list(flight.scales.frequencies)
+    statistics = [
+        flight.part([one.name for one in flight.patterns if one.name.startswith(f"{name} ")]).score.chi_square
+        for name in names
+    ]
+    return pattern.name.startswith(f"{names[int(np.argmax(statistics))]} ")
+
+
+def _formula(terms: list[Pattern], coefficients: Float[np.ndarray, "term"]) -> str:
+    if not terms:
+        return "none of the terms"
+    signs = ["-" if value < 0 else "+" for value in coefficients]
+    parts = [
+        f"{sign} {number(abs(value))} {term.formula}"
+        for sign, value, term in zip(signs, coefficients.tolist(), terms, strict=True)
+    ]
+    return "a = " + " ".join(parts).removeprefix("+ ").replace("- ", "-", int(signs[0] == "-"))
+
+
+def _share_sentences(model: ResidualModel, freed: ResidualModel, noise: float) -> Iterator[str]:
+    """How much of what is unexplained begins at contacts."""
+    whole, left = (one.linear.degrees * (one.dispersion - noise) for one in (model, freed))
+    if whole <= 0 or model.dispersion < 1.05 * noise:
+        yield "The residuals are hardly larger than the roughness of the tracks."
+        return
+    share = float(np.clip(1 - left / whole, 0.0, 1.0))
+    if share > NOTABLE:
+        yield f"{100 * share:.0f} % of what is unexplained begins at contacts."
+    else:
+        yield "What is unexplained builds up in free flight, not at contacts."
+
+
+def _window_sentences(windows: Windows) -> Iterator[str]:
+    """Size and direction of the missing acceleration, and where in speed, time and place there is more of it."""
+    if windows.size == 0 or len(windows.time) < 6:
+        yield "No missing acceleration shows in free flight."
+        return
+    squares = (windows.acceleration**2).sum(axis=1)
+    total = float(squares.sum())
+    along = float((windows.along**2).sum()) / total
+    yield (
+        f"In free flight {number(float(np.sqrt(2)) * windows.size)} m/s^2 are missing (root mean square), "
+        f"{100 * along:.0f} % of its square along the path and {100 * (1 - along):.0f} % across."
+    )
+    middle = np.median(windows.position, axis=0)
+    aspects = (
+        ("speeds", windows.speed, "m/s"),
+        ("times", windows.time, "s"),
+        ("x", windows.position[:, 0], "m"),
+        ("y", windows.position[:, 1], "m"),
+        ("distances from the middle of the plane", np.linalg.norm(windows.position - middle, axis=1), "m"),
+    )
+    for name, values, unit in aspects:
+        low, high = np.quantile(values, [1 / 3, 2 / 3])
+        below, above = (float(np.sqrt(squares[part].mean())) for part in (values <= low, values >= high))
+        if max(below, above) > CLEARLY * min(below, above):
+            yield (
+                f"It is {'larger' if above > below else 'smaller'} at large {name}: {number(above)} m/s^2 above "
+                f"{number(float(high))} {unit}, {number(below)} m/s^2 below {number(float(low))} {unit}."
+            )
+
+
+def _formula_sentences(found: SparseFormula, formula: str) -> Iterator[str]:
+    if not found.terms:
+        yield "No sum of state terms predicts it in videos that were left out."
+        return
+    yield (
+        f"The formula {formula} explains {100 * found.explained:.0f} % of it in videos that were left out ({SYMBOLS}); "
+        "it describes, and names no cause."
+    )
+
+
+def _check_sentences(checks: tuple[Check, ...]) -> Iterator[str]:
+    specific = [check for check in checks if check.significant and check.name not in GENERAL]
+    telling = [check for check in specific if BESIDE not in check.sentence]
+    for check in telling[:MOST_CHECKS]:
+        yield check.sentence

@@ -1,0 +1,78 @@
+"""Figures of what a model misses, and the window estimates that they show."""
+
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+
+from tests.discovery.fitted import fitted
+from tests.discovery.test_describe import PAIRS
+from vrdp_prob.discovery.figures import residual_figures
+from vrdp_prob.discovery.free_flight import FreeFlight
+from vrdp_prob.discovery.measurement_checks import roughness
+from vrdp_prob.discovery.missing_acceleration import Windows, missing_acceleration
+from vrdp_prob.discovery.plots import Plot, side_by_side
+from vrdp_prob.discovery.residual_model import ResidualModel
+from vrdp_prob.inference.several_videos.fitting import SharedFit
+from vrdp_prob.report.axes import Axis
+
+SVG = "{http://www.w3.org/2000/svg}"
+
+
+def windows(fit: SharedFit) -> Windows:
+    model = ResidualModel.of(fit)
+    return missing_acceleration(FreeFlight.of(model).model, roughness(model))
+
+
+def test_windows_of_a_tilted_table_show_its_push_and_those_of_a_null_nothing() -> None:
+    data, tilted = fitted("surface_tilt", seed=2, setting=PAIRS)
+    found = windows(tilted)
+    laws = data.truth.videos[0].laws
+    expected = 9.81 * np.array([laws.tilt_x, laws.tilt_y])
+    weights = found.sd**-2
+    mean = (found.acceleration * weights).sum(axis=0) / weights.sum(axis=0)
+    assert mean @ expected / np.linalg.norm(mean) / np.linalg.norm(expected) > 0.9
+    assert found.size == pytest.approx(np.linalg.norm(expected) / np.sqrt(2), rel=0.6)
+    np.testing.assert_allclose(found.along**2 + found.across**2, (found.acceleration**2).sum(axis=1), rtol=1e-6)
+    _, null = fitted(seed=1)
+    assert windows(null).size < 0.2 * found.size
+
+
+def test_there_is_a_figure_of_each_aspect_and_it_is_an_svg_element() -> None:
+    _, fit = fitted(seed=1)
+    alone, both = residual_figures(fit, None), residual_figures(fit, fit)
+    assert list(alone) == list(both)
+    assert list(both)[:3] == [
+        "Missing acceleration over the plane",
+        "Missing acceleration against speed",
+        "Missing acceleration against time",
+    ]
+    for before, after in zip(alone.values(), both.values(), strict=True):
+        element, larger = ElementTree.fromstring(before), ElementTree.fromstring(after)
+        assert element.tag == f"{SVG}svg"
+        assert element.get("aria-label")
+        assert "themed" in (element.get("class") or "")
+        assert "nan" not in after.lower()
+        assert len(list(larger.iter(f"{SVG}circle"))) > len(list(element.iter(f"{SVG}circle")))
+        assert "the extended model" in after
+
+
+def test_a_point_stands_where_its_axes_say_and_labels_are_escaped() -> None:
+    plot = Plot(Axis(0, 10, False, (0, 5, 10)), Axis(-1, 1, False, (0,)), "x < 3", "y & z", width=170, height=166)
+    plot.point(5, 0, 0.5, "red")
+    element = ElementTree.fromstring(side_by_side([plot], 'a "plot"'))
+    (circle,) = element.iter(f"{SVG}circle")
+    assert (float(circle.get("cx", 0)), float(circle.get("cy", 0))) == (108.0, 76.0)
+    words = [text.text for text in element.iter(f"{SVG}text")]
+    assert {"x < 3", "y & z", "0", "5", "10"} <= set(words)
+    assert element.get("aria-label") == 'a "plot"'
+
+
+def test_an_arrow_too_short_to_see_is_a_dot() -> None:
+    axis = Axis(0, 1, False, ())
+    plot = Plot(axis, axis, "", "")
+    plot.arrow((0.5, 0.5), (0.5, 0.5001), "red")
+    assert "<circle" in plot.element
+    plot = Plot(axis, axis, "", "")
+    plot.arrow((0.2, 0.5), (0.8, 0.5), "red")
+    assert "<circle" not in plot.element

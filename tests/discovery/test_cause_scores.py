@@ -1,0 +1,97 @@
+"""Score tests of causes at the strength at which they vanish."""
+
+import numpy as np
+import pytest
+from scipy.stats import chi2
+
+from tests.discovery.fitted import fitted
+from vrdp_prob.discovery.estimates import upper_bounds
+from vrdp_prob.discovery.linear import LinearFit
+from vrdp_prob.discovery.scores import CauseScore, happens_once, score_causes
+from vrdp_prob.models.effects.clock_error import ClockError
+from vrdp_prob.models.effects.external_impulse import ExternalImpulse
+from vrdp_prob.models.effects.linear_drag import LinearDrag
+from vrdp_prob.models.effects.surface_tilt import SurfaceTilt
+from vrdp_prob.models.effects.wall import Wall
+from vrdp_prob.models.model_file import known_effects
+
+
+def scored(way: str | None, *, seed: int, names: tuple[str, ...] | None = None) -> dict[str, CauseScore]:
+    _, fit = fitted(way, seed=seed)
+    present = {effect.name for effect in fit.model.effects}
+    effects = [
+        effect() for name, effect in known_effects().items() if name not in present and (names is None or name in names)
+    ]
+    return {one.effect.name: one for one in score_causes(fit, LinearFit.of(fit), effects, seed=0)}
+
+
+def test_a_null_gives_no_cause_a_small_p_value() -> None:
+    found = scored(None, seed=1)
+    assert len(found) >= 15
+    assert min(one.p_value for one in found.values()) > 0.05 / 20 / 10  # false alarm of one seed in 200
+    assert not any(one.sites for one in found.values())
+
+
+def test_a_hidden_slope_has_the_largest_score_and_the_right_size() -> None:
+    data, _ = fitted("surface_tilt", seed=1)
+    found = scored("surface_tilt", seed=1, names=("surface_tilt", "linear_drag", "friction_patch"))
+    first = next(iter(found.values()))
+    assert first.effect.name == "surface_tilt"
+    assert first.p_value < 1e-9
+    slope = np.hypot(first.start["tilt_x"], first.start["tilt_y"])
+    assert slope == pytest.approx(data.truth.causes[0].strength, rel=0.5)
+
+
+def test_a_strength_that_cannot_be_negative_is_tested_on_one_side() -> None:
+    found = scored(None, seed=1, names=("linear_drag", "contact_friction"))
+    for one in found.values():
+        assert one.chi_square >= 0
+        if one.chi_square == 0:
+            assert one.p_value == 1.0
+        assert all(value > 0 for value in one.start.values())
+
+
+def test_the_p_value_of_a_single_place_is_that_of_chi_square() -> None:
+    one = scored(None, seed=1, names=("surface_tilt",))["surface_tilt"]
+    assert one.degrees == 2
+    assert one.p_value == pytest.approx(float(chi2.sf(one.chi_square, 2)))
+
+
+def test_a_scan_pays_for_looking_everywhere() -> None:
+    one = scored(None, seed=1, names=("friction_patch",))["friction_patch"]
+    assert one.p_value > 2 * float(chi2.sf(one.chi_square, one.degrees))
+
+
+def test_a_kick_is_found_in_its_video_at_its_body_and_time() -> None:
+    data, fit = fitted("external_impulse", seed=2)
+    number, (body, time) = next(
+        (k, (video.laws.kick_body, video.laws.kick_time))
+        for k, video in enumerate(data.truth.videos)
+        if np.hypot(video.laws.kick_x, video.laws.kick_y) > 0
+    )
+    one = score_causes(fit, LinearFit.of(fit), [ExternalImpulse()], seed=0)[0]
+    assert one.sites
+    assert (one.sites[0].video, one.sites[0].owner) == (number, body)
+    assert one.sites[0].values["impulse_time"] == pytest.approx(time, abs=0.2)
+
+
+def test_which_effects_happen_once() -> None:
+    assert happens_once(ExternalImpulse())
+    assert happens_once(ClockError())
+    assert not happens_once(SurfaceTilt())
+
+
+def test_a_cause_without_a_vanishing_strength_has_no_score() -> None:
+    _, fit = fitted(seed=1)
+    assert score_causes(fit, LinearFit.of(fit), [Wall()], seed=0) == []
+
+
+def test_bounds_lie_beyond_the_estimates() -> None:
+    for one in scored(None, seed=1, names=("surface_tilt", "linear_drag")).values():
+        for bound in upper_bounds(one):
+            assert bound.bound is not None
+            assert (
+                bound.bound >= abs(one.start[bound.parameter])
+                if one.effect.name != LinearDrag.name
+                else bound.bound > 0
+            )

@@ -1,0 +1,59 @@
+"""First guesses of hidden walls and discs, from kicks."""
+
+import numpy as np
+import pytest
+
+from tests.discovery.fitted import fitted
+from vrdp_prob.discovery.linear import LinearFit
+from vrdp_prob.discovery.proposals import hidden_things
+from vrdp_prob.discovery.scores import score_causes
+from vrdp_prob.discovery.trials import Trial
+from vrdp_prob.models.effects.external_impulse import ExternalImpulse
+from vrdp_prob.models.effects.hidden_obstacle import HiddenObstacle
+from vrdp_prob.models.effects.wall import Wall
+
+WAY, SEED = "hidden_obstacle", 1
+
+
+@pytest.fixture(scope="module")
+def kicked() -> Trial:
+    _, fit = fitted(WAY, 20.0, seed=SEED)
+    score = score_causes(fit, LinearFit.of(fit), [ExternalImpulse()], seed=0)[0]
+    assert score.sites
+    found = Trial((), fit).with_cause(score)
+    assert found is not None
+    return found
+
+
+def test_a_disc_is_guessed_where_it_touches_the_hidden_one(kicked: Trial) -> None:
+    data, _ = fitted(WAY, 20.0, seed=SEED)
+    disc = data.truth.videos[0].hidden_discs[0]
+    starts = [one.start for one in hidden_things(kicked.fit, [HiddenObstacle()], 0.0)]
+    assert starts
+    # All guesses touch the body at one point; the true disc does so too, whatever its radius.
+    reach = [
+        abs(
+            np.hypot(one["obstacle_x"] - disc.x, one["obstacle_y"] - disc.y) - abs(one["obstacle_radius"] - disc.radius)
+        )
+        for one in starts
+    ]
+    assert min(reach) < 0.05
+
+
+def test_a_wall_is_guessed_square_to_the_kick(kicked: Trial) -> None:
+    guesses = hidden_things(kicked.fit, [Wall()], 0.0)
+    assert guesses
+    assert all(0 < one.start["hidden_wall_restitution"] < 1 for one in guesses)
+
+
+def test_nothing_is_guessed_of_other_causes(kicked: Trial) -> None:
+    assert hidden_things(kicked.fit, [ExternalImpulse()], 0.0) == []
+
+
+def test_a_disc_in_the_place_of_the_kick_explains_the_videos_as_well(kicked: Trial) -> None:
+    starts = hidden_things(kicked.fit, [HiddenObstacle()], 0.0)
+    found = [one for one in map(kicked.with_cause_in_place, starts) if one is not None]
+    assert found
+    best = max(found, key=lambda one: float(one.log_density.sum()))
+    assert best.names == ("hidden_obstacle",)
+    assert best.log_density.sum() > kicked.log_density.sum() - 15

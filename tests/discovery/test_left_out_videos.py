@@ -1,0 +1,67 @@
+"""What leaving a video out says, how models are weighed by it, and how far off forecasts are."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tests.discovery.fitted import fitted
+from vrdp_prob.discovery.forecast import held_out
+from vrdp_prob.discovery.held_out import cavities
+from vrdp_prob.discovery.linear import LinearFit
+from vrdp_prob.discovery.scores import score_causes
+from vrdp_prob.discovery.trials import Trial, gain, weights
+from vrdp_prob.inference.several_videos.fitting import fit_together
+from vrdp_prob.models.effects.surface_tilt import SurfaceTilt
+
+
+def test_a_video_is_as_probable_as_the_evidence_with_it_over_that_without_it() -> None:
+    data, fit = fitted(seed=1)
+    others = fit_together(data.tracks[1:], model=fit.model, model_error=False)
+    left_out = next(iter(cavities(fit).values()))
+    assert left_out.log_density == pytest.approx(fit.log_evidence - others.log_evidence, abs=1.0)
+
+
+def test_what_the_others_say_is_less_sharp_than_what_all_say() -> None:
+    _, fit = fitted(seed=1)
+    for cavity in cavities(fit).values():
+        assert (np.sqrt(np.diag(cavity.covariance)) >= fit.joint.gaussian.sd * (1 - 1e-6)).all()
+
+
+def test_a_right_cause_gains_and_its_removal_loses_the_same() -> None:
+    data, fit = fitted("surface_tilt", seed=1)
+    base = Trial((), fit)
+    score = score_causes(fit, LinearFit.of(fit), [SurfaceTilt()], seed=0)[0]
+    found = base.with_cause(score)
+    assert found is not None
+    assert found.names == ("surface_tilt",)
+    gained, error = gain(found, base)
+    assert gained > max(30.0, error)
+    values = dict(zip(found.fit.joint.numbers.names, found.fit.joint.gaussian.mean, strict=True))
+    truth = data.truth.videos[0].laws
+    assert (values["tilt_x"], values["tilt_y"]) == pytest.approx((truth.tilt_x, truth.tilt_y), rel=0.1, abs=2e-4)
+    again = found.without(found.causes[0])
+    assert again.names == ()
+    assert abs(gain(again, base)[0]) < 0.1 * gained
+
+
+def test_equal_models_have_equal_weights_and_a_hopeless_one_none() -> None:
+    _, fit = fitted(seed=1)
+    base = Trial((), fit)
+    hopeless = replace(base, choices={"handicap": np.full(len(fit.fits), 30.0)})
+    found = weights([base, base, hopeless], [0.0, 0.0, 0.0], np.random.default_rng(0))
+    assert found[:2] == pytest.approx([0.5, 0.5])
+    assert found[2] < 1e-3
+    prior = weights([base, base], [0.0, -np.log(3.0)], np.random.default_rng(0))
+    assert prior == pytest.approx([0.75, 0.25])
+
+
+def test_forecasts_of_a_null_are_as_far_off_as_they_say() -> None:
+    _, fit = fitted(seed=1)
+    joint = fit.joint
+    points = [joint.point(index) for index in range(len(joint.videos))]
+    found = held_out(joint.videos, points, list(cavities(fit).values()))
+    assert 0.001 < found.rmse < 0.2
+    assert found.rmse_end is not None
+    assert found.coverage_50 < found.coverage_90
+    assert found.coverage_90 > 0.6

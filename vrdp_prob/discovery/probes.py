@@ -7,8 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from vrdp_prob.inference.several_videos.fitting import SharedFit, plain_likelihood
+from vrdp_prob.inference.several_videos.fitting import SharedFit
 from vrdp_prob.inference.several_videos.linking import Key, shared_key
+from vrdp_prob.inference.several_videos.parts import plain_likelihood
 from vrdp_prob.models.coordinates import Coordinate
 from vrdp_prob.models.effects.effect import Effect
 from vrdp_prob.models.parameters import Transform

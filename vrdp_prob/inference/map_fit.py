@@ -33,11 +33,9 @@ from vrdp_prob.progress import ProgressDisplay, SilentProgress
 from vrdp_prob.scene import Tracks
 
 AGREED = 1.0
-"""Fits are grown anew until the two best agree to so many nats..."""
-MOST_ATTEMPTS = 3
-"""...but at most so many, where the first met several open yaws at once or is not plausible..."""
+"""Fits are grown anew until the two best agree to so many nats."""
 GOOD_COST = 1.15
-"""...which it is up to this factor on the cost that noise alone would make."""
+"""A fit is plausible up to this factor on the cost that noise alone would make."""
 LBFGS_ITERATIONS = 30
 
 
@@ -112,6 +110,7 @@ def fit_map(
     *,
     noise: NoiseFamily | None = None,
     plan: FitPlan | None = None,
+    model_error: bool = True,
 ) -> MapFit:
     """Find the most probable values of a video.
 
@@ -129,6 +128,8 @@ def fit_map(
         Distribution of the measurement errors; where None, Student-t if the tracks show gross outliers, else Gaussian.
     plan
         Stages and optimiser; `FitPlan()` where None.
+    model_error
+        Whether what the model leaves unexplained is looked for, and widens the density.
 
     Raises
     ------
@@ -149,7 +150,7 @@ def fit_map(
     found = _refined(everything, starts, likelihood, stages)
     misfit = judge(likelihood, found[0].point, clues.noise, int(clues.outliers.sum()))
     evaluations = sum(one.evaluations for one in attempts) + sum(one.evaluations for one in found)
-    for _ in range(TURNS):
+    for _ in range(TURNS if model_error else 0):
         error = next_model_error(likelihood, found[0].point, clues, misfit)
         if error is None or error is likelihood.model_error:
             break
@@ -188,7 +189,7 @@ class _Task:
 def _attempts(task: _Task, generator: np.random.Generator, progress: ProgressDisplay | None) -> list[GrowingFit]:
     """Fits that grow anew from other draws until no doubt is left."""
     attempts = [_grow(task, generator, progress)]
-    while _in_doubt(attempts) and len(attempts) < MOST_ATTEMPTS:
+    while _in_doubt(attempts) and len(attempts) < task.plan.attempts:
         attempts.append(_grow(task, generator, progress))
     return attempts
 

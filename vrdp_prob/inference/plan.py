@@ -33,12 +33,15 @@ class FitPlan:
     alternatives
         Whether several starts are tried: worlds drawn where a window brings something new, other explanations of
         contacts, fits grown anew where there was doubt. Without them there is one start and one mode.
+    attempts
+        Times that a fit is grown anew at most, where the first met several open yaws at once or is not plausible.
     """
 
     optimiser: Optimiser = Optimiser.GAUSS_NEWTON
     free_first: bool = False
     windows: int | tuple[int, ...] = 8
     alternatives: bool = True
+    attempts: int = 3
 
     def ends(self, tracks: Tracks) -> list[int]:
         """Frame counts of the windows, the whole video last."""

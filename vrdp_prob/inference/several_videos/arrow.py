@@ -244,6 +244,11 @@ class Expansions:
         """Upper-triangular root of the curvature in the shared numbers when all own ones follow."""
         return upper_root(np.concatenate([self.prior.rows, *(one.reduced_rows for one in self.videos)]))
 
+    @property
+    def root(self) -> Float[np.ndarray, "shared shared"]:
+        """Lower-triangular root of the covariance of the shared numbers."""
+        return _covariance_root(self._triangle)
+
     @cached_property
     def gradient(self) -> Float[np.ndarray, "shared"]:
         """Gradient in the shared numbers when all own ones follow."""
@@ -277,7 +282,7 @@ class Expansions:
     ) -> ArrowGaussian:
         """The Gaussian around a maximum at which all were expanded."""
         blocks = (one.around(local, logarithms) for local, one in zip(locals_, self.videos, strict=True))
-        return ArrowGaussian(shared, _covariance_root(self._triangle), tuple(blocks), logarithms)
+        return ArrowGaussian(shared, self.root, tuple(blocks), logarithms)
 
     def _solve(self, vector: Float[np.ndarray, "shared"]) -> Float[np.ndarray, "shared"]:
         """A vector divided by the curvature in the shared numbers."""

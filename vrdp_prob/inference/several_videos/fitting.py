@@ -1,26 +1,26 @@
 """The joint fit of several videos: each by itself first, then all together, then what the model leaves unexplained."""
 
 import math
-import zlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from jaxtyping import Float
 
 from vrdp_prob.errors import InputError
-from vrdp_prob.inference.clues import Clues
 from vrdp_prob.inference.map_fit import MapFit, fit_map
 from vrdp_prob.inference.misfit import judge
 from vrdp_prob.inference.mode import Mode
 from vrdp_prob.inference.model_error_fit import TURNS, next_model_error
 from vrdp_prob.inference.parallel import in_parallel
+from vrdp_prob.inference.plan import FitPlan
+from vrdp_prob.inference.several_videos.agreement import first_guess
 from vrdp_prob.inference.several_videos.ascent import climb
-from vrdp_prob.inference.several_videos.joint_fit import JointFit, first_guess, with_alternatives
-from vrdp_prob.inference.several_videos.linking import LinkedVideo, check_names, link
-from vrdp_prob.models.coordinates import Coordinates
+from vrdp_prob.inference.several_videos.joint_fit import JointFit, with_alternatives
+from vrdp_prob.inference.several_videos.linking import check_names, link
+from vrdp_prob.inference.several_videos.parts import carried_starts, plain_likelihood, stream, structure_of
+from vrdp_prob.inference.several_videos.second_look import look_again, trusted
+from vrdp_prob.inference.several_videos.transfer import coordinate, first_numbers
 from vrdp_prob.models.likelihood import Likelihood
-from vrdp_prob.models.parameters import MASS, RESTITUTION, Transform
 from vrdp_prob.models.physics import PhysicsModel
 from vrdp_prob.models.unknowns import Structure, unknowns
 from vrdp_prob.progress import ProgressDisplay, SilentProgress
@@ -28,8 +28,6 @@ from vrdp_prob.scene import Tracks
 
 Owned = tuple[str, int | None]
 """A number of a video: its name and its owner, None for the video's."""
-LOG_FAINT = math.log(0.01)
-"""Where the logarithm of a strength begins that is to be found, relative to what is expected of it."""
 
 
 @dataclass(frozen=True)
@@ -107,18 +105,7 @@ class SharedFit:
             plain_likelihood(fit.clues, model, structure) for fit, structure in zip(self.fits, structures, strict=True)
         ]
         numbers, videos = link(likelihoods, self.shared)
-        known = dict(zip(joint.numbers.keys, joint.gaussian.mean, strict=True))
-        vanishing, wanted = self._vanishing(model), dict(start or {})
-        shared, towards = numbers.prior_mean.copy(), numbers.prior_mean.copy()
-        for place, (key, entry) in enumerate(zip(numbers.keys, numbers.entries, strict=True)):
-            if key in known:
-                shared[place] = towards[place] = known[key]
-                continue
-            if key[0] in wanted:
-                shared[place] = towards[place] = _coordinate(entry.transform, wanted[key[0]])
-            if key[0] in vanishing:
-                shared[place] = _nearly_vanished(entry.transform, vanishing[key[0]], towards[place])
-                towards[place] = towards[place] if key[0] in wanted else shared[place]
+        shared, towards = first_numbers(joint, numbers, self._vanishing(model), start or {})
         locals_ = [
             video.split(old.likelihood.coordinates.carried(joint.point(index), video.likelihood.coordinates))[1]
             for index, (old, video) in enumerate(zip(joint.videos, videos, strict=True))
@@ -128,7 +115,7 @@ class SharedFit:
             for number, place in enumerate(video.local_places):
                 entry = entries[place]
                 if (entry.field, entry.owner) in values:
-                    mine[number] = _coordinate(entry.transform, values[entry.field, entry.owner])
+                    mine[number] = coordinate(entry.transform, values[entry.field, entry.owner])
         found = climb(numbers, videos, shared, locals_, towards=towards)
         return _finished(found, model, self.fits, structures, self.shared, model_error=model_error)
 
@@ -174,18 +161,19 @@ def fit_together(
     check_videos(videos)
     if shared is not None:
         check_names(shared, model)
+    plan = FitPlan() if model_error else FitPlan(attempts=1)
     with (progress or SilentProgress()).stage("Fitting each video (MAP)", total=len(videos)) as advance:
 
         def fit(tracks: Tracks) -> MapFit:
-            found = fit_map(tracks, model, stream(seed, tracks.video))
+            found = fit_map(tracks, model, stream(seed, tracks.video), plan=plan, model_error=model_error)
             advance(1)
             return found
 
-        fits = in_parallel(fit, videos)
+        fits = look_again(in_parallel(fit, videos), model, shared, seed)
     structures = tuple(structure_of(one.likelihood.coordinates) for one in fits)
     likelihoods = [plain_likelihood(fit.clues, model, one) for fit, one in zip(fits, structures, strict=True)]
     numbers, linked = link(likelihoods, shared)
-    joint = climb(numbers, linked, *first_guess(numbers, linked, _starts(fits, linked)))
+    joint = climb(numbers, linked, *first_guess(numbers, linked, carried_starts(fits, linked), trusted(fits).tolist()))
     names = None if shared is None else tuple(shared)
     found = _finished(joint, model, fits, structures, names, model_error=model_error)
     return replace(found, joint=_with_modes(found.joint, fits))
@@ -195,15 +183,7 @@ def _with_modes(joint: JointFit, fits: Sequence[MapFit]) -> JointFit:
     """The joint fit with the further modes that the videos' own fits found."""
     if all(len(fit.modes) == 1 for fit in fits):
         return joint
-    return with_alternatives(joint, _starts(fits, joint.videos))
-
-
-def _starts(fits: Sequence[MapFit], videos: Sequence[LinkedVideo]) -> list[Float[np.ndarray, "mode dimension"]]:
-    """The modes of the videos' own fits, in the vectors of the linked videos."""
-    return [
-        np.array([fit.likelihood.coordinates.carried(mode.point, video.likelihood.coordinates) for mode in fit.modes])
-        for fit, video in zip(fits, videos, strict=True)
-    ]
+    return with_alternatives(joint, carried_starts(fits, joint.videos))
 
 
 def check_videos(videos: Sequence[Tracks]) -> None:
@@ -220,11 +200,6 @@ def check_videos(videos: Sequence[Tracks]) -> None:
     twice = sorted({name for name in names if names.count(name) > 1})
     if twice:
         raise InputError(f"{names.count(twice[0])} videos have the name '{twice[0]}'; name them apart.")
-
-
-def stream(seed: int, video: str) -> np.random.Generator:
-    """Source of randomness of one video, the same whatever the other videos are."""
-    return np.random.default_rng([seed, zlib.crc32(video.encode())])
 
 
 def _finished(
@@ -292,28 +267,3 @@ def _mode(joint: JointFit, index: int) -> Mode:
     """A video's part of the fit, with the precision that its numbers have by themselves and all videos together."""
     video, point = joint.videos[index], joint.point(index)
     return Mode(point, joint.precision(index), video.value(joint.gaussian.mean, joint.gaussian.locals[index].centre))
-
-
-def plain_likelihood(clues: Clues, model: PhysicsModel, structure: Structure) -> Likelihood:
-    """Density of a video without a model error."""
-    tracks, family = clues.tracks, clues.noise_family
-    return Likelihood(tracks, model, unknowns(tracks, model, structure, family), family)
-
-
-def structure_of(coordinates: Coordinates) -> Structure:
-    """Which bodies have which unknowns in a fit."""
-    owners = {
-        field: frozenset(e.owner for e in coordinates.entries if e.field == field and e.owner is not None)
-        for field in ("velocity_x", MASS.name, RESTITUTION.name)
-    }
-    # A weighed body that meets others counts among those that meet walls: it has the same unknowns.
-    return Structure(moving=owners["velocity_x"], colliding=owners[MASS.name], bouncing=owners[RESTITUTION.name])
-
-
-def _nearly_vanished(transform: Transform, value: float, expected: float) -> float:
-    """Coordinate at which a strength vanishes; where that is infinitely far, one far below what is expected."""
-    return expected + LOG_FAINT if transform is Transform.LOG and value == 0.0 else _coordinate(transform, value)
-
-
-def _coordinate(transform: Transform, value: float) -> float:
-    return float(np.log(value)) if transform is Transform.LOG else value

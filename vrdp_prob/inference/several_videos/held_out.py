@@ -11,10 +11,10 @@ from vrdp_prob.inference.map_fit import fit_map
 from vrdp_prob.inference.samples import PARETO_K_GOAL
 from vrdp_prob.inference.several_videos.arrow import ArrowGaussian
 from vrdp_prob.inference.several_videos.clouds import Clouds
-from vrdp_prob.inference.several_videos.fitting import plain_likelihood, stream, structure_of
 from vrdp_prob.inference.several_videos.importance import resampled, weighted_locals
 from vrdp_prob.inference.several_videos.joint_fit import local_modes
 from vrdp_prob.inference.several_videos.linking import linked
+from vrdp_prob.inference.several_videos.parts import plain_likelihood, stream, structure_of
 from vrdp_prob.inference.several_videos.posterior import SharedPosterior
 from vrdp_prob.progress import ProgressDisplay
 from vrdp_prob.scene import Tracks

@@ -1,9 +1,4 @@
-"""The most probable values of several videos at once: Gauss-Newton steps of arrow shape, tried before they are taken.
-
-Each video is expanded by itself, its own numbers are eliminated, the shared numbers take one common step, and every
-video then picks the best of a few moves of its own. So memory holds one video's batch of worlds at a time, and a video
-whose events change their order under a step does not stop the others.
-"""
+"""The most probable values of several videos at once, the Gaussian around them, and further modes of single videos."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -15,12 +10,12 @@ from scipy.linalg import solve_triangular
 
 from vrdp_prob.inference.least_squares import jacobian, minimise
 from vrdp_prob.inference.noise_fit import NOISE_FIELDS, noise_curvature
+from vrdp_prob.inference.parallel import in_parallel
 from vrdp_prob.inference.samples import evaluate_with_gradient
 from vrdp_prob.inference.several_videos.arrow import (
     LOG_TWO_PI,
     ArrowGaussian,
     Expansion,
-    Expansions,
     LocalGaussian,
     SharedExpansion,
 )
@@ -167,38 +162,6 @@ def expand_prior(numbers: SharedNumbers, shared: Float[np.ndarray, "shared"]) ->
     return SharedExpansion(derivative.T @ residuals, derivative)
 
 
-def first_guess(
-    numbers: SharedNumbers,
-    videos: Sequence[LinkedVideo],
-    starts: Sequence[Float[np.ndarray, "_ _"]],
-) -> tuple[Float[np.ndarray, "shared"], list[Float[np.ndarray, "_"]]]:
-    """Shared numbers that the videos' own fits agree on best, and each video's own numbers for them.
-
-    Parameters
-    ----------
-    numbers, videos
-        What is fitted.
-    starts
-        Vectors of each video at the modes of its own fit, the best first.
-    """
-    places, expansions = [], []
-    for video, points in zip(videos, starts, strict=True):
-        used, local = video.split(points[0])
-        shared = numbers.prior_mean.copy()
-        shared[video.shared_columns] = used
-        places.append(shared)
-        expansions.append(expand(video, shared, local))
-    middle = np.mean(places, axis=0)
-    agreed = Expansions(expand_prior(numbers, middle), tuple(expansions)).consensus(middle, places)
-    agreed = np.clip(agreed, np.min(places, axis=0), np.max(places, axis=0))
-    locals_ = []
-    for video, points, one, place in zip(videos, starts, expansions, places, strict=True):
-        _, own = video.split(points)
-        following = own[0] + one.slope @ (agreed - place) + one.local_step
-        locals_.append(settle(video, agreed, [*own, following]))
-    return agreed, locals_
-
-
 def settle(
     video: LinkedVideo, shared: Float[np.ndarray, "shared"], starts: Sequence[Float[np.ndarray, "local"]]
 ) -> Float[np.ndarray, "local"]:
@@ -222,11 +185,14 @@ def settle(
 
 def with_alternatives(fit: JointFit, starts: Sequence[Float[np.ndarray, "_ _"]]) -> JointFit:
     """A fit with the further modes of each video's own numbers that are reached from some vectors of it."""
-    found = (
-        local_modes(video, fit.numbers, fit.gaussian.mean, video.split(points)[1], fit.gaussian.locals[index])
-        for index, (video, points) in enumerate(zip(fit.videos, starts, strict=True))
-    )
-    return replace(fit, alternatives=tuple(found))
+
+    def found(index: int) -> tuple[LocalMode, ...]:
+        if len(starts[index]) == 1:
+            return fit.modes(index)
+        own = fit.videos[index].split(starts[index])[1]
+        return local_modes(fit.videos[index], fit.numbers, fit.gaussian.mean, own, fit.gaussian.locals[index])
+
+    return replace(fit, alternatives=tuple(in_parallel(found, range(len(fit.videos)))))
 
 
 def local_modes(

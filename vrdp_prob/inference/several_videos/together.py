@@ -13,9 +13,10 @@ from vrdp_prob.inference.infer import default_model
 from vrdp_prob.inference.map_fit import MapFit
 from vrdp_prob.inference.posterior import Posterior
 from vrdp_prob.inference.samples import Convergence, Samples, assess
-from vrdp_prob.inference.several_videos.fitting import SharedFit, fit_together, stream
+from vrdp_prob.inference.several_videos.fitting import SharedFit, fit_together
 from vrdp_prob.inference.several_videos.gibbs import sample_gibbs
 from vrdp_prob.inference.several_videos.importance import sample_by_importance
+from vrdp_prob.inference.several_videos.parts import stream
 from vrdp_prob.inference.several_videos.posterior import SharedPosterior, VideoPosteriors
 from vrdp_prob.models.physics import PhysicsModel
 from vrdp_prob.progress import ProgressDisplay

@@ -1,0 +1,90 @@
+"""Own numbers of a video that follow the shared ones, and videos that are fitted anew with what the others say."""
+
+from dataclasses import dataclass, replace
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from tests.discovery.data_set import draw
+from tests.inference.several_videos.videos import colliding, sliding
+from vrdp_prob.inference.infer import default_model
+from vrdp_prob.inference.map_fit import fit_map
+from vrdp_prob.inference.several_videos.fitting import fit_together
+from vrdp_prob.inference.several_videos.following import follow
+from vrdp_prob.inference.several_videos.linking import LinkedVideo
+from vrdp_prob.inference.several_videos.parts import stream
+from vrdp_prob.inference.several_videos.second_look import look_again
+from vrdp_prob.models.coordinates import Coordinate, Coordinates
+from vrdp_prob.models.likelihood import Likelihood
+from vrdp_prob.models.parameters import Prior, Transform
+from vrdp_prob.models.physics import PhysicsModel
+
+SHARPNESS = 1e5
+"""One over the standard deviation of the direction that is known best."""
+
+
+@dataclass(frozen=True)
+class Valley(LinkedVideo):
+    """Two own numbers in a narrow, bent valley that moves with the shared number; behind an edge all is worse."""
+
+    edge: float = np.inf
+
+    @property
+    def data(self) -> Any:
+        return SimpleNamespace(residuals=self._residuals, coordinates=self.likelihood.coordinates)
+
+    def _residuals(self, points: np.ndarray) -> np.ndarray:
+        shared, first, second = points.T
+        beyond = 30.0 * (first > self.edge)
+        sharp = SHARPNESS * (first - np.sin(3 * shared) - second**2 / 2)
+        return np.stack([sharp, second - shared, 0.1 * first, beyond], axis=1)
+
+
+def valley(edge: float = np.inf) -> Valley:
+    entries = tuple(Coordinate(name, None, Transform.IDENTITY, Prior(0.0, 1.0)) for name in ("shared", "a", "b"))
+    one = np.zeros(1, dtype=np.int64)
+    likelihood = Likelihood(sliding(0), PhysicsModel.base(), Coordinates(entries, {}))
+    return Valley(likelihood, one, one, np.zeros(1), edge=edge)
+
+
+def test_own_numbers_follow_along_a_narrow_bent_valley() -> None:
+    found = follow(valley(), np.zeros(1), np.zeros(2), np.array([1.0]))
+    assert found.arrived
+    first, second = found.local
+    assert first == pytest.approx(np.sin(3) + second**2 / 2, abs=1e-6)
+    # along the valley `second` is at the least of (second - 1)^2 + (first / 10)^2
+    assert second - 1 + 0.01 * first * second == pytest.approx(0.0, abs=1e-3)
+
+
+def test_they_stop_before_an_edge_behind_which_all_is_worse() -> None:
+    found = follow(valley(edge=0.5), np.zeros(1), np.zeros(2), np.array([0.4]))
+    assert not found.arrived
+    found = follow(valley(edge=0.5), np.zeros(1), np.zeros(2), np.array([0.1]))
+    assert found.arrived
+    assert found.local[0] < 0.5
+
+
+def test_a_video_that_is_worse_than_the_others_is_fitted_anew() -> None:
+    videos = [colliding(0), colliding(1), sliding(2)]
+    fits = [fit_map(one, default_model(), stream(0, one.video), model_error=False) for one in videos]
+    assert look_again(fits, default_model(), None, 0) == fits
+    spoilt = replace(fits[1], misfit=replace(fits[1].misfit, residual_sd=3 * fits[1].misfit.residual_sd))
+    found = look_again([fits[0], spoilt, fits[2]], default_model(), None, 0)
+    assert (found[0], found[2]) == (fits[0], fits[2])
+    assert found[1].misfit.residual_sd == pytest.approx(fits[1].misfit.residual_sd, rel=0.02)
+    assert found[1].likelihood.model == default_model()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [1, 5, 6])
+def test_videos_with_collisions_in_a_row_are_all_explained_together(seed: int) -> None:
+    """Own numbers that are known to a millionth, and single videos whose own fit takes a wrong course of events."""
+    data = draw([], seed=seed)
+    fit = fit_together(data.tracks, model=default_model(), model_error=False)
+    assert fit.joint.converged
+    assert max(one.misfit.residual_sd for one in fit.fits) < 1.08 * data.truth.measurement.noise
+    mean, sd = fit.joint.gaussian.mean, fit.joint.gaussian.sd
+    place = [name for name, _ in fit.joint.numbers.keys].index("air_drag")
+    assert abs(mean[place] - np.log(data.truth.videos[0].laws.drag)) < 4 * sd[place]

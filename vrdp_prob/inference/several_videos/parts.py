@@ -1,0 +1,45 @@
+"""What a video brings to a joint fit: its randomness, its density and the modes of its own fit."""
+
+import zlib
+from collections.abc import Sequence
+
+import numpy as np
+from jaxtyping import Float
+
+from vrdp_prob.inference.clues import Clues
+from vrdp_prob.inference.map_fit import MapFit
+from vrdp_prob.inference.several_videos.linking import LinkedVideo
+from vrdp_prob.models.coordinates import Coordinates
+from vrdp_prob.models.likelihood import Likelihood
+from vrdp_prob.models.parameters import MASS, RESTITUTION
+from vrdp_prob.models.physics import PhysicsModel
+from vrdp_prob.models.unknowns import Structure, unknowns
+
+
+def stream(seed: int, video: str) -> np.random.Generator:
+    """Source of randomness of one video, the same whatever the other videos are."""
+    return np.random.default_rng([seed, zlib.crc32(video.encode())])
+
+
+def carried_starts(fits: Sequence[MapFit], videos: Sequence[LinkedVideo]) -> list[Float[np.ndarray, "mode dimension"]]:
+    """The modes of the videos' own fits, in the vectors of the linked videos."""
+    return [
+        np.array([fit.likelihood.coordinates.carried(mode.point, video.likelihood.coordinates) for mode in fit.modes])
+        for fit, video in zip(fits, videos, strict=True)
+    ]
+
+
+def plain_likelihood(clues: Clues, model: PhysicsModel, structure: Structure) -> Likelihood:
+    """Density of a video without a model error."""
+    tracks, family = clues.tracks, clues.noise_family
+    return Likelihood(tracks, model, unknowns(tracks, model, structure, family), family)
+
+
+def structure_of(coordinates: Coordinates) -> Structure:
+    """Which bodies have which unknowns in a fit."""
+    owners = {
+        field: frozenset(e.owner for e in coordinates.entries if e.field == field and e.owner is not None)
+        for field in ("velocity_x", MASS.name, RESTITUTION.name)
+    }
+    # A weighed body that meets others counts among those that meet walls: it has the same unknowns.
+    return Structure(moving=owners["velocity_x"], colliding=owners[MASS.name], bouncing=owners[RESTITUTION.name])

@@ -1,0 +1,99 @@
+"""Videos whose own fit is worse than those of the others are fitted anew, with what the others say of shared numbers.
+
+What makes a fit miss the order of events in one video is often a friction that bends to the motion of one body; where
+the other videos hold it, the search finds its way.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from jaxtyping import Bool
+
+from vrdp_prob.inference.map_fit import MapFit, fit_map
+from vrdp_prob.inference.parallel import in_parallel
+from vrdp_prob.inference.plan import FitPlan
+from vrdp_prob.inference.several_videos.agreement import consensus
+from vrdp_prob.inference.several_videos.linking import link
+from vrdp_prob.inference.several_videos.parts import carried_starts, plain_likelihood, stream, structure_of
+from vrdp_prob.models.parameters import Prior, Scope
+from vrdp_prob.models.physics import PhysicsModel
+
+WORSE = 1.08
+"""Residuals that are larger than those of the video in the middle by this factor call for another look..."""
+FAR_WORSE = 1.5
+"""...and by this one the video is not asked for the shared numbers."""
+LOOKS = 4
+"""Fits that are made anew of one video."""
+MOST = 3
+"""One video in so many is looked at again."""
+SAME = 0.01
+"""Fits whose residuals differ by a smaller share are taken for the same one, and unless they are far worse than those
+of other videos no further one is looked for."""
+WIDER, LEAST_SD = 2.0, 0.02
+"""What the others say is believed with so many times its standard deviation, and at least with this one."""
+
+
+def trusted(fits: Sequence[MapFit]) -> Bool[np.ndarray, "video"]:
+    """Whose fits are not far worse than those of the others."""
+    return _excess(fits) < FAR_WORSE
+
+
+def look_again(fits: Sequence[MapFit], model: PhysicsModel, shared: Sequence[str] | None, seed: int) -> list[MapFit]:
+    """The fits of single videos, with those improved that are worse than the others.
+
+    Parameters
+    ----------
+    fits
+        The fits, each by itself.
+    model
+        The physics.
+    shared
+        Names of the quantities that are shared; all that have one value per video where None.
+    seed
+        Seed of the searches.
+    """
+    excess = _excess(fits)
+    order = np.argsort(-excess, kind="stable")[: len(fits) // MOST]
+    doubtful = [int(index) for index in order if excess[index] > WORSE]
+    if not doubtful:
+        return list(fits)
+    told = _told(fits, model, shared)
+
+    def looked(index: int) -> MapFit:
+        best, goal = fits[index], WORSE * np.median([one.misfit.residual_sd for one in fits])
+        for look in range(LOOKS):
+            generator = stream(seed, f"{best.clues.tracks.video} {look}")
+            found = fit_map(best.clues.tracks, told, generator, plan=FitPlan(attempts=1), model_error=False)
+            gained = best.misfit.residual_sd / found.misfit.residual_sd - 1
+            if gained > SAME:
+                likelihood = plain_likelihood(found.clues, model, structure_of(found.likelihood.coordinates))
+                best = replace(found, likelihood=likelihood)
+            if (abs(gained) < SAME and excess[index] < FAR_WORSE) or best.misfit.residual_sd < goal:
+                break
+        return best
+
+    improved = dict(zip(doubtful, in_parallel(looked, doubtful), strict=True))
+    return [improved.get(index, fit) for index, fit in enumerate(fits)]
+
+
+def _excess(fits: Sequence[MapFit]) -> np.ndarray:
+    """Residuals of each video over those of the one in the middle, both in units of the noise."""
+    ratios = np.array([fit.misfit.residual_sd / fit.misfit.noise_sd for fit in fits])
+    return ratios / np.median(ratios)
+
+
+def _told(fits: Sequence[MapFit], model: PhysicsModel, shared: Sequence[str] | None) -> PhysicsModel:
+    """The model with what the trusted videos say of shared parameters as their prior."""
+    likelihoods = [plain_likelihood(fit.clues, model, structure_of(fit.likelihood.coordinates)) for fit in fits]
+    numbers, videos = link(likelihoods, shared)
+    points = [starts[0] for starts in carried_starts(fits, videos)]
+    found = consensus(numbers, videos, points, trusted(fits).tolist())
+    known = dict(zip(numbers.keys, zip(found.mean, found.sd, strict=True), strict=True))
+    beliefs = {}
+    for parameter in model.parameters:
+        place = known.get((parameter.name, ()))
+        if parameter.scope is Scope.SHARED and place is not None:
+            sd = min(max(WIDER * place[1], LEAST_SD), parameter.prior.sd)
+            beliefs[parameter.name] = replace(parameter, prior=Prior(float(place[0]), float(sd)))
+    return PhysicsModel(model.name, model.effects, {**model.beliefs, **beliefs})

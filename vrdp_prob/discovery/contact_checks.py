@@ -228,10 +228,10 @@ def _kick_without_partner(model: ResidualModel, replicas: Sequence[Float[np.ndar
             statistic = scores[k].chi_square / model.dispersion
             if best is None or statistic > best[0]:
                 best = (statistic, index, int(frames[k]), int(bodies[k]), scores[k])
-        pulls = np.einsum("rps,rn->nps", blocks[:, shown], noise)
+        pulls = (blocks[:, shown].reshape(len(noise), -1).T @ noise).reshape(len(shown), 2, -1)
         inverse = np.array([np.linalg.inv(scores[k].information) for k in shown]).reshape(-1, 2, 2)
-        found = np.einsum("nps,pst,npt->np", pulls, inverse, pulls)
-        largest = np.maximum(largest, found.max(axis=1, initial=0.0))
+        found = (pulls * (inverse @ pulls)).sum(axis=1)
+        largest = np.maximum(largest, found.max(axis=0, initial=0.0))
     if best is None:
         return
     statistic, index, frame, body, score = best

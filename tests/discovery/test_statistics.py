@@ -7,7 +7,7 @@ from scipy.stats import chi2, kstest
 from vrdp_prob.discovery.false_discovery import controlled, significant
 from vrdp_prob.discovery.finding import Check
 from vrdp_prob.discovery.linear import Score
-from vrdp_prob.discovery.replications import independent_places, sum_p_value, two_sided_p_value
+from vrdp_prob.discovery.replications import anywhere, independent_places, sum_p_value, two_sided_p_value
 from vrdp_prob.discovery.scatter_regression import dependence
 from vrdp_prob.discovery.words import direction_words, number
 
@@ -35,6 +35,14 @@ def test_a_scan_of_independent_places_has_as_many() -> None:
     largest = generator.chisquare(2, (2000, 40)).max(axis=1)
     assert independent_places(largest, 2, 1000) == pytest.approx(40, rel=0.3)
     assert independent_places(largest, 2, 10) == 10
+
+
+def test_the_best_of_many_places_is_judged_as_such() -> None:
+    generator = np.random.default_rng(6)
+    found = [anywhere(float(generator.uniform(size=30).min()), 30) for _ in range(300)]
+    assert kstest(found, "uniform").pvalue > 0.01
+    assert anywhere(1e-20, 30) == pytest.approx(3e-19)
+    assert anywhere(1.0, 30) == pytest.approx(1.0)
 
 
 def test_p_values_of_sums_and_numbers_are_uniform() -> None:

@@ -18,7 +18,7 @@ from vrdp_prob.discovery.fitted_motion import FittedMotion, Kicks
 from vrdp_prob.discovery.free_flight import NORMAL_95, FreeFlight
 from vrdp_prob.discovery.free_flight_checks import SEEN
 from vrdp_prob.discovery.linear import Score
-from vrdp_prob.discovery.replications import independent_places
+from vrdp_prob.discovery.replications import anywhere, independent_places
 from vrdp_prob.discovery.residual_model import ResidualModel, joined
 from vrdp_prob.discovery.words import number, opposite
 
@@ -235,7 +235,7 @@ def _kick_without_partner(model: ResidualModel, replicas: Sequence[Float[np.ndar
     if best is None:
         return
     statistic, index, frame, body, score = best
-    p_value = min(1.0, independent_places(largest, 2, places) * float(chi2.sf(statistic, 2)))
+    p_value = anywhere(float(chi2.sf(statistic, 2)), independent_places(largest, 2, places))
     video = model.videos[index]
     size = float(np.linalg.norm(score.estimate))
     name = video.motion.tracks.bodies[body].id

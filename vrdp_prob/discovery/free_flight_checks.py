@@ -11,6 +11,7 @@ import numpy as np
 
 from vrdp_prob.discovery.finding import Check
 from vrdp_prob.discovery.free_flight import FreeFlight, Part
+from vrdp_prob.discovery.replications import anywhere
 from vrdp_prob.discovery.words import by, direction_words, number, opposite
 
 BESIDE = "Nothing is left of it beside"
@@ -206,7 +207,7 @@ def _shaking(flight: FreeFlight) -> Iterator[tuple[Question, Part, float]]:
         return f"all bodies are pushed to and fro {times} a second, by {number(part.size)} m/s^2 (root mean square)"
 
     question = Question("push against time", _phases(name), sentence, PUSH)
-    yield question, best, min(1.0, len(known) * best.score.p_value)
+    yield question, best, anywhere(best.score.p_value, len(known))
 
 
 def _phases(name: str) -> tuple[str, ...]:

@@ -68,8 +68,8 @@ def _clock_checks(model: ResidualModel, replicas: Replicas) -> Iterator[Check]:
             where = f"video {video.linear.name} from {number(float(motion.times[late.frames[best]]))} s on"
     p_value = sum_p_value(lost, lost_replicas)
     sentence = (
-        f"All bodies jump along their paths together, as if frames were missing: most in {where}, by "
-        f"{number(abs(strongest[1]))} s {opposite(strongest[1], 'too early', 'too late')}."
+        f"All bodies jump {opposite(strongest[1], 'back', 'ahead')} along their paths together, as if frames were "
+        f"missing: most in {where}, by {number(abs(strongest[1]))} s."
         if p_value < SEEN
         else "No jump of all bodies along their paths was seen."
     )

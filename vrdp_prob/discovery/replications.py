@@ -30,6 +30,11 @@ def independent_places(largest: Float[np.ndarray, "replica"], degrees: int, plac
     return float(np.clip(TAIL / max(alone, 1e-300), 1.0, max(places, 1)))
 
 
+def anywhere(p_value: float, places: float) -> float:
+    """Probability of so small a p-value at the best of so many independent places."""
+    return float(-np.expm1(places * np.log1p(-min(p_value, 1 - 1e-16))))
+
+
 def sum_p_value(value: float, replicas: Float[np.ndarray, "replica"]) -> float:
     """Probability of so large a sum of squares, whose replications have the mean and variance of a scaled chi-square.
 

@@ -6,7 +6,7 @@ from scipy.stats import chi2
 
 from tests.discovery.fitted import fitted
 from vrdp_prob.discovery.estimates import upper_bounds
-from vrdp_prob.discovery.linear import LinearFit
+from vrdp_prob.discovery.residual_model import ResidualModel
 from vrdp_prob.discovery.scores import CauseScore, happens_once, score_causes
 from vrdp_prob.models.effects.clock_error import ClockError
 from vrdp_prob.models.effects.external_impulse import ExternalImpulse
@@ -22,7 +22,7 @@ def scored(way: str | None, *, seed: int, names: tuple[str, ...] | None = None) 
     effects = [
         effect() for name, effect in known_effects().items() if name not in present and (names is None or name in names)
     ]
-    return {one.effect.name: one for one in score_causes(fit, LinearFit.of(fit), effects, seed=0)}
+    return {one.effect.name: one for one in score_causes(fit, ResidualModel.of(fit), effects, seed=0)}
 
 
 def test_a_null_gives_no_cause_a_small_p_value() -> None:
@@ -69,7 +69,7 @@ def test_a_kick_is_found_in_its_video_at_its_body_and_time() -> None:
         for k, video in enumerate(data.truth.videos)
         if np.hypot(video.laws.kick_x, video.laws.kick_y) > 0
     )
-    one = score_causes(fit, LinearFit.of(fit), [ExternalImpulse()], seed=0)[0]
+    one = score_causes(fit, ResidualModel.of(fit), [ExternalImpulse()], seed=0)[0]
     assert one.sites
     assert (one.sites[0].video, one.sites[0].owner) == (number, body)
     assert one.sites[0].values["impulse_time"] == pytest.approx(time, abs=0.2)
@@ -83,7 +83,7 @@ def test_which_effects_happen_once() -> None:
 
 def test_a_cause_without_a_vanishing_strength_has_no_score() -> None:
     _, fit = fitted(seed=1)
-    assert score_causes(fit, LinearFit.of(fit), [Wall()], seed=0) == []
+    assert score_causes(fit, ResidualModel.of(fit), [Wall()], seed=0) == []
 
 
 def test_bounds_lie_beyond_the_estimates() -> None:

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from tests.discovery.fitted import fitted
-from vrdp_prob.discovery.linear import LinearFit
 from vrdp_prob.discovery.proposals import hidden_things
+from vrdp_prob.discovery.residual_model import ResidualModel
 from vrdp_prob.discovery.scores import score_causes
 from vrdp_prob.discovery.trials import Trial
 from vrdp_prob.models.effects.external_impulse import ExternalImpulse
@@ -18,7 +18,7 @@ WAY, SEED = "hidden_obstacle", 1
 @pytest.fixture(scope="module")
 def kicked() -> Trial:
     _, fit = fitted(WAY, 20.0, seed=SEED)
-    score = score_causes(fit, LinearFit.of(fit), [ExternalImpulse()], seed=0)[0]
+    score = score_causes(fit, ResidualModel.of(fit), [ExternalImpulse()], seed=0)[0]
     assert score.sites
     found = Trial((), fit).with_cause(score)
     assert found is not None

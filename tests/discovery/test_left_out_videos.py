@@ -8,7 +8,7 @@ import pytest
 from tests.discovery.fitted import fitted
 from vrdp_prob.discovery.forecast import held_out
 from vrdp_prob.discovery.held_out import cavities
-from vrdp_prob.discovery.linear import LinearFit
+from vrdp_prob.discovery.residual_model import ResidualModel
 from vrdp_prob.discovery.scores import score_causes
 from vrdp_prob.discovery.trials import Trial, gain, weights
 from vrdp_prob.inference.several_videos.fitting import fit_together
@@ -31,7 +31,7 @@ def test_what_the_others_say_is_less_sharp_than_what_all_say() -> None:
 def test_a_right_cause_gains_and_its_removal_loses_the_same() -> None:
     data, fit = fitted("surface_tilt", seed=1)
     base = Trial((), fit)
-    score = score_causes(fit, LinearFit.of(fit), [SurfaceTilt()], seed=0)[0]
+    score = score_causes(fit, ResidualModel.of(fit), [SurfaceTilt()], seed=0)[0]
     found = base.with_cause(score)
     assert found is not None
     assert found.names == ("surface_tilt",)

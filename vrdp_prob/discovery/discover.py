@@ -104,7 +104,9 @@ def _causes(found: Search, seed: int) -> list[FoundCause]:
     for number, (lesser, rivals) in enumerate(zip(found.lesser, found.rivals, strict=True)):
         best_of = {one.causes[-1].name: one for one in reversed(rivals)}
         trials = [found.best, lesser, *best_of.values()]
-        log_prior = [-found.needed, 0.0] + [-found.needed] * len(best_of)
+        simplest = max(one.log_prior for one in (found.best, *best_of.values()))
+        log_prior = [one.log_prior - simplest - found.needed for one in (found.best, *best_of.values())]
+        log_prior.insert(1, 0.0)
         shares = weights(trials, log_prior, np.random.default_rng(seed))
         named.append(_cause(found.best, found.best.causes[number], lesser, float(shares[0]), named=True))
         for rival, share in zip(best_of.values(), shares[2:], strict=True):

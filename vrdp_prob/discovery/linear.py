@@ -13,13 +13,6 @@ import numpy as np
 from jaxtyping import Float
 from scipy.stats import chi2
 
-from vrdp_prob.inference.least_squares import jacobian
-from vrdp_prob.inference.noise_fit import NOISE_FIELDS
-from vrdp_prob.inference.parallel import in_parallel
-from vrdp_prob.inference.several_videos.fitting import SharedFit
-from vrdp_prob.inference.several_videos.joint_fit import expand_prior
-from vrdp_prob.inference.several_videos.linking import LinkedVideo
-
 RIDGE = 1e-9
 """Relative size below which what unknowns do counts as nothing."""
 RANK = 1e-8
@@ -47,19 +40,6 @@ class LinearVideo:
     own: Float[np.ndarray, "residual own"]
     shared: Float[np.ndarray, "residual shared"]
     data: int
-
-    @classmethod
-    def of(cls, video: LinkedVideo, point: Float[np.ndarray, "dimension"], shared: int) -> "LinearVideo":
-        """The video at a point of its vector; `shared` is the number of all shared unknowns."""
-        likelihood = video.data
-        coordinates = likelihood.coordinates
-        world = ~coordinates.mask(NOISE_FIELDS)
-        values, derivative = jacobian(likelihood.residuals, point, coordinates.scale, active=world, central=True)
-        own = derivative[:, [place for place in video.local_places if world[place]]]
-        columns = np.zeros((len(values), shared))
-        columns[:, video.shared_columns] = derivative[:, video.shared_places]
-        observations = likelihood.observations
-        return cls(video.name, values, own, columns, 2 * len(observations.frame) + len(observations.angle))
 
     @cached_property
     def _basis(self) -> Float[np.ndarray, "residual rank"]:
@@ -175,16 +155,6 @@ class LinearFit:
     videos: tuple[LinearVideo, ...]
     prior_gradient: Float[np.ndarray, "shared"]
     prior: Float[np.ndarray, "shared shared"]
-
-    @classmethod
-    def of(cls, fit: SharedFit) -> "LinearFit":
-        """The linear model at the most probable values."""
-        joint = fit.joint
-        prior = expand_prior(joint.numbers, joint.gaussian.mean)
-        videos = in_parallel(
-            lambda k: LinearVideo.of(joint.videos[k], joint.point(k), len(joint.numbers)), range(len(joint.videos))
-        )
-        return cls(tuple(videos), prior.gradient, prior.curvature)
 
     def sharing(self, directions: Sequence[Float[np.ndarray, "_ extra"]]) -> "LinearFit":
         """The fit of a model with further shared unknowns of which nothing is known beforehand."""

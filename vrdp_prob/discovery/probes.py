@@ -5,8 +5,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import torch
 from jaxtyping import Float
 
+from vrdp_prob.discovery.residual_model import Noise
 from vrdp_prob.inference.several_videos.fitting import SharedFit
 from vrdp_prob.inference.several_videos.linking import Key, shared_key
 from vrdp_prob.inference.several_videos.parts import plain_likelihood
@@ -16,7 +18,9 @@ from vrdp_prob.models.parameters import Transform
 
 STEP = 1e-4
 """Size of a probe in standard deviations of the strength's prior."""
-FAINT = 1e-3
+JUMP = 1.5
+"""Ratio of the changes to both sides from which on one of them has met another course of events."""
+FAINT = 1e-5
 """Size of a positive strength that vanishes at 0, as a share of its prior median."""
 
 
@@ -42,7 +46,9 @@ class Probe:
     directions: Float[np.ndarray, "point data"]
 
 
-def probes(fit: SharedFit, index: int, effect: Effect, points: Sequence[Mapping[str, float]]) -> list[Probe]:
+def probes(
+    fit: SharedFit, index: int, noise: Noise, effect: Effect, points: Sequence[Mapping[str, float]]
+) -> list[Probe]:
     """Probe one video for a cause at search points.
 
     Parameters
@@ -51,6 +57,8 @@ def probes(fit: SharedFit, index: int, effect: Effect, points: Sequence[Mapping[
         Fit of a model without the cause.
     index
         Which video.
+    noise
+        Its fitted noise.
     effect
         The cause.
     points
@@ -75,18 +83,17 @@ def probes(fit: SharedFit, index: int, effect: Effect, points: Sequence[Mapping[
             if entry.field in values:
                 base[place] = coordinate(entry.transform, values[entry.field])
         for place, strength in strengths.items():
-            base[place] = (strength.high + strength.low) / 2
+            base[place] = strength.coordinates[1]
         for place, strength in strengths.items():
-            moved = np.stack([base, base])
-            moved[:, place] = strength.high, strength.low
+            moved = np.tile(base, (3, 1))
+            moved[:, place] = strength.coordinates
             batch.append(moved)
-    count = 2 * len(likelihood.observations.frame) + len(likelihood.observations.angle)
-    residuals = likelihood.residuals(np.concatenate(batch))[:, :count].reshape(len(points), len(strengths), 2, count)
+    residuals = noise.linear(likelihood.discrepancies(torch.from_numpy(np.concatenate(batch))))
+    residuals = residuals.reshape(len(points), len(strengths), 3, -1)
     found = []
     for number, (place, strength) in enumerate(strengths.items()):
         entry = entries[place]
-        difference = (residuals[:, number, 0] - residuals[:, number, 1]) / strength.distance
-        directions = np.where(np.isfinite(difference), difference, 0.0)
+        directions = _derivative(residuals[:, number], strength.distance)
         found.append(Probe(shared_key(entry, likelihood.tracks), entry.owner, entry.field, directions))
     return found
 
@@ -105,19 +112,29 @@ def coordinate(transform: Transform, value: float) -> float:
     return math.log(value) if transform is Transform.LOG else value
 
 
+def _derivative(residuals: Float[np.ndarray, "point 3 data"], distance: float) -> Float[np.ndarray, "point data"]:
+    """Derivative by differences; where a contact happens or fails to on one side, that of the other side."""
+    sides = np.diff(residuals, axis=1) / distance
+    sides = np.where(np.isfinite(sides), sides, 0.0)
+    sizes = np.linalg.norm(sides, axis=2)
+    alike = sizes.max(axis=1) < JUMP * sizes.min(axis=1)
+    smaller = sides[np.arange(len(sides)), sizes.argmin(axis=1)]
+    derivative: np.ndarray = np.where(alike[:, None], sides.mean(axis=1), smaller)
+    return derivative
+
+
 @dataclass(frozen=True)
 class _Difference:
-    """The two coordinates between which the residuals are compared, and the distance of their values."""
+    """Three coordinates at which the residuals are compared, and the distance of neighbouring values."""
 
-    high: float
-    low: float
+    coordinates: tuple[float, float, float]
     distance: float
 
     @classmethod
     def of(cls, entry: Coordinate, vanishing: float) -> "_Difference":
         if entry.transform is Transform.LOG and vanishing == 0.0:
             faint = FAINT * math.exp(entry.prior.mean)
-            return cls(math.log(2 * faint), math.log(faint), faint)
+            return cls((math.log(faint), math.log(2 * faint), math.log(3 * faint)), faint)
         middle, step = coordinate(entry.transform, vanishing), STEP * entry.prior.sd
         per_value = vanishing if entry.transform is Transform.LOG else 1.0
-        return cls(middle + step, middle - step, 2 * step * per_value)
+        return cls((middle - step, middle, middle + step), step * per_value)

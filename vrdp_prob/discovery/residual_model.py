@@ -21,7 +21,7 @@ from vrdp_prob.inference.parallel import in_parallel
 from vrdp_prob.inference.several_videos.fitting import SharedFit
 from vrdp_prob.inference.several_videos.joint_fit import expand_prior
 from vrdp_prob.inference.several_videos.linking import LinkedVideo
-from vrdp_prob.models.likelihood import Likelihood
+from vrdp_prob.models.likelihood import Discrepancies, Likelihood
 from vrdp_prob.models.noise import NoiseFamily
 from vrdp_prob.models.unknowns import ANGLE_NOISE, DEGREES_OF_FREEDOM, NOISE
 
@@ -61,6 +61,13 @@ class Noise:
         if self.family is NoiseFamily.GAUSSIAN:
             return 1.0
         return float(np.sqrt((self.degrees + numbers) / (self.degrees + numbers + 2)))
+
+    def linear(self, discrepancies: Discrepancies) -> Float[np.ndarray, "point data"]:
+        """Differences of what was seen from worlds, in the units in which residuals of unit variance follow them."""
+        positions = discrepancies.positions.flatten(1) * (self.slope(2) / self.scale)
+        angles = discrepancies.angles * (self.slope(1) / self.angle_scale)
+        rows: np.ndarray = torch.cat([positions, angles], dim=1).detach().numpy()
+        return rows
 
     def influence(
         self, residuals: Float[np.ndarray, "observation number column"]

@@ -12,8 +12,9 @@ import numpy as np
 from jaxtyping import Float
 from scipy.stats import chi2
 
-from vrdp_prob.discovery.linear import LinearFit, Score
+from vrdp_prob.discovery.linear import Score
 from vrdp_prob.discovery.probes import Probe, probes
+from vrdp_prob.discovery.residual_model import ResidualModel
 from vrdp_prob.inference.parallel import in_parallel
 from vrdp_prob.inference.several_videos.fitting import SharedFit
 from vrdp_prob.inference.several_videos.linking import Key
@@ -96,27 +97,31 @@ def happens_once(effect: Effect) -> bool:
     return any(parameter.scope is Scope.VIDEO for parameter in effect.parameters)
 
 
-def score_causes(fit: SharedFit, linear: LinearFit, effects: Iterable[Effect], *, seed: int) -> list[CauseScore]:
+def score_causes(fit: SharedFit, model: ResidualModel, effects: Iterable[Effect], *, seed: int) -> list[CauseScore]:
     """Scores of causes that have a strength at which they vanish, the least probable by chance first."""
     found = []
     for effect in effects:
         if effect.vanishes_at or effect.vanishes_like:
             scan = _scan_once if happens_once(effect) else _scan_shared
-            found.append(scan(fit, linear, effect, np.random.default_rng(seed)))
+            found.append(scan(fit, model, effect, np.random.default_rng(seed)))
     present = [one for one in found if one is not None]
     return sorted(present, key=lambda one: (one.p_value, -one.chi_square))
 
 
-def _probed(fit: SharedFit, effect: Effect) -> tuple[Sequence[Mapping[str, float]], list[list[Probe]]]:
+def _probed(
+    fit: SharedFit, model: ResidualModel, effect: Effect
+) -> tuple[Sequence[Mapping[str, float]], list[list[Probe]]]:
     points = effect.search_points([part.likelihood.tracks for part in fit.fits])
-    return points, in_parallel(lambda index: probes(fit, index, effect, points), range(len(fit.fits)))
+    return points, in_parallel(
+        lambda index: probes(fit, index, model.videos[index].noise, effect, points), range(len(fit.fits))
+    )
 
 
 def _scan_shared(
-    fit: SharedFit, linear: LinearFit, effect: Effect, generator: np.random.Generator
+    fit: SharedFit, model: ResidualModel, effect: Effect, generator: np.random.Generator
 ) -> CauseScore | None:
     """The largest score of strengths that all videos share."""
-    points, probed = _probed(fit, effect)
+    points, probed = _probed(fit, model, effect)
     columns: dict[Key, int] = {}
     for index, video in enumerate(probed):
         for probe in video:
@@ -124,12 +129,12 @@ def _scan_shared(
     if not columns:
         return None
     directions = []
-    for index, (linear_video, found) in enumerate(zip(linear.videos, probed, strict=True)):
+    for index, (linear_video, found) in enumerate(zip(model.linear.videos, probed, strict=True)):
         block = np.zeros((linear_video.data, len(points), len(columns)))
         for probe in found:
             block[:, :, columns[_name(probe, index)]] = probe.directions.T
         directions.append(block)
-    scores = [_one_sided(linear.score([one[:, p] for one in directions]), effect) for p in range(len(points))]
+    scores = [_one_sided(model.linear.score([one[:, p] for one in directions]), effect) for p in range(len(points))]
     statistics = np.array([score.chi_square for score in scores])
     best = int(np.argmax(statistics))
     degrees = _rank(scores[best])
@@ -137,7 +142,7 @@ def _scan_shared(
         return None
     blocks = [
         linear_video.without_own(linear_video.padded(one.reshape(len(one), -1))).reshape(-1, *one.shape[1:])
-        for linear_video, one in zip(linear.videos, directions, strict=True)
+        for linear_video, one in zip(model.linear.videos, directions, strict=True)
     ]
     p_value = min(1.0, _independent(blocks, degrees, generator) * float(chi2.sf(statistics[best], degrees)))
     names = [name for name, _ in columns]
@@ -194,14 +199,16 @@ def _independent(
     return max(1.0, TAIL / float(chi2.sf(np.quantile(largest, 1 - TAIL), degrees)))
 
 
-def _scan_once(fit: SharedFit, linear: LinearFit, effect: Effect, generator: np.random.Generator) -> CauseScore | None:
+def _scan_once(
+    fit: SharedFit, model: ResidualModel, effect: Effect, generator: np.random.Generator
+) -> CauseScore | None:
     """The largest scores of strengths of single videos, and where they are."""
-    points, probed = _probed(fit, effect)
+    points, probed = _probed(fit, model, effect)
     sites, all_degrees, sds = [], [], []
     for index, video in enumerate(probed):
         for owner in sorted({probe.owner for probe in video}, key=str):
             mine = [probe for probe in video if probe.owner == owner]
-            scores, block = linear.scores_in(index, np.stack([probe.directions.T for probe in mine], axis=2))
+            scores, block = model.linear.scores_in(index, np.stack([probe.directions.T for probe in mine], axis=2))
             best = max(range(len(scores)), key=lambda place: scores[place].chi_square)
             degrees = _rank(scores[best])
             if not degrees:

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vrdp_prob.discovery.linear import LinearFit
 from vrdp_prob.discovery.proposals import hidden_things
+from vrdp_prob.discovery.residual_model import ResidualModel
 from vrdp_prob.discovery.scores import CauseScore, score_causes
 from vrdp_prob.discovery.trials import Trial, gain
 from vrdp_prob.inference.parallel import in_parallel
@@ -22,6 +22,7 @@ HOPEFUL = 0.2
 """Share of the largest statistic below which a cause cannot be the best one, nor a rival of it."""
 MOST_REFITTED, MOST_RIVALS = 5, 2
 MOST_CAUSES = 5
+MOST_SWAPS = 3
 FALSE_ALARM = 0.05
 """Prior odds that the model lacks something; all causes of the catalogue share them alike."""
 
@@ -103,10 +104,8 @@ def search(
                 continue
             chain.append(winner)
             steps.append(searcher.first(winner))
-        best = chain[-1]
-        lesser = [best.without(cause) for cause in best.causes[:-1]] + chain[-2:-1]
-        rivals = [searcher.rivals(best, number, steps[number], one) for number, one in enumerate(lesser)]
-    return Search(chain[0], best, tuple(steps), tuple(lesser), tuple(rivals), needed)
+        best, lesser, rivals = searcher.compared(chain, steps)
+    return Search(chain[0], best, tuple(steps), lesser, rivals, needed)
 
 
 @dataclass(frozen=True)
@@ -121,7 +120,7 @@ class _Searcher:
     def first(self, trial: Trial) -> Step:
         """A step in which nothing was tried yet."""
         left = [effect for effect in self.catalogue if effect.name not in trial.names]
-        return Step(tuple(score_causes(trial.fit, LinearFit.of(trial.fit), left, seed=self.seed)), ())
+        return Step(tuple(score_causes(trial.fit, ResidualModel.of(trial.fit), left, seed=self.seed)), ())
 
     def tried(self, trial: Trial, step: Step) -> Step:
         """The step with the causes tried that may be the best one.
@@ -132,7 +131,7 @@ class _Searcher:
         kicks = next((one for one in step.scores if isinstance(one.effect, ExternalImpulse) and one.sites), None)
         if kicks is not None and not self._smooth(trial, found):
             found += self._hidden(trial, found, kicks)
-        return Step(step.scores, tuple(sorted(found, key=lambda one: -float(one.log_density.sum()))))
+        return Step(step.scores, tuple(sorted(found, key=_merit, reverse=True)))
 
     def _smooth(self, trial: Trial, found: Sequence[Trial]) -> bool:
         """Whether a cause was found that leaves no sudden change of a velocity, and is not itself one."""
@@ -154,14 +153,32 @@ class _Searcher:
 
         return self._all(refit, starts)
 
+    def compared(
+        self, chain: Sequence[Trial], steps: Sequence[Step]
+    ) -> tuple[Trial, tuple[Trial, ...], tuple[tuple[Trial, ...], ...]]:
+        """The best model, each of its causes left out, and others in the place of each.
+
+        A cause that was found first may fit worse than another once a further one has joined; then they are swapped.
+        """
+        best = chain[-1]
+        for _ in range(MOST_SWAPS):
+            last = chain[-2:-1] if best is chain[-1] else [best.without(cause) for cause in best.causes[-1:]]
+            lesser = (*(best.without(cause) for cause in best.causes[:-1]), *last)
+            rivals = tuple(self.rivals(best, number, steps[number], one) for number, one in enumerate(lesser))
+            better = max((one for some in rivals for one in some), key=_merit, default=best)
+            if _merit(better) <= _merit(best):
+                break
+            best = better
+        return best, lesser, rivals
+
     def rivals(self, best: Trial, number: int, step: Step, lesser: Trial) -> tuple[Trial, ...]:
         """Models in which another cause takes the place of one, as far as it came close when that one was found."""
-        cause = best.causes[number]
         others = [one for one in step.tried if one.causes[-1].name not in best.names]
-        if number == len(best.causes) - 1:
+        if len(best.causes) == 1:
             return tuple(others)
-        gained = gain(next(one for one in step.tried if one.causes[-1].name == cause.name), lesser)[0]
-        close = {one.causes[-1].name for one in others if gain(one, lesser)[0] > HOPEFUL * gained}
+        most = max(float(one.log_density.sum()) for one in step.tried)
+        least = HOPEFUL * (most - float(lesser.log_density.sum()))
+        close = {one.causes[-1].name for one in others if gain(one, lesser)[0] > least}
         return tuple(self._refitted(lesser, [one for one in step.scores if one.effect.name in close][:MOST_RIVALS]))
 
     def _refitted(self, trial: Trial, scores: Sequence[CauseScore]) -> list[Trial]:
@@ -175,7 +192,12 @@ class _Searcher:
             return found
 
         found = [one for one in in_parallel(done, scores) if one is not None]
-        return sorted(found, key=lambda one: -float(one.log_density.sum()))
+        return sorted(found, key=_merit, reverse=True)
+
+
+def _merit(trial: Trial) -> float:
+    """By which models are ordered: what they predict of left-out videos, less what their causes are believed less."""
+    return float(trial.log_density.sum()) + trial.log_prior
 
 
 def _shortlist(scores: Sequence[CauseScore]) -> list[CauseScore]:

@@ -15,6 +15,12 @@ from vrdp_prob.models.effects.effect import Effect
 from vrdp_prob.models.parameters import Scope
 from vrdp_prob.models.physics import PhysicsModel
 
+EACH_PARAMETER = 1.0
+"""Nats by which a cause is believed less for each of its parameters.
+
+A cause that holds another one as its limit (a bowl whose middle is far away is a slope) predicts as well as that one.
+"""
+
 
 @dataclass(frozen=True)
 class Trial:
@@ -47,6 +53,11 @@ class Trial:
         """
         density = np.array([one.log_density for one in self.cavities.values()])
         return density - sum(self.choices.values(), np.zeros(len(density)))
+
+    @property
+    def log_prior(self) -> float:
+        """Log prior (nats, up to a constant) of its causes among others: those with fewer parameters come first."""
+        return -EACH_PARAMETER * sum(len(cause.parameters) for cause in self.causes)
 
     @property
     def names(self) -> tuple[str, ...]:

@@ -18,14 +18,14 @@ BOWL_STIFFNESS = Parameter(
     default=0.0,
 )
 BOWL_X = Parameter(
-    "bowl_x", "m", "x of the lowest (or highest) point", Transform.IDENTITY, Prior(0.0, 2.0), default=0.0
+    "bowl_x", "m", "x of the lowest (or highest) point", Transform.IDENTITY, Prior(0.0, 1.0), default=0.0
 )
 BOWL_Y = Parameter(
-    "bowl_y", "m", "y of the lowest (or highest) point", Transform.IDENTITY, Prior(0.0, 2.0), default=0.0
+    "bowl_y", "m", "y of the lowest (or highest) point", Transform.IDENTITY, Prior(0.0, 1.0), default=0.0
 )
 
 
-SEARCH_SHARES = (-2.0, -1.0, -0.5, 0.0, 0.5, 1.0, 2.0)
+SEARCH_SHARES = (-1.0, -0.5, 0.0, 0.5, 1.0)
 """Where the middle is looked for, in half widths of the region where bodies were seen."""
 
 

@@ -20,8 +20,8 @@ DISTORTION = Parameter(
     Prior(0.0, 0.02),
     default=0.0,
 )
-LENS_X = Parameter("lens_x", "m", "x of the picture's centre", Transform.IDENTITY, Prior(0.0, 1.0), 0.0)
-LENS_Y = Parameter("lens_y", "m", "y of the picture's centre", Transform.IDENTITY, Prior(0.0, 1.0), 0.0)
+LENS_X = Parameter("lens_x", "m", "x of the picture's centre", Transform.IDENTITY, Prior(0.0, 0.5), 0.0)
+LENS_Y = Parameter("lens_y", "m", "y of the picture's centre", Transform.IDENTITY, Prior(0.0, 0.5), 0.0)
 
 
 SEARCH_SHARES = (-0.4, -0.2, 0.0, 0.2, 0.4)

@@ -10,8 +10,8 @@ from vrdp_prob.models.simulator.formula import Scalar
 TABLE_ROTATION = Parameter(
     "table_rotation", "rad/s", "rate at which table and camera turn", Transform.IDENTITY, Prior(0.0, 0.3), default=0.0
 )
-ROTATION_X = Parameter("rotation_x", "m", "x of the axis of rotation", Transform.IDENTITY, Prior(0.0, 2.0), 0.0)
-ROTATION_Y = Parameter("rotation_y", "m", "y of the axis of rotation", Transform.IDENTITY, Prior(0.0, 2.0), 0.0)
+ROTATION_X = Parameter("rotation_x", "m", "x of the axis of rotation", Transform.IDENTITY, Prior(0.0, 1.0), 0.0)
+ROTATION_Y = Parameter("rotation_y", "m", "y of the axis of rotation", Transform.IDENTITY, Prior(0.0, 1.0), 0.0)
 
 
 class RotatingTable(Effect):

@@ -78,7 +78,7 @@ def test_a_video_that_is_worse_than_the_others_is_fitted_anew() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", [1, 5, 6])
+@pytest.mark.parametrize("seed", [1, 4, 5])
 def test_videos_with_collisions_in_a_row_are_all_explained_together(seed: int) -> None:
     """Own numbers that are known to a millionth, and single videos whose own fit takes a wrong course of events."""
     data = draw([], seed=seed)

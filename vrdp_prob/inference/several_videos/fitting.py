@@ -5,6 +5,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from jaxtyping import Float
 
 from vrdp_prob.errors import InputError
 from vrdp_prob.inference.map_fit import MapFit, fit_map
@@ -16,9 +17,9 @@ from vrdp_prob.inference.plan import FitPlan
 from vrdp_prob.inference.several_videos.agreement import first_guess
 from vrdp_prob.inference.several_videos.ascent import climb
 from vrdp_prob.inference.several_videos.joint_fit import JointFit, with_alternatives
-from vrdp_prob.inference.several_videos.linking import check_names, link
+from vrdp_prob.inference.several_videos.linking import LinkedVideo, SharedNumbers, check_names, link
 from vrdp_prob.inference.several_videos.parts import carried_starts, plain_likelihood, stream, structure_of
-from vrdp_prob.inference.several_videos.second_look import look_again, trusted
+from vrdp_prob.inference.several_videos.second_look import WORSE, look_again, trusted
 from vrdp_prob.inference.several_videos.transfer import coordinate, first_numbers
 from vrdp_prob.models.likelihood import Likelihood
 from vrdp_prob.models.physics import PhysicsModel
@@ -170,13 +171,36 @@ def fit_together(
             return found
 
         fits = look_again(in_parallel(fit, videos), model, shared, seed)
+    numbers, linked, guess = _guessed(fits, model, shared)
+    seen = [_with_misfit(fit, video, guess[0], own) for fit, video, own in zip(fits, linked, guess[1], strict=True)]
+    lost = [k for k, fit in enumerate(fits) if seen[k].misfit.residual_sd > WORSE * fit.misfit.residual_sd]
+    found_again = look_again(seen, model, shared, seed, among=lost)
+    if any(one is not other for one, other in zip(found_again, seen, strict=True)):
+        pairs = zip(found_again, seen, fits, strict=True)
+        fits = [fit if one is other else one for one, other, fit in pairs]
+        numbers, linked, guess = _guessed(fits, model, shared)
     structures = tuple(structure_of(one.likelihood.coordinates) for one in fits)
-    likelihoods = [plain_likelihood(fit.clues, model, one) for fit, one in zip(fits, structures, strict=True)]
-    numbers, linked = link(likelihoods, shared)
-    joint = climb(numbers, linked, *first_guess(numbers, linked, carried_starts(fits, linked), trusted(fits).tolist()))
+    joint = climb(numbers, linked, *guess)
     names = None if shared is None else tuple(shared)
     found = _finished(joint, model, fits, structures, names, model_error=model_error)
     return replace(found, joint=_with_modes(found.joint, fits))
+
+
+def _guessed(
+    fits: Sequence[MapFit], model: PhysicsModel, shared: Sequence[str] | None
+) -> tuple[SharedNumbers, tuple[LinkedVideo, ...], tuple[Float[np.ndarray, "shared"], list[Float[np.ndarray, "_"]]]]:
+    """The videos linked by what they share, and where their climb begins."""
+    likelihoods = [plain_likelihood(one.clues, model, structure_of(one.likelihood.coordinates)) for one in fits]
+    numbers, linked = link(likelihoods, shared)
+    return numbers, linked, first_guess(numbers, linked, carried_starts(fits, linked), trusted(fits).tolist())
+
+
+def _with_misfit(
+    fit: MapFit, video: LinkedVideo, shared: Float[np.ndarray, "shared"], own: Float[np.ndarray, "_"]
+) -> MapFit:
+    """A video's own fit with what its residuals are where it shares numbers with the others."""
+    point = video.points(shared, own)
+    return replace(fit, misfit=judge(video.likelihood, point, fit.clues.noise, fit.misfit.outliers))
 
 
 def _with_modes(joint: JointFit, fits: Sequence[MapFit]) -> JointFit:

@@ -4,7 +4,7 @@ What makes a fit miss the order of events in one video is often a friction that 
 the other videos hold it, the search finds its way.
 """
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -39,7 +39,13 @@ def trusted(fits: Sequence[MapFit]) -> Bool[np.ndarray, "video"]:
     return _excess(fits) < FAR_WORSE
 
 
-def look_again(fits: Sequence[MapFit], model: PhysicsModel, shared: Sequence[str] | None, seed: int) -> list[MapFit]:
+def look_again(
+    fits: Sequence[MapFit],
+    model: PhysicsModel,
+    shared: Sequence[str] | None,
+    seed: int,
+    among: Collection[int] | None = None,
+) -> list[MapFit]:
     """The fits of single videos, with those improved that are worse than the others.
 
     Parameters
@@ -52,10 +58,12 @@ def look_again(fits: Sequence[MapFit], model: PhysicsModel, shared: Sequence[str
         Names of the quantities that are shared; all that have one value per video where None.
     seed
         Seed of the searches.
+    among
+        Videos that may be looked at again; all where None.
     """
     excess = _excess(fits)
     order = np.argsort(-excess, kind="stable")[: len(fits) // MOST]
-    doubtful = [int(index) for index in order if excess[index] > WORSE]
+    doubtful = [int(index) for index in order if excess[index] > WORSE and (among is None or index in among)]
     if not doubtful:
         return list(fits)
     told = _told(fits, model, shared)

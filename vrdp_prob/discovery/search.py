@@ -149,7 +149,7 @@ class _Searcher:
         starts = hidden_things(kicked.fit, left, kicks.p_value)
 
         def refit(score: CauseScore) -> Trial | None:
-            return kicked.with_cause_in_place(score)
+            return kicked.with_cause_in_place(score, trial.fit.joint.log_density)
 
         return self._all(refit, starts)
 

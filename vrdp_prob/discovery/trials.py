@@ -71,13 +71,16 @@ class Trial:
         except ImpossibleStartError:
             return None
 
-    def with_cause_in_place(self, score: CauseScore) -> "Trial | None":
-        """The fit with a cause in the place of the last one, from where that has brought the videos."""
+    def with_cause_in_place(self, score: CauseScore, least: float) -> "Trial | None":
+        """The fit with a cause in the place of the last one, from where that has brought the videos.
+
+        None where no world can begin there, or the log posterior does not come near to `least` at once.
+        """
         last = self.causes[-1]
         left = self._model_without(last).with_effect(score.effect)
         choices = {name: one for name, one in self.choices.items() if name != last.name}
         try:
-            fit = self.fit.under(left, start=score.start, model_error=False)
+            fit = self.fit.under(left, start=score.start, least=least, model_error=False)
         except ImpossibleStartError:
             return None
         return Trial((*self.causes[:-1], score.effect), fit, choices)

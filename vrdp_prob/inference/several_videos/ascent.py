@@ -36,7 +36,7 @@ taken to be at an edge: where two orders of events meet, or a contact just happe
 
 
 class ImpossibleStartError(Exception):
-    """A search was to begin where the world of some video cannot be simulated."""
+    """A search was to begin where the world of some video cannot be simulated, or where it is not worth its while."""
 
 
 @dataclass(frozen=True)
@@ -68,6 +68,7 @@ def climb(
     locals_: Sequence[Float[np.ndarray, "_"]],
     *,
     towards: Float[np.ndarray, "shared"] | None = None,
+    least: float | None = None,
 ) -> JointFit:
     """Climb the joint log posterior.
 
@@ -79,14 +80,18 @@ def climb(
         Where to begin.
     towards
         Shared numbers to which the first step goes, as far as it goes up.
+    least
+        Log posterior that the videos must reach by their own numbers alone, for the climb to be worth its while.
 
     Raises
     ------
     ImpossibleStartError
-        If a video has no world at the start.
+        If a video has no world at the start, or less than that is reached.
     """
+    if least is not None:
+        locals_ = in_parallel(lambda index: settle(videos[index], shared, [locals_[index]]), range(len(videos)))
     state, converged = _with_best_noise(numbers, videos, _State.at(videos, shared, locals_)), False
-    if not np.isfinite(state.total(numbers)):
+    if not state.total(numbers) > (-np.inf if least is None else least):
         raise ImpossibleStartError
     slopes = _expanded(numbers, videos, state)
     if towards is not None and not np.array_equal(towards, shared):

@@ -80,6 +80,7 @@ class SharedFit:
         start: Mapping[str, float] | None = None,
         own: Sequence[Mapping[Owned, float]] | None = None,
         held: Sequence[frozenset[Owned]] | None = None,
+        least: float | None = None,
         model_error: bool = True,
     ) -> "SharedFit":
         """The fit of another model, from the values of this one; much faster than a new one.
@@ -95,8 +96,15 @@ class SharedFit:
             Where further numbers of each video begin, by name and owner and in their units.
         held
             Numbers of each video that keep their default though the model has them; those that do now where None.
+        least
+            Log posterior that must be reached at the start, where the videos' own numbers alone have followed.
         model_error
             Whether what the model leaves unexplained is looked for.
+
+        Raises
+        ------
+        ImpossibleStartError
+            If a video has no world at the start, or less than that is reached.
         """
         joint = self.joint
         structures = self.structures
@@ -117,7 +125,7 @@ class SharedFit:
                 entry = entries[place]
                 if (entry.field, entry.owner) in values:
                     mine[number] = coordinate(entry.transform, values[entry.field, entry.owner])
-        found = climb(numbers, videos, shared, locals_, towards=towards)
+        found = climb(numbers, videos, shared, locals_, towards=towards, least=least)
         return _finished(found, model, self.fits, structures, self.shared, model_error=model_error)
 
     def _vanishing(self, model: PhysicsModel) -> dict[str, float]:

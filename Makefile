@@ -6,12 +6,13 @@ SETUP := $(VENV)/.complete
 OUT ?= out
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
-.PHONY: help setup demo test test-slow lint types bench calibrate clean
+.PHONY: help setup demo test test-slow test-discovery lint types bench calibrate clean
 
 help:
 	@echo "make demo       the main job on the example that ships: a video in, a report out"
 	@echo "make test       the fast tests"
 	@echo "make test-slow  the statistical and large tests"
+	@echo "make test-discovery  hide effects in data and require finding them, tables to docs/ (hours; goes on where it was)"
 	@echo "make lint       format and lint"
 	@echo "make types      types"
 	@echo "make calibrate  simulation-based calibration of every sampler, figures to docs/ (hours; goes on where it was)"
@@ -36,6 +37,10 @@ test: $(SETUP)
 test-slow: $(SETUP)
 	$(BIN)/python -m pytest -m slow -n 2 --dist loadfile
 
+test-discovery: $(SETUP)
+	mkdir -p $(OUT)
+	$(BIN)/python benchmarks/discovery.py --docs docs --json $(OUT)/discovery.json
+
 lint: $(SETUP)
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
@@ -45,7 +50,7 @@ types: $(SETUP)
 
 bench: $(SETUP)
 	mkdir -p $(OUT)
-	for script in $(filter-out benchmarks/calibration.py,$(wildcard benchmarks/[a-z]*.py)); do \
+	for script in $(filter-out benchmarks/calibration.py benchmarks/discovery.py,$(wildcard benchmarks/[a-z]*.py)); do \
 	  $(BIN)/python $$script --json $(OUT)/$$(basename $$script .py).json || exit 1; \
 	done
 

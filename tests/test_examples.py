@@ -39,6 +39,18 @@ def test_your_own_tracks(tmp_path: Path) -> None:
     assert mean == pytest.approx(0.036, rel=0.02)
 
 
+def test_find_the_hidden_effect(tmp_path: Path) -> None:
+    printed = run_example("find_the_hidden_effect.py", tmp_path)
+    assert "verdict: named\nsurface_tilt" in printed
+    low, high = (float(end) for end in printed.split("tilt_x: ")[1].splitlines()[0].split(" to "))
+    assert low < 0.016 < high
+
+
 def test_every_example_is_run() -> None:
     scripts = {path.name for path in EXAMPLES.glob("*.py")}
-    assert scripts == {"ask_a_question.py", "report_on_a_video.py", "your_own_tracks.py"}
+    assert scripts == {
+        "ask_a_question.py",
+        "find_the_hidden_effect.py",
+        "report_on_a_video.py",
+        "your_own_tracks.py",
+    }

@@ -95,7 +95,7 @@ class Rebounds:
                 owners.append(row)
                 met = (one.bodies == pair).all(axis=1)
                 speeds.append(float(np.exp(np.log(np.maximum(one.events.closing_speed[met], SLOWEST)).mean())))
-        rows = np.array(owners).reshape(-1, len(own.values))
+        rows = np.array(owners).reshape(len(owners), len(own.values))
         covariance = rows @ own.covariance @ rows.T
         known = np.flatnonzero(np.diag(covariance) < LARGEST_SD**2)
         return cls((rows @ own.values)[known], covariance[np.ix_(known, known)], np.array(speeds)[known], rows[known])

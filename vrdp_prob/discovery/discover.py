@@ -6,9 +6,7 @@ import numpy as np
 
 from vrdp_prob.discovery.checking import check_video_count
 from vrdp_prob.discovery.checks import run_checks
-from vrdp_prob.discovery.describe import describe
 from vrdp_prob.discovery.estimates import cause_sentence, estimates, upper_bounds
-from vrdp_prob.discovery.figures import residual_figures
 from vrdp_prob.discovery.finding import Check, Finding, FoundCause, Gain, HeldOut, UpperBound, Verdict
 from vrdp_prob.discovery.forecast import held_out
 from vrdp_prob.discovery.search import Search, search
@@ -67,9 +65,8 @@ def discover(
     checks = run_checks(found.base.fit, seed=seed)
     after = run_checks(found.best.fit, seed=seed) if found.best.causes else checks
     causes = _causes(found, seed)
-    verdict = _verdict(found, after)
     return Finding(
-        verdict=verdict,
+        verdict=_verdict(found, after),
         causes=tuple(causes),
         checks=checks,
         checks_after=after,
@@ -77,9 +74,7 @@ def discover(
         model=physics,
         extended=found.best.fit.model,
         videos=tuple(tracks.video for tracks in videos),
-        description=describe(found.best.fit, seed=seed) if verdict is Verdict.UNKNOWN else None,
         notes=tuple(_notes(found)),
-        figures=residual_figures(found.base.fit, found.best.fit if found.best.causes else None),
     )
 
 

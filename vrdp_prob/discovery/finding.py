@@ -199,8 +199,6 @@ class Finding:
         Names of the videos.
     notes
         Limits of the result, in sentences.
-    figures
-        What the model misses, and the extended one, as SVG by title.
     """
 
     verdict: Verdict
@@ -212,8 +210,7 @@ class Finding:
     extended: PhysicsModel
     videos: tuple[str, ...]
     description: Description | None = None
-    notes: tuple[str, ...] = ()
-    figures: Mapping[str, str] = field(default_factory=dict)
+    notes: tuple[str, ...] = field(default=())
 
     @property
     def named(self) -> tuple[FoundCause, ...]:

@@ -1,0 +1,208 @@
+"""Tables and checks of what discovery finds, and the page that holds them."""
+
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+from _discovery_results import (
+    NULLS,
+    REACHED,
+    SURE,
+    Result,
+    Share,
+    alarm,
+    alone,
+    answer,
+    between,
+    checks,
+    covered,
+    hit,
+    intervals,
+    named,
+    of,
+    reached,
+    right,
+    sure,
+    unknown,
+)
+from _discovery_tasks import SIZES, Kind
+
+from tests.discovery.causes import CATALOGUE
+from tests.discovery.other_effects import ALL
+
+MARKS = "<!-- measured: begin -->", "<!-- measured: end -->"
+
+
+def tables(results: Sequence[Result]) -> str:
+    """Everything that was measured, in Markdown."""
+    parts = {
+        "In short": _summary(results),
+        "Recall by cause and effect size": _recall(results),
+        "Confusion": _confusion(results),
+        "False alarms": _nulls(results),
+        "Two causes": _pairs(results),
+        "Outside the catalogue": _outside(results),
+        "Removed from the catalogue": _removed(results),
+        "Gain in held-out videos": _gains(results),
+        "Coverage of 95 % intervals": _coverage(results),
+        "What failed": _failures(results),
+    }
+    return "\n\n".join(f"### {title}\n\n{text}" for title, text in parts.items() if text)
+
+
+def _summary(results: Sequence[Result]) -> str:
+    rows = [
+        (one["name"], _figure(one["value"]), _figure(one["goal"]), "yes" if one["ok"] else "**no**")
+        for one in checks(results)
+    ]
+    return _table(("", "measured", "goal", "met"), rows)
+
+
+def _figure(value: float | None) -> str:
+    return "-" if value is None else f"{value:.3g}"
+
+
+def _recall(results: Sequence[Result]) -> str:
+    bounds = (*SIZES, np.inf)
+    bins = list(pairwise(bounds))
+    head = ["hidden", *(f"from {low:g} noise sd" for low, _ in bins), "and nothing else", "smaller"]
+    rows = []
+    ones = of(results, Kind.ONE)
+    for way in [*dict.fromkeys(way for result in ones for way in result["ways"]), None]:
+        mine = [result for result in ones if way in (None, *result["ways"])]
+        seen = between(mine, SIZES[0], np.inf)
+        shares = [str(Share(between(mine, *ends), hit)) for ends in bins]
+        rows.append((way or "all", *shares, str(Share(seen, alone)), str(len(mine) - len(seen))))
+    return _table(head, rows) if ones else ""
+
+
+def _confusion(results: Sequence[Result]) -> str:
+    rows: dict[str, Counter[str]] = {}
+    for result in of(results, Kind.ONE, Kind.NULL, Kind.ROUGH_NULL, Kind.OUTSIDE):
+        if result["kind"] == Kind.ONE and reached(result) < REACHED * SIZES[0]:
+            continue
+        title = ALL[result["ways"][0]].name if result["ways"] else result["kind"]
+        rows.setdefault(title, Counter())[answer(result)] += 1
+    causes = list(CATALOGUE)
+    columns = [*causes, "none", "unknown", "failed"]
+    head = ["hidden", *(str(k + 1) for k in range(len(causes))), "none", "unknown", "failed"]
+    numbered = {name: f"{k + 1} {name}" for k, name in enumerate(causes)}
+    order = [*causes, *(name for name in rows if name not in causes)]
+    cells = [
+        (numbered.get(name, name), *(str(rows[name][column] or "") for column in columns))
+        for name in order
+        if name in rows
+    ]
+    return _table(head, cells) if cells else ""
+
+
+def _nulls(results: Sequence[Result]) -> str:
+    rows = []
+    for title, kinds in ((Kind.NULL, NULLS[:1]), (Kind.ROUGH_NULL, NULLS[1:]), ("both", NULLS)):
+        mine = of(results, *kinds)
+        called = Counter(name for result in mine for name in named(result))
+        shown = ", ".join(f"{name} {count}" for name, count in called.most_common()) or "-"
+        rows.append((str(title), str(Share(mine, alarm)), str(Share(mine, _named)), shown))
+    return _table(("data", "verdict not `none`", "a cause is named", "which"), rows) if of(results, *NULLS) else ""
+
+
+def _named(result: Result) -> bool:
+    return bool(named(result))
+
+
+def _pairs(results: Sequence[Result]) -> str:
+    rows = [
+        (" + ".join(ways), str(Share(mine, hit)), _list(", ".join(named(one)) or answer(one) for one in mine))
+        for ways, mine in _by_ways(of(results, Kind.TWO)).items()
+    ]
+    return _table(("hidden", "both named", "answers"), rows) if rows else ""
+
+
+def _outside(results: Sequence[Result]) -> str:
+    rows = [
+        (" + ".join(ways), str(Share(mine, sure)), str(Share(mine, unknown)), _list(_probable(one) for one in mine))
+        for ways, mine in _by_ways(of(results, Kind.OUTSIDE)).items()
+    ]
+    head = ("hidden", f"a cause with probability > {SURE}", "verdict `unknown`", "answers")
+    return _table(head, rows) if rows else ""
+
+
+def _removed(results: Sequence[Result]) -> str:
+    rows = [
+        (" + ".join(ways), str(Share(mine, unknown)), _list(_probable(one) for one in mine))
+        for ways, mine in _by_ways(of(results, Kind.REMOVED)).items()
+    ]
+    return _table(("hidden, and not looked for", "verdict `unknown`", "answers"), rows) if rows else ""
+
+
+def _probable(result: Result) -> str:
+    """The verdict, and causes with their probabilities."""
+    causes = [
+        f"{one['name']} {one['probability']:.2f}" for one in result.get("causes", ()) if one["name"] in named(result)
+    ]
+    return " ".join([f"`{result.get('verdict', 'failed')}`", *causes])
+
+
+def _gains(results: Sequence[Result]) -> str:
+    head = (
+        "hidden",
+        "data sets where it was named",
+        "gain > 2 standard errors",
+        "gain in nats, median",
+        "error without it, mm",
+        "with it, mm",
+        "noise, mm",
+    )
+    rows = []
+    for name, found in right(results).items():
+        sure = sum(one["gain"] > 2 * one["gain_se"] for one in found)
+        errors = 1e3 * np.median([[*one["rmse"], one["noise"]] for one in found], axis=0)
+        gain = np.median([one["gain"] for one in found])
+        rows.append((name, str(len(found)), str(sure), f"{gain:.0f}", *(f"{error:.1f}" for error in errors)))
+    return _table(head, rows) if rows else ""
+
+
+def _coverage(results: Sequence[Result]) -> str:
+    found = intervals(results)
+    rows = [(name, str(Share(mine, covered))) for name, mine in found.items()]
+    rows.append(("all", str(Share([one for mine in found.values() for one in mine], covered))))
+    return _table(("parameter", "truth inside"), rows) if found else ""
+
+
+def _failures(results: Sequence[Result]) -> str:
+    lines = [f"- {result['task']}: not drawn: {result['not_drawn']}" for result in results if "not_drawn" in result]
+    lines += [
+        f"- {result['task']}: {result['exception'].strip().splitlines()[-1]}"
+        for result in results
+        if "exception" in result
+    ]
+    return "\n".join(lines)
+
+
+def _by_ways(results: Sequence[Result]) -> Mapping[tuple[str, ...], list[Result]]:
+    found: dict[tuple[str, ...], list[Result]] = {}
+    for result in results:
+        found.setdefault(tuple(result["ways"]), []).append(result)
+    return found
+
+
+def _list(answers: Iterable[str]) -> str:
+    return "; ".join(f"{text} ({count})" if count > 1 else text for text, count in Counter(answers).most_common())
+
+
+def _table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    cells = [list(head), *[list(row) for row in rows]]
+    widths = [max(len(row[column]) for row in cells) for column in range(len(head))]
+    lines = [
+        "| " + " | ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)) + " |" for row in cells
+    ]
+    return "\n".join([lines[0], "|" + "|".join("-" * (width + 2) for width in widths) + "|", *lines[1:]])
+
+
+def page(results: Sequence[Result], path: Path) -> None:
+    """Write the tables between the marks of a page."""
+    text = path.read_text(encoding="utf-8")
+    before, after = text.split(MARKS[0])[0], text.split(MARKS[1])[1]
+    path.write_text(f"{before}{MARKS[0]}\n\n{tables(results)}\n\n{MARKS[1]}{after}", encoding="utf-8")

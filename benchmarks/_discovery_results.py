@@ -1,0 +1,143 @@
+"""What the results of `benchmarks/discovery.py` mean: hits, false alarms, shares with intervals, and the goals."""
+
+from collections.abc import Callable, Iterable, Sequence
+from typing import Any
+
+import numpy as np
+from _discovery_tasks import SIZES, Kind
+from scipy.stats import binomtest
+
+Result = dict[str, Any]
+
+SURE, LIKELY = 0.9, 0.5
+REACHED = 0.95
+"""Share of an effect size from which it counts as reached: the search for a strength is no finer."""
+NULLS = (Kind.NULL, Kind.ROUGH_NULL)
+STRONG_RECALL, WEAK_RECALL, FALSE_ALARMS, BOTH, SECONDS = 0.95, 0.60, 0.05, 0.80, 180.0
+FEWEST_NULLS = 60
+
+
+def of(results: Iterable[Result], *kinds: Kind) -> list[Result]:
+    """Results of tasks of some kinds for which there were data."""
+    return [result for result in results if result["kind"] in kinds and "not_drawn" not in result]
+
+
+def named(result: Result) -> list[str]:
+    """What discovery holds for likely, the most probable first; where that is nothing, the first of what it named."""
+    causes = result.get("causes", [])
+    likely = sorted((one for one in causes if one["probability"] >= LIKELY), key=lambda one: -float(one["probability"]))
+    return [one["name"] for one in likely] or [one["name"] for one in causes if one["named"]][:1]
+
+
+def answer(result: Result) -> str:
+    """The first cause that was named; the verdict where none was."""
+    return next(iter(named(result)), result.get("verdict", "failed"))
+
+
+def hit(result: Result) -> bool:
+    """Whether everything hidden was named, or held for likely."""
+    return {one["name"] for one in result["hidden"]} <= set(named(result))
+
+
+def alone(result: Result) -> bool:
+    """Whether what is hidden was named and nothing else."""
+    return {one["name"] for one in result["hidden"]} == set(named(result))
+
+
+def reached(result: Result) -> float:
+    """Smallest effect size of what is hidden, in units of the noise."""
+    return min(float(one["effect_size"]) for one in result["hidden"])
+
+
+def between(results: Iterable[Result], low: float, high: float) -> list[Result]:
+    """Results whose effect size lies from a size up to below another one."""
+    return [result for result in results if REACHED * low <= reached(result) < REACHED * high]
+
+
+class Share:
+    """How many of some results have a property, with Wilson's 95 % interval of the share."""
+
+    def __init__(self, results: Sequence[Result], has: Callable[[Result], bool]) -> None:
+        self.hits, self.of = sum(map(has, results)), len(results)
+
+    @property
+    def value(self) -> float | None:
+        """The share; None of nothing."""
+        return self.hits / self.of if self.of else None
+
+    def __str__(self) -> str:
+        if not self.of:
+            return "-"
+        low, high = binomtest(self.hits, self.of).proportion_ci(method="wilson")
+        return f"{self.hits}/{self.of} ({100 * low:.0f}-{100 * high:.0f} %)"
+
+
+def alarm(result: Result) -> bool:
+    return result.get("verdict") != "none"
+
+
+def sure(result: Result) -> bool:
+    return any(one["probability"] > SURE for one in result.get("causes", ()))
+
+
+def unknown(result: Result) -> bool:
+    return result.get("verdict") == "unknown"
+
+
+def right(results: Sequence[Result]) -> dict[str, list[Result]]:
+    """What was found of single causes that were named rightly, by the cause."""
+    found: dict[str, list[Result]] = {}
+    for result in between(of(results, Kind.ONE), SIZES[0], np.inf):
+        if hit(result):
+            name = result["hidden"][0]["name"]
+            found.setdefault(name, []).append(next(one for one in result["causes"] if one["name"] == name))
+    return found
+
+
+def intervals(results: Sequence[Result]) -> dict[str, list[Result]]:
+    """Estimates of which the truth is known, by the parameter without the body and video."""
+    found: dict[str, list[Result]] = {}
+    for causes in right(results).values():
+        for cause in causes:
+            for name, estimate in cause["parameters"].items():
+                if estimate["truth"] is not None:
+                    found.setdefault(name.split("[")[0], []).append(estimate)
+    return found
+
+
+def covered(estimate: Result) -> bool:
+    return bool(estimate["low"] <= estimate["truth"] <= estimate["high"])
+
+
+def checks(results: Sequence[Result]) -> list[dict[str, Any]]:
+    """Goals of discovery."""
+    ones, nulls = of(results, Kind.ONE), of(results, *NULLS)
+    strong, weak = between(ones, 3.0, np.inf), between(ones, 1.5, 3.0)
+    values = [estimate for mine in intervals(results).values() for estimate in mine]
+    walls = [result["seconds"]["wall"] for result in results if "seconds" in result]
+    entries = [
+        _at_least("recall from 3 noise sd", Share(strong, hit).value, STRONG_RECALL),
+        _at_least("recall from 1.5 to 3 noise sd", Share(weak, hit).value, WEAK_RECALL),
+        _at_most("false alarms", Share(nulls, alarm).value, FALSE_ALARMS),
+        _at_least("nulls", len(nulls), FEWEST_NULLS),
+        _at_least("two causes, both named", Share(of(results, Kind.TWO), hit).value, BOTH),
+        _at_most(
+            "outside the catalogue, called a cause of it with probability > 0.9",
+            Share(of(results, Kind.OUTSIDE), sure).value,
+            0.0,
+        ),
+        _at_least("removed from the catalogue, verdict unknown", Share(of(results, Kind.REMOVED), unknown).value, 1.0),
+        _at_least("95 % intervals that hold the truth", Share(values, covered).value, 0.9),
+        _at_most(
+            "wall seconds per data set, 95 % are below", float(np.quantile(walls, 0.95)) if walls else None, SECONDS
+        ),
+    ]
+    return [*entries, _at_most("data sets on which discovery failed", sum("exception" in one for one in results), 0)]
+
+
+def _at_least(name: str, value: float | None, goal: float) -> dict[str, Any]:
+    return {"name": name, "value": value, "goal": goal, "ok": value is not None and value >= goal}
+
+
+def _at_most(name: str, value: float | None, goal: float) -> dict[str, Any]:
+    return {"name": name, "value": value, "goal": goal, "ok": value is not None and value <= goal}

@@ -1,0 +1,119 @@
+"""What is hidden in the data sets of `benchmarks/discovery.py`."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from enum import StrEnum
+
+import _project  # noqa: F401  the generator belongs to the tests, which lie beside the package
+
+from tests.discovery.causes import CATALOGUE, VARIANTS
+from tests.discovery.other_effects import OTHERS
+
+SIZES = (1.5, 3.0, 6.0)
+"""Effect sizes at which single causes are hidden."""
+STRONG = 6.0
+"""Effect size of what has no name in the catalogue, or whose name is taken out of it."""
+TOGETHER = 4.0
+"""Effect size of each of two causes."""
+PAIRS = (
+    ("surface_tilt", "linear_drag"),
+    ("surface_tilt", "contact_radius_error"),
+    ("bowl", "contact_friction"),
+    ("wind", "lens_distortion"),
+    ("rotating_table", "time_varying_friction"),
+    ("pair_force", "slip_to_roll"),
+    ("magnus_curl", "surface_tilt"),
+    ("linear_drag", "clock_error"),
+    ("surface_tilt", "external_impulse"),
+    ("wall", "linear_drag"),
+    ("hidden_obstacle", "surface_tilt"),
+    ("friction_patch", "rotating_table"),
+    ("material_friction", "bowl"),
+    ("speed_dependent_restitution", "linear_drag"),
+    ("mass_dependent_friction", "surface_tilt"),
+)
+"""Causes that are hidden two at a time; every cause is in one pair at least."""
+
+
+class Kind(StrEnum):
+    """Kinds of tasks."""
+
+    ONE = "one cause"
+    TWO = "two causes"
+    NULL = "null"
+    ROUGH_NULL = "null, outliers and dropouts"
+    OUTSIDE = "outside the catalogue"
+    REMOVED = "removed from the catalogue"
+
+
+@dataclass(frozen=True)
+class Task:
+    """A data set to draw and to search.
+
+    Parameters
+    ----------
+    kind
+        What is asked.
+    ways
+        What is hidden.
+    effect_size
+        Of each of them, in units of the noise.
+    seed
+        Of the data.
+    videos, bodies
+        Numbers of videos, and of bodies in each.
+    """
+
+    kind: Kind
+    ways: tuple[str, ...]
+    effect_size: float
+    seed: int
+    videos: int = 12
+    bodies: int = 4
+
+    @property
+    def name(self) -> str:
+        """The task in words, by which its result is found again."""
+        what = "+".join(self.ways) or "nothing"
+        return f"{self.kind}: {what}, size {self.effect_size:g}, {self.videos} videos x {self.bodies}, seed {self.seed}"
+
+
+def tasks(
+    *,
+    causes: Sequence[str] | None = None,
+    sizes: Sequence[float] = SIZES,
+    seeds: int = 3,
+    nulls: int = 60,
+    videos: int = 12,
+    bodies: int = 4,
+) -> list[Task]:
+    """The grid, seed by seed, so that a run that is cut short has seen some of everything.
+
+    Parameters
+    ----------
+    causes
+        What may be hidden, of the catalogue, of its variants and outside it; None for everything.
+    sizes
+        Effect sizes of single causes.
+    seeds
+        Data sets of each cause and size, of each pair and of each effect outside the catalogue.
+    nulls
+        Data sets with nothing hidden, every other one with outliers and dropouts.
+    videos, bodies
+        Numbers of videos, and of bodies in each.
+    """
+    chosen = set(causes if causes is not None else (*CATALOGUE, *VARIANTS, *OTHERS))
+    single = [way for way in (*CATALOGUE, *VARIANTS) if way in chosen]
+    pairs = [pair for pair in PAIRS if chosen.issuperset(pair)]
+    rounds: list[list[Task]] = []
+    for seed in range(1, seeds + 1):
+        found = [Task(Kind.ONE, (way,), size, seed) for size in sorted(sizes, reverse=True) for way in single]
+        found += [Task(Kind.TWO, pair, TOGETHER, seed) for pair in pairs]
+        found += [Task(Kind.OUTSIDE, (way,), STRONG, seed) for way in OTHERS if way in chosen]
+        if seed == 1:
+            found += [Task(Kind.REMOVED, (way,), STRONG, seed) for way in single]
+        rounds.append(found)
+    empty = [Task((Kind.NULL, Kind.ROUGH_NULL)[k % 2], (), 0.0, k // 2 + 1) for k in range(nulls)]
+    share = -(-nulls // max(seeds, 1))
+    listed = [task for k, found in enumerate(rounds) for task in (*found, *empty[k * share : (k + 1) * share])]
+    return [replace(task, videos=videos, bodies=bodies) for task in (listed if rounds else empty)]

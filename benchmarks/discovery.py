@@ -1,0 +1,187 @@
+"""Whether discovery finds what is hidden in measured data: by cause and effect size, two at a time, and in nulls.
+
+    python benchmarks/discovery.py [--json FILE] [--docs docs] [--causes a,b] [--sizes 1.5,3,6] [--seeds 3] [--nulls 60]
+
+Each task draws videos with a hidden cause (`tests/discovery`: an integrator that is not the simulator), writes nothing
+but their tracks, reads them back and calls `discover`. Each result is written to `--results` (a file) as it comes, so
+that a run that was interrupted goes on; results of another version of the code are to be deleted by hand. `--causes`
+may also name effects outside the catalogue. `--docs` writes the tables into `discovery-tests.md` there; `--show` only
+reads the results there are. One process per core.
+"""
+
+import argparse
+import json
+import multiprocessing
+import os
+import sys
+import tempfile
+import time
+import traceback
+from collections.abc import Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+os.environ.setdefault("OMP_NUM_THREADS", "1")
+
+import torch
+from _discovery_page import page, tables
+from _discovery_results import Result, checks
+from _discovery_tasks import SIZES, Kind, Task, tasks
+
+from tests.discovery.data_set import Truth
+from tests.discovery.hidden import ROUGH, hide, true_values
+from tests.discovery.other_effects import ALL
+from tests.discovery.scenes import Setting
+from tests.discovery.videos import UnendingMotionError
+from vrdp_prob import load_all
+from vrdp_prob.discovery.discover import discover
+from vrdp_prob.discovery.finding import Finding, FoundCause
+from vrdp_prob.inference import default_model
+from vrdp_prob.models.effects.effect import Effect
+from vrdp_prob.models.model_file import known_effects
+from vrdp_prob.models.simulator.rollout import compile_model
+from vrdp_prob.progress import progress_display
+
+RESULTS = Path("out") / "discovery.jsonl"
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--json", type=Path, help="file for the checks")
+    parser.add_argument("--docs", type=Path, help="folder of the documentation, whose page is written anew")
+    parser.add_argument("--causes", help="what is hidden, separated by commas; everything by default")
+    parser.add_argument(
+        "--sizes", default=",".join(f"{size:g}" for size in SIZES), help="effect sizes of single causes"
+    )
+    parser.add_argument("--seeds", type=int, default=3, help="data sets of each cause and size")
+    parser.add_argument("--nulls", type=int, default=60, help="data sets with nothing hidden")
+    parser.add_argument("--videos", type=int, default=12)
+    parser.add_argument("--bodies", type=int, default=4)
+    parser.add_argument("--results", type=Path, default=RESULTS, help="file of the results, which are gone on with")
+    parser.add_argument("--show", action="store_true", help="compute nothing, show all results there are")
+    parser.add_argument("--processes", type=int, default=os.cpu_count() or 1)
+    options = parser.parse_args(arguments)
+    causes = options.causes.split(",") if options.causes else None
+    for name in causes or ():
+        if name not in ALL:
+            parser.error(f"nothing is called {name}; there are {', '.join(ALL)}")
+    listed = tasks(
+        causes=causes,
+        sizes=[float(size) for size in options.sizes.split(",")],
+        seeds=options.seeds,
+        nulls=options.nulls,
+        videos=options.videos,
+        bodies=options.bodies,
+    )
+    if options.show:
+        results = list(read(options.results).values())
+    else:
+        compile_model(default_model())
+        results = measure(listed, options.results, options.processes)
+    print(tables(results))
+    if options.docs:
+        page(results, options.docs / "discovery-tests.md")
+    if options.json:
+        options.json.write_text(json.dumps({"checks": checks(results)}, indent=1) + "\n", encoding="utf-8")
+    return 0
+
+
+def measure(listed: Sequence[Task], path: Path, processes: int) -> list[Result]:
+    """Results of tasks, those that are not there yet computed and written one by one."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    known = read(path)
+    missing = [task for task in listed if task.name not in known]
+    with (
+        multiprocessing.get_context("spawn").Pool(max(1, min(processes, len(missing)))) as pool,
+        path.open("a", encoding="utf-8") as file,
+        progress_display(quiet=False).stage("Hidden effects", total=len(missing)) as advance,
+    ):
+        for result in pool.imap_unordered(one, missing):
+            file.write(json.dumps(result) + "\n")
+            file.flush()
+            known[result["task"]] = result
+            advance(1)
+    return [known[task.name] for task in listed]
+
+
+def read(path: Path) -> dict[str, Result]:
+    """Results of an earlier run by the name of their task; a line that was cut short is left out."""
+    found = {}
+    for line in path.read_text(encoding="utf-8").splitlines() if path.exists() else []:
+        try:
+            result = json.loads(line)
+        except json.JSONDecodeError:
+            continue
+        found[result["task"]] = result
+    return found
+
+
+def one(task: Task) -> Result:
+    """What discovery makes of a data set."""
+    torch.set_num_threads(1)
+    facts: dict[str, Any] = {"task": task.name, **asdict(task)}
+    rough = ROUGH if task.kind is Kind.ROUGH_NULL else None
+    setting = Setting(videos=task.videos, bodies=task.bodies)
+    try:
+        data = hide(task.ways, seed=task.seed, effect_size=task.effect_size, setting=setting, measurement=rough)
+    except (UnendingMotionError, ValueError) as error:  # scenes in which this cause finds no room
+        return {**facts, "not_drawn": str(error)}
+    facts["hidden"] = [
+        {"name": cause.name, "strength": cause.strength, "effect_size": cause.effect_size}
+        for cause in data.truth.causes
+    ]
+    with tempfile.TemporaryDirectory() as folder:
+        data.write(folder)
+        videos = load_all(folder)
+    wall, cpu = time.perf_counter(), time.process_time()
+    try:
+        finding = discover(videos, seed=0, catalogue=catalogue(task))
+    except Exception:  # one failure is a result, and the others go on
+        return {**facts, "exception": traceback.format_exc(limit=-4)}
+    seconds = {"wall": time.perf_counter() - wall, "cpu": time.process_time() - cpu}
+    return {**facts, **outcome(finding, data.truth), "seconds": seconds}
+
+
+def catalogue(task: Task) -> list[Effect] | None:
+    """Causes that are looked for: all, or all but the hidden one."""
+    if task.kind is not Kind.REMOVED:
+        return None
+    hidden = {ALL[way].name for way in task.ways}
+    return [effect() for name, effect in known_effects().items() if name not in hidden]
+
+
+def outcome(finding: Finding, truth: Truth) -> Result:
+    """What was found, and the truth beside it."""
+    return {
+        "verdict": str(finding.verdict),
+        "causes": [_cause(cause, truth) for cause in finding.causes],
+        "failing_checks": [check.name for check in finding.checks if check.significant],
+        "failing_checks_after": [check.name for check in finding.checks_after if check.significant],
+        "notes": list(finding.notes),
+    }
+
+
+def _cause(cause: FoundCause, truth: Truth) -> Result:
+    right = {hidden.name for hidden in truth.causes}
+    true = {}
+    if cause.name in right:
+        true = true_values(truth, {name: estimate.mean for name, estimate in cause.parameters.items()})
+    gain = cause.gain
+    return {
+        "name": cause.name,
+        "named": cause.named,
+        "probability": cause.probability,
+        "gain": gain.elpd_difference,
+        "gain_se": gain.elpd_se,
+        "rmse": [gain.before.rmse, gain.after.rmse],
+        "noise": gain.noise,
+        "parameters": {
+            name: {"mean": one.mean, "low": one.q025, "high": one.q975, "truth": true.get(name)}
+            for name, one in cause.parameters.items()
+        },
+    }
+
+
+if __name__ == "__main__":
+    sys.exit(main())

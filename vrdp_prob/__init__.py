@@ -9,6 +9,8 @@
 __version__ = "0.1.0"
 
 from vrdp_prob.datasets import load, load_all
+from vrdp_prob.discovery.discover import discover
+from vrdp_prob.discovery.finding import Finding
 from vrdp_prob.errors import InputError
 from vrdp_prob.inference import Posterior
 from vrdp_prob.models.physics import PhysicsModel
@@ -22,6 +24,7 @@ __all__ = [
     "Body",
     "Camera",
     "Event",
+    "Finding",
     "InputError",
     "PhysicsModel",
     "Posterior",
@@ -30,6 +33,7 @@ __all__ = [
     "Tracks",
     "Wall",
     "ask",
+    "discover",
     "infer",
     "load",
     "load_all",

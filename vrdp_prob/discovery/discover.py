@@ -6,7 +6,9 @@ import numpy as np
 
 from vrdp_prob.discovery.checking import check_video_count
 from vrdp_prob.discovery.checks import run_checks
+from vrdp_prob.discovery.describe import describe
 from vrdp_prob.discovery.estimates import cause_sentence, estimates, upper_bounds
+from vrdp_prob.discovery.figures import residual_figures
 from vrdp_prob.discovery.finding import Check, Finding, FoundCause, Gain, HeldOut, UpperBound, Verdict
 from vrdp_prob.discovery.forecast import held_out
 from vrdp_prob.discovery.search import Search, search
@@ -65,8 +67,9 @@ def discover(
     checks = run_checks(found.base.fit, seed=seed)
     after = run_checks(found.best.fit, seed=seed) if found.best.causes else checks
     causes = _causes(found, seed)
+    verdict = _verdict(found, after)
     return Finding(
-        verdict=_verdict(found, after),
+        verdict=verdict,
         causes=tuple(causes),
         checks=checks,
         checks_after=after,
@@ -74,7 +77,9 @@ def discover(
         model=physics,
         extended=found.best.fit.model,
         videos=tuple(tracks.video for tracks in videos),
+        description=describe(found.best.fit, seed=seed) if verdict is Verdict.UNKNOWN else None,
         notes=tuple(_notes(found)),
+        figures=residual_figures(found.base.fit, found.best.fit if found.best.causes else None),
     )
 
 

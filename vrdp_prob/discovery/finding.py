@@ -199,6 +199,8 @@ class Finding:
         Names of the videos.
     notes
         Limits of the result, in sentences.
+    figures
+        What the model misses, and the extended one, as SVG by title.
     """
 
     verdict: Verdict
@@ -210,7 +212,8 @@ class Finding:
     extended: PhysicsModel
     videos: tuple[str, ...]
     description: Description | None = None
-    notes: tuple[str, ...] = field(default=())
+    notes: tuple[str, ...] = ()
+    figures: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def named(self) -> tuple[FoundCause, ...]:

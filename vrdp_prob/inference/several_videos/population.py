@@ -16,7 +16,7 @@ from vrdp_prob.models.physics import PhysicsModel
 
 FEWEST = 6
 """Bodies of which the tracks must tell the quantity, for their spread to be estimated."""
-SMALLEST, LARGEST = 0.005, 2.0
+SMALLEST, LARGEST = 0.02, 2.0
 """Standard deviations that are looked at, as shares of the stated one (the smallest) and of itself."""
 TELLING = 0.5
 """Share of the prior's variance below which the tracks tell a body's quantity."""
@@ -55,14 +55,13 @@ def _estimates(fit: SharedFit, parameter: Parameter) -> tuple[Float[np.ndarray, 
     values, variances = [], []
     joint, prior = fit.joint, parameter.prior
     for index, video in enumerate(joint.videos):
-        entries, point = video.likelihood.coordinates.entries, joint.point(index)
-        places = [place for place, entry in enumerate(entries) if entry.field == parameter.name]
-        if not places:
-            continue
-        variance = np.diag(np.linalg.inv(joint.precision(index)))
-        for place in places:
-            if variance[place] < TELLING * prior.sd**2:
-                alone = 1 / (1 / variance[place] - prior.sd**-2)
-                values.append(alone * (point[place] / variance[place] - prior.mean * prior.sd**-2))
+        entries, local = video.likelihood.coordinates.entries, joint.gaussian.locals[index]
+        # Given the shared numbers: a shared friction that is not sharp shifts all bodies alike, which is no spread.
+        own = (local.root**2).sum(axis=1)
+        for number, place in enumerate(video.local_places):
+            variance, value = float(own[number]), float(local.centre[number])
+            if entries[place].field == parameter.name and variance < TELLING * prior.sd**2:
+                alone = 1 / (1 / variance - prior.sd**-2)
+                values.append(alone * (value / variance - prior.mean * prior.sd**-2))
                 variances.append(alone)
     return np.array(values), np.array(variances)

@@ -61,8 +61,8 @@ def _estimate(transform: Transform, mean: float, sd: float, unit: str) -> Estima
 def cause_sentence(effect: Effect, found: Mapping[str, Estimate]) -> str:
     """What a cause is and how strong."""
     shown = [name for name in found if name.split("[")[0] in {*effect.vanishes_at, *effect.vanishes_like}]
-    parts = [f"{name} = {found[name].mean:.3g} +- {found[name].sd:.2g} {_unit(found[name].unit)}" for name in shown]
-    return f"{effect.sentence} {'; '.join(part.strip() for part in parts)}." if parts else effect.sentence
+    parts = [f"{name} = {found[name].mean:.3g} ± {found[name].sd:.2g} {_unit(found[name].unit)}" for name in shown]
+    return f"{effect.sentence.rstrip('.')} ({'; '.join(part.strip() for part in parts)})." if parts else effect.sentence
 
 
 def _unit(unit: str) -> str:

@@ -1,0 +1,38 @@
+"""What is said of the parameters of a cause."""
+
+import math
+
+import pytest
+
+from tests.discovery.fitted import fitted
+from vrdp_prob.discovery.estimates import cause_sentence, estimates
+from vrdp_prob.discovery.finding import Estimate
+from vrdp_prob.models.effects.air_drag import AirDrag
+from vrdp_prob.models.effects.body_friction import BodyFriction
+from vrdp_prob.models.effects.linear_drag import LinearDrag
+from vrdp_prob.models.effects.wall import Wall
+
+
+def test_a_logarithm_is_told_in_its_unit() -> None:
+    _, fit = fitted(seed=1)
+    place = fit.joint.numbers.names.index("air_drag")
+    mean, sd = fit.joint.gaussian.mean[place], fit.joint.gaussian.sd[place]
+    found = estimates(fit, AirDrag())["air_drag"]
+    assert found.q025 < found.mean < found.q975
+    assert math.sqrt(found.q025 * found.q975) == pytest.approx(math.exp(mean))
+    assert found.sd == pytest.approx(found.mean * sd, rel=0.2)
+
+
+def test_numbers_of_bodies_say_whose_they_are() -> None:
+    _, fit = fitted(seed=1)
+    names = list(estimates(fit, BodyFriction()))
+    assert names
+    assert all(name.startswith("friction_ratio[") and " in v0" in name for name in names)
+
+
+def test_a_sentence_holds_the_strength_in_brackets() -> None:
+    found = {"linear_drag": Estimate(0.187, 0.0082, 0.17, 0.2, "1/s")}
+    assert cause_sentence(LinearDrag(), found) == (
+        "Bodies are slowed in proportion to their speed (linear_drag = 0.187 ± 0.0082 1/s)."
+    )
+    assert cause_sentence(Wall(), {}) == Wall.sentence

@@ -17,7 +17,7 @@ from vrdp_prob.inference.several_videos.linking import LinkedVideo, SharedNumber
 def first_guess(
     numbers: SharedNumbers,
     videos: Sequence[LinkedVideo],
-    starts: Sequence[Float[np.ndarray, "start _"]],
+    starts: Sequence[Float[np.ndarray, "_ _"]],
     trusted: Sequence[bool],
 ) -> tuple[Float[np.ndarray, "shared"], list[Float[np.ndarray, "_"]]]:
     """Shared numbers that the videos' own fits agree on best, and each video's own numbers for them.

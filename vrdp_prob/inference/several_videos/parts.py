@@ -21,7 +21,7 @@ def stream(seed: int, video: str) -> np.random.Generator:
     return np.random.default_rng([seed, zlib.crc32(video.encode())])
 
 
-def carried_starts(fits: Sequence[MapFit], videos: Sequence[LinkedVideo]) -> list[Float[np.ndarray, "mode dimension"]]:
+def carried_starts(fits: Sequence[MapFit], videos: Sequence[LinkedVideo]) -> list[Float[np.ndarray, "_ _"]]:
     """The modes of the videos' own fits, in the vectors of the linked videos."""
     return [
         np.array([fit.likelihood.coordinates.carried(mode.point, video.likelihood.coordinates) for mode in fit.modes])

@@ -6,12 +6,12 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+from _resumable import Result
 from scipy.stats import binomtest
 
 from tests.inference.rank_statistics import shares, simultaneous_band, uniformity
 from tests.inference.scene_ranks import KINDS, LEVELS
 
-Result = dict[str, Any]
 Results = Mapping[str, Sequence[Result]]
 
 INTERVALS = (0.5, 0.8, 0.95)

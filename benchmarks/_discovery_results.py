@@ -5,9 +5,8 @@ from typing import Any
 
 import numpy as np
 from _discovery_tasks import SIZES, Kind
+from _resumable import Result
 from scipy.stats import binomtest
-
-Result = dict[str, Any]
 
 SURE, LIKELY = 0.9, 0.5
 REACHED = 0.95

@@ -11,7 +11,6 @@ tables into `calibration.md` there, and the figures beside it. One process per c
 
 import argparse
 import json
-import multiprocessing
 import os
 import sys
 import time
@@ -24,13 +23,13 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 import torch
 from _calibration_page import Result, checks, figures, page, tables
+from _resumable import measured
 
 from tests.inference.prior_scenes import PriorScene, prior_scene
 from tests.inference.scene_ranks import ranks
 from vrdp_prob.errors import InputError
 from vrdp_prob.inference import SAMPLERS, Posterior, default_model, infer
 from vrdp_prob.models.simulator.rollout import compile_model
-from vrdp_prob.progress import progress_display
 
 DRAWS = 1000
 ALONE = "laplace-alone"
@@ -67,37 +66,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def measure(sampler: str, seeds: Sequence[int], folder: Path, processes: int) -> list[Result]:
     """Results of some scenes, those that are not there yet computed and written one by one."""
-    folder.mkdir(parents=True, exist_ok=True)
-    path = folder / f"{sampler}.jsonl"
-    known = {result["seed"]: result for result in read(path)}
-    missing = [(sampler, seed) for seed in seeds if seed not in known]
-    with (
-        multiprocessing.get_context("spawn").Pool(min(processes, max(len(missing), 1))) as pool,
-        path.open("a", encoding="utf-8") as file,
-        progress_display(quiet=False).stage(f"Calibration ({sampler})", total=len(missing)) as advance,
-    ):
-        for result in pool.imap_unordered(one, missing):
-            file.write(json.dumps(result) + "\n")
-            file.flush()
-            known[result["seed"]] = result
-            advance(1)
-    return [known[seed] for seed in seeds]
+    asked = {seed: (sampler, seed) for seed in seeds}
+    path, label = folder / f"{sampler}.jsonl", f"Calibration ({sampler})"
+    return measured(one, asked, path, field="seed", label=label, processes=processes)
 
 
 def accepted() -> Iterator[int]:
     """Seeds whose scenes are of the kind that is looked at."""
     return (seed for seed in count() if prior_scene(seed) is not None)
-
-
-def read(path: Path) -> list[Result]:
-    """Results of an earlier run; a line that was cut short is left out."""
-    found = []
-    for line in path.read_text(encoding="utf-8").splitlines() if path.exists() else []:
-        try:
-            found.append(json.loads(line))
-        except json.JSONDecodeError:
-            continue
-    return found
 
 
 def one(task: tuple[str, int]) -> Result:

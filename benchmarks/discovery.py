@@ -11,7 +11,6 @@ reads the results there are. One process per core.
 
 import argparse
 import json
-import multiprocessing
 import os
 import sys
 import tempfile
@@ -28,6 +27,7 @@ import torch
 from _discovery_page import page, tables
 from _discovery_results import Result, checks
 from _discovery_tasks import SIZES, Kind, Task, tasks
+from _resumable import measured, read
 
 from tests.discovery.data_set import Truth
 from tests.discovery.hidden import ROUGH, hide, true_values
@@ -41,7 +41,6 @@ from vrdp_prob.inference import default_model
 from vrdp_prob.models.effects.effect import Effect
 from vrdp_prob.models.model_file import known_effects
 from vrdp_prob.models.simulator.rollout import compile_model
-from vrdp_prob.progress import progress_display
 
 RESULTS = Path("out") / "discovery.jsonl"
 
@@ -75,46 +74,19 @@ def main(arguments: Sequence[str] | None = None) -> int:
         bodies=options.bodies,
     )
     if options.show:
-        results = list(read(options.results).values())
+        results = list({result["task"]: result for result in read(options.results)}.values())
     else:
         compile_model(default_model())
-        results = measure(listed, options.results, options.processes)
+        asked = {task.name: task for task in listed}
+        results = measured(
+            one, asked, options.results, field="task", label="Hidden effects", processes=options.processes
+        )
     print(tables(results))
     if options.docs:
         page(results, options.docs / "discovery-tests.md")
     if options.json:
         options.json.write_text(json.dumps({"checks": checks(results)}, indent=1) + "\n", encoding="utf-8")
     return 0
-
-
-def measure(listed: Sequence[Task], path: Path, processes: int) -> list[Result]:
-    """Results of tasks, those that are not there yet computed and written one by one."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    known = read(path)
-    missing = [task for task in listed if task.name not in known]
-    with (
-        multiprocessing.get_context("spawn").Pool(max(1, min(processes, len(missing)))) as pool,
-        path.open("a", encoding="utf-8") as file,
-        progress_display(quiet=False).stage("Hidden effects", total=len(missing)) as advance,
-    ):
-        for result in pool.imap_unordered(one, missing):
-            file.write(json.dumps(result) + "\n")
-            file.flush()
-            known[result["task"]] = result
-            advance(1)
-    return [known[task.name] for task in listed]
-
-
-def read(path: Path) -> dict[str, Result]:
-    """Results of an earlier run by the name of their task; a line that was cut short is left out."""
-    found = {}
-    for line in path.read_text(encoding="utf-8").splitlines() if path.exists() else []:
-        try:
-            result = json.loads(line)
-        except json.JSONDecodeError:
-            continue
-        found[result["task"]] = result
-    return found
 
 
 def one(task: Task) -> Result:

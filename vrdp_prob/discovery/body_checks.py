@@ -13,7 +13,7 @@ from jaxtyping import Float
 
 from vrdp_prob.discovery.finding import Check
 from vrdp_prob.discovery.fitted_contacts import FittedContacts
-from vrdp_prob.discovery.free_flight import FRICTION
+from vrdp_prob.discovery.free_flight import FRICTION, NORMAL_95
 from vrdp_prob.discovery.free_flight_checks import SEEN
 from vrdp_prob.discovery.residual_model import ResidualModel
 from vrdp_prob.discovery.scatter_regression import Dependence, dependence
@@ -121,7 +121,7 @@ def _restitution_check(rebounds: Rebounds) -> Iterator[Check]:
         f"Restitution {opposite(slope, 'falls', 'grows')} with the approach speed: {number(low)} at {number(slow)} "
         f"m/s, {number(high)} at {number(fast)} m/s."
         if found.p_value < SEEN
-        else f"Nothing seen; a power of {number(1.96 * sd)} of the approach speed would have shown."
+        else f"Nothing seen; a power of {number(NORMAL_95 * sd)} of the approach speed would have shown."
     )
     yield Check("restitution against approach speed", slope, found.p_value, False, sentence)
 
@@ -159,7 +159,7 @@ def _friction_check(name: str, found: Dependence | None, words: str) -> Iterator
     sentence = (
         f"The fitted friction of the bodies depends on their {name}: {words}."
         if found.p_value < SEEN
-        else f"Nothing seen; {number(100 * 1.96 * float(found.sd.max()))} % would have shown."
+        else f"Nothing seen; {number(100 * NORMAL_95 * float(found.sd.max()))} % would have shown."
     )
     yield Check(f"friction of the bodies against {name}", float(found.slope[0]), found.p_value, False, sentence)
 

@@ -3,16 +3,16 @@
 from collections.abc import Sequence
 
 import numpy as np
+from jaxtyping import Float
 
 from vrdp_prob.discovery.checking import check_video_count
 from vrdp_prob.discovery.checks import run_checks
 from vrdp_prob.discovery.describe import describe
 from vrdp_prob.discovery.estimates import cause_sentence, estimates, upper_bounds
 from vrdp_prob.discovery.figures import residual_figures
-from vrdp_prob.discovery.finding import Check, Finding, FoundCause, Gain, HeldOut, UpperBound, Verdict
-from vrdp_prob.discovery.forecast import held_out
+from vrdp_prob.discovery.finding import Check, Finding, FoundCause, Gain, UpperBound, Verdict
 from vrdp_prob.discovery.search import Search, search
-from vrdp_prob.discovery.trials import Trial, gain, weights
+from vrdp_prob.discovery.trials import Trial, gain, gains, weights
 from vrdp_prob.inference import default_model
 from vrdp_prob.inference.several_videos.fitting import fit_together
 from vrdp_prob.models.effects.effect import Effect
@@ -27,6 +27,8 @@ EXPLAINED = 0.5
 
 LEFT_LEVEL = 0.005
 """Probability, over all checks, with which a model that explains everything is taken to leave something."""
+TELLING = 2.0
+"""Overdispersion of a video that is told of."""
 LEAST_SHARE = 0.01
 """Probability from which a cause is told of that could take the place of a named one."""
 
@@ -112,44 +114,48 @@ def _causes(found: Search, seed: int) -> list[FoundCause]:
         simplest = max(one.log_prior for one in (found.best, *best_of.values()))
         log_prior = [one.log_prior - simplest - found.needed for one in (found.best, *best_of.values())]
         log_prior.insert(1, 0.0)
-        shares = weights(trials, log_prior, np.random.default_rng(seed))
-        named.append(_cause(found.best, found.best.causes[number], lesser, float(shares[0]), named=True))
+        shares = weights(trials, log_prior, np.random.default_rng(seed), overdispersion=found.overdispersion)
+        named.append(
+            _cause(found.best, found.best.causes[number], lesser, found.overdispersion, float(shares[0]), named=True)
+        )
         for rival, share in zip(best_of.values(), shares[2:], strict=True):
             if share >= LEAST_SHARE:
-                others.append(_cause(rival, rival.causes[-1], lesser, float(share), named=False))
+                others.append(_cause(rival, rival.causes[-1], lesser, found.overdispersion, float(share), named=False))
     named.sort(key=lambda one: -one.probability)
     return named + sorted(others, key=lambda one: -one.probability)
 
 
-def _cause(trial: Trial, effect: Effect, lesser: Trial, probability: float, *, named: bool) -> FoundCause:
-    values = estimates(trial.fit, effect)
+def _cause(
+    trial: Trial,
+    effect: Effect,
+    lesser: Trial,
+    overdispersion: Float[np.ndarray, "video"],
+    probability: float,
+    *,
+    named: bool,
+) -> FoundCause:
+    values = estimates(trial.fit, effect, overdispersion)
     return FoundCause(
         name=effect.name,
         probability=min(max(probability, 0.0), 1.0),
         sentence=cause_sentence(effect, values),
         parameters=values,
-        gain=_gain(lesser, trial),
+        gain=_gain(lesser, trial, overdispersion),
         named=named,
     )
 
 
-def _gain(before: Trial, after: Trial) -> Gain:
-    difference, error = gain(after, before)
+def _gain(before: Trial, after: Trial, overdispersion: Float[np.ndarray, "video"]) -> Gain:
+    difference, error = gain(after, before, overdispersion)
     videos = after.fit.videos
     return Gain(
-        before=_held_out(before),
-        after=_held_out(after),
+        before=before.held_out,
+        after=after.held_out,
         noise=float(np.median([part.clues.noise for part in after.fit.fits])),
         elpd_difference=difference,
         elpd_se=error,
-        by_video=dict(zip(videos, (after.log_density - before.log_density).tolist(), strict=True)),
+        by_video=dict(zip(videos, gains(after, before, overdispersion).tolist(), strict=True)),
     )
-
-
-def _held_out(trial: Trial) -> HeldOut:
-    joint = trial.fit.joint
-    points = [joint.point(index) for index in range(len(joint.videos))]
-    return held_out(joint.videos, points, list(trial.cavities.values()))
 
 
 def _bounds(found: Search) -> list[UpperBound]:
@@ -164,5 +170,13 @@ def _notes(found: Search) -> list[str]:
     if not found.best.fit.joint.converged:
         notes.append(
             "The joint fit ended before it had converged: some video is at the edge between two courses of events."
+        )
+    worst = int(np.argmax(found.overdispersion))
+    if found.overdispersion[worst] > TELLING:
+        notes.append(
+            "More than noise is left unexplained: its sums over neighbouring frames are "
+            f"{np.sqrt(found.overdispersion[worst]):.2g} times as large as noise would leave them in video "
+            f"{found.base.fit.videos[worst]}. Gains are divided by the squares of such factors, and intervals "
+            "are that much wider."
         )
     return notes

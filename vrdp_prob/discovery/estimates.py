@@ -4,6 +4,7 @@ import math
 from collections.abc import Mapping
 
 import numpy as np
+from jaxtyping import Float
 
 from vrdp_prob.discovery.finding import Estimate, UpperBound
 from vrdp_prob.discovery.scores import CauseScore
@@ -14,11 +15,15 @@ from vrdp_prob.models.parameters import Transform
 
 MIDDLE = 1.959964
 """Standard deviations from the middle of a normal distribution to the ends of its middle 95 %."""
+CERTAIN = 0.95
+"""Probability of the intervals."""
 ONE_SIDED = 1.644854
 """The same to the end of its lower 95 %."""
 
 
-def estimates(fit: SharedFit, effect: Effect) -> dict[str, Estimate]:
+def estimates(
+    fit: SharedFit, effect: Effect, overdispersion: Float[np.ndarray, "video"] | None = None
+) -> dict[str, Estimate]:
     """Parameters of an effect by name, with the material, or the body and video, that each belongs to.
 
     Parameters
@@ -27,7 +32,11 @@ def estimates(fit: SharedFit, effect: Effect) -> dict[str, Estimate]:
         Fit of a model with the effect.
     effect
         The effect.
+    overdispersion
+        Factor of each video by which variances are larger than what the likelihood says, shared numbers by their mean;
+        1 where None.
     """
+    wider = np.sqrt(np.ones(len(fit.videos)) if overdispersion is None else overdispersion)
     units = {parameter.name: parameter for parameter in effect.parameters}
     found: dict[str, Estimate] = {}
     joint = fit.joint
@@ -35,7 +44,7 @@ def estimates(fit: SharedFit, effect: Effect) -> dict[str, Estimate]:
         if key[0] in units:
             words = place_words(key[1])
             name = f"{key[0]}[{words}]" if words else key[0]
-            mean, sd = joint.gaussian.mean[place], joint.gaussian.sd[place]
+            mean, sd = joint.gaussian.mean[place], joint.gaussian.sd[place] * np.sqrt(np.mean(wider**2))
             found[name] = _estimate(units[key[0]].transform, float(mean), float(sd), units[key[0]].unit)
     for index, video in enumerate(joint.videos):
         coordinates, point = video.likelihood.coordinates, joint.point(index)
@@ -45,8 +54,12 @@ def estimates(fit: SharedFit, effect: Effect) -> dict[str, Estimate]:
             if entry.field in units:
                 body = "" if entry.owner is None else f"{video.likelihood.tracks.bodies[entry.owner].id} in "
                 found[f"{entry.field}[{body}{video.name}]"] = _estimate(
-                    entry.transform, float(point[place]), float(sd[place]), units[entry.field].unit
+                    entry.transform, float(point[place]), float(sd[place] * wider[index]), units[entry.field].unit
                 )
+        interval = float(np.median(np.diff(video.likelihood.tracks.times)))
+        for (name, _), value in fit.structures[index].held.items():
+            if name in effect.stepwise and value is not None:
+                found[f"{name}[{video.name}]"] = _between_frames(value, interval, units[name].unit)
     return found
 
 
@@ -56,6 +69,12 @@ def _estimate(transform: Transform, mean: float, sd: float, unit: str) -> Estima
         return Estimate(mean, sd, low, high, unit)
     middle = math.exp(mean + sd**2 / 2)
     return Estimate(middle, middle * math.sqrt(math.expm1(sd**2)), math.exp(low), math.exp(high), unit)
+
+
+def _between_frames(middle: float, interval: float, unit: str) -> Estimate:
+    """A time of which only the two frames around it are known."""
+    half = CERTAIN * interval / 2
+    return Estimate(middle, interval / math.sqrt(12), middle - half, middle + half, unit)
 
 
 def cause_sentence(effect: Effect, found: Mapping[str, Estimate]) -> str:

@@ -97,11 +97,7 @@ class Score:
     @cached_property
     def _root(self) -> Float[np.ndarray, "strength known"]:
         """Root of the covariance of the strengths, in the directions of which something is known."""
-        size = np.sqrt(np.maximum(np.diag(self.information), 1e-300))
-        values, vectors = np.linalg.eigh(self.information / np.outer(size, size))
-        known = values > RANK
-        root: np.ndarray = vectors[:, known] / np.sqrt(values[known]) / size[:, None]
-        return root
+        return _covariance_root(self.information, RANK)
 
     @property
     def estimate(self) -> Float[np.ndarray, "strength"]:
@@ -169,11 +165,7 @@ class LinearFit:
     def _root(self) -> Float[np.ndarray, "shared known"]:
         """Root of the covariance of the shared unknowns, in the directions of which something is known."""
         curvature = self.prior + sum(video.reduced_shared.T @ video.reduced_shared for video in self.videos)
-        size = np.sqrt(np.maximum(np.diag(curvature), 1e-300))
-        values, vectors = np.linalg.eigh(curvature / np.outer(size, size))
-        known = values > RIDGE
-        root: np.ndarray = vectors[:, known] / np.sqrt(values[known]) / size[:, None]
-        return root
+        return _covariance_root(curvature, RIDGE)
 
     def _step(self, gradient: Float[np.ndarray, "shared column"]) -> Float[np.ndarray, "shared column"]:
         """Step of the shared unknowns."""
@@ -232,3 +224,14 @@ class LinearFit:
         blocks = reduced.reshape(-1, places, strengths)
         information = np.einsum("rps,rpt->pst", blocks, blocks) - np.einsum("kps,kpt->pst", cross, solved)
         return [Score(g, (i + i.T) / 2) for g, i in zip(gradient, information, strict=True)], blocks
+
+
+def _covariance_root(
+    information: Float[np.ndarray, "number number"], least: float
+) -> Float[np.ndarray, "number known"]:
+    """Root of a covariance, in the directions in which the information exceeds a share of each number's own."""
+    size = np.sqrt(np.maximum(np.diag(information), 1e-300))
+    values, vectors = np.linalg.eigh(information / np.outer(size, size))
+    known = values > least
+    root: np.ndarray = vectors[:, known] / np.sqrt(values[known]) / size[:, None]
+    return root

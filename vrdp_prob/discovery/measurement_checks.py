@@ -8,7 +8,7 @@ from scipy.stats import chi2, poisson
 
 from vrdp_prob.discovery.finding import Check
 from vrdp_prob.discovery.fitted_motion import FittedMotion
-from vrdp_prob.discovery.free_flight import FreeFlight
+from vrdp_prob.discovery.free_flight import NORMAL_95, FreeFlight
 from vrdp_prob.discovery.free_flight_checks import SEEN
 from vrdp_prob.discovery.replications import sum_p_value, two_sided_p_value
 from vrdp_prob.discovery.residual_model import ResidualModel, VideoResiduals
@@ -138,8 +138,8 @@ def _lens_check(flight: FreeFlight) -> Iterator[Check]:
         f"Positions are displaced {opposite(strength, 'towards', 'away from')} the middle of the picture with the cube "
         f"of the distance: by {number(edge)} m at {number(far)} m from it."
         if lens.p_value < SEEN
-        else f"Nothing seen; {number(1.96 * float(lens.of([0], [1, 2]).sd[0]) * far**3)} m at {number(far)} m from the "
-        "middle would have shown."
+        else f"Nothing seen; {number(NORMAL_95 * float(lens.of([0], [1, 2]).sd[0]) * far**3)} m at {number(far)} m "
+        "from the middle would have shown."
     )
     yield Check("distortion of positions", edge, lens.p_value, False, sentence)
 

@@ -68,7 +68,7 @@ def probes(
     likelihood = plain_likelihood(part.clues, fit.model.with_effect(effect), fit.structures[index])
     entries = likelihood.coordinates.entries
     start = video.likelihood.coordinates.carried(fit.joint.point(index), likelihood.coordinates)
-    vanishing = vanishing_values(fit, effect)
+    vanishing = fit.vanishing([effect])
     strengths = {
         place: _Difference.of(entry, vanishing[entry.field])
         for place, entry in enumerate(entries)
@@ -81,7 +81,7 @@ def probes(
         base = start.copy()
         for place, entry in enumerate(entries):
             if entry.field in values:
-                base[place] = coordinate(entry.transform, values[entry.field])
+                base[place] = entry.transform.to_coordinate(values[entry.field])
         for place, strength in strengths.items():
             base[place] = strength.coordinates[1]
         for place, strength in strengths.items():
@@ -96,20 +96,6 @@ def probes(
         directions = _derivative(residuals[:, number], strength.distance)
         found.append(Probe(shared_key(entry, likelihood.tracks), entry.owner, entry.field, directions))
     return found
-
-
-def vanishing_values(fit: SharedFit, effect: Effect) -> dict[str, float]:
-    """Values of parameters at which nothing is left of an effect, given what a fit without it has found."""
-    found = dict(effect.vanishes_at)
-    for name, other in effect.vanishes_like.items():
-        if (value := fit.value(other)) is not None:
-            found[name] = value
-    return found
-
-
-def coordinate(transform: Transform, value: float) -> float:
-    """Coordinate in which a value is inferred."""
-    return math.log(value) if transform is Transform.LOG else value
 
 
 def _derivative(residuals: Float[np.ndarray, "point 3 data"], distance: float) -> Float[np.ndarray, "point data"]:
@@ -135,6 +121,6 @@ class _Difference:
         if entry.transform is Transform.LOG and vanishing == 0.0:
             faint = FAINT * math.exp(entry.prior.mean)
             return cls((math.log(faint), math.log(2 * faint), math.log(3 * faint)), faint)
-        middle, step = coordinate(entry.transform, vanishing), STEP * entry.prior.sd
+        middle, step = entry.transform.to_coordinate(vanishing), STEP * entry.prior.sd
         per_value = vanishing if entry.transform is Transform.LOG else 1.0
         return cls((middle - step, middle, middle + step), step * per_value)

@@ -12,7 +12,7 @@ import numpy as np
 from jaxtyping import Float
 from scipy.stats import chi2
 
-from vrdp_prob.discovery.linear import Score
+from vrdp_prob.discovery.linear import RANK, Score
 from vrdp_prob.discovery.probes import Probe, probes
 from vrdp_prob.discovery.residual_model import ResidualModel
 from vrdp_prob.inference.parallel import in_parallel
@@ -24,8 +24,6 @@ from vrdp_prob.models.parameters import Scope, Transform
 REPLICATIONS = 400
 TAIL = 0.05
 """Tail probability at which the number of independent places of a scan is read off its null distribution."""
-RANK = 1e-8
-"""Relative information below which a strength cannot be seen at all."""
 SITE_LEVEL = 1e-3
 """An effect that happens once in a video is there if chance makes a statistic as large, anywhere, less often."""
 LEAST_START = 0.01
@@ -137,7 +135,7 @@ def _scan_shared(
     scores = [_one_sided(model.linear.score([one[:, p] for one in directions]), effect) for p in range(len(points))]
     statistics = np.array([score.chi_square for score in scores])
     best = int(np.argmax(statistics))
-    degrees = _rank(scores[best])
+    degrees = scores[best].degrees
     if not degrees:
         return None
     blocks = [
@@ -173,11 +171,6 @@ def _starting(effect: Effect, estimate: Mapping[str, float]) -> dict[str, float]
     return {name: max(value, least.get(name, value)) for name, value in estimate.items()}
 
 
-def _rank(score: Score) -> int:
-    size = np.sqrt(np.maximum(np.diag(score.information), 1e-300))
-    return int(np.linalg.matrix_rank(score.information / np.outer(size, size), tol=RANK, hermitian=True))
-
-
 def _independent(
     blocks: Sequence[Float[np.ndarray, "_ point strength"]], degrees: int, generator: np.random.Generator
 ) -> float:
@@ -210,7 +203,7 @@ def _scan_once(
             mine = [probe for probe in video if probe.owner == owner]
             scores, block = model.linear.scores_in(index, np.stack([probe.directions.T for probe in mine], axis=2))
             best = max(range(len(scores)), key=lambda place: scores[place].chi_square)
-            degrees = _rank(scores[best])
+            degrees = scores[best].degrees
             if not degrees:
                 continue
             statistic = scores[best].chi_square

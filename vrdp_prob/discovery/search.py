@@ -1,28 +1,40 @@
 """Forward selection of causes by how well whole videos are predicted that the model was not fitted to."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
 import numpy as np
+from jaxtyping import Float
 
+from vrdp_prob.discovery.overdispersion import overdispersion
 from vrdp_prob.discovery.proposals import hidden_things
 from vrdp_prob.discovery.residual_model import ResidualModel
-from vrdp_prob.discovery.scores import CauseScore, score_causes
-from vrdp_prob.discovery.trials import Trial, gain
+from vrdp_prob.discovery.scores import CauseScore, happens_once, score_causes
+from vrdp_prob.discovery.single_videos import causes_of_lost_videos, lost_videos
+from vrdp_prob.discovery.trials import Trial, gain, weights
 from vrdp_prob.inference.parallel import in_parallel
-from vrdp_prob.inference.several_videos.fitting import SharedFit
+from vrdp_prob.inference.several_videos.fitting import SharedFit, fit_together
 from vrdp_prob.inference.several_videos.population import with_learned_spreads
+from vrdp_prob.inference.several_videos.second_look import doubtful
 from vrdp_prob.models.effects.effect import Effect
 from vrdp_prob.models.effects.external_impulse import ExternalImpulse
 from vrdp_prob.progress import ProgressDisplay, SilentProgress
 
 SHORTLIST_LEVEL = 0.01
 """Causes whose score chance makes as large more often are not refitted."""
+CLOSE = 0.5
+"""Share of the largest statistic below which a cause is refitted only if those above it leave something."""
 HOPEFUL = 0.2
 """Share of the largest statistic below which a cause cannot be the best one, nor a rival of it."""
 MOST_REFITTED, MOST_RIVALS = 5, 2
 MOST_CAUSES = 5
 MOST_SWAPS = 3
+SHORT, MENDINGS = 0.5, 3
+"""Share of what was promised or brought by another that a cause must bring, and number of refits searched anew."""
+PLAIN = 50.0
+"""Gain of a cause, in those that are needed, from which it is not put in doubt again."""
+ESTABLISHED = 0.8
+"""Probability that a cause must have beside the model without it."""
 FALSE_ALARM = 0.05
 """Prior odds that the model lacks something; all causes of the catalogue share them alike."""
 
@@ -37,10 +49,13 @@ class Step:
         Scores of all causes before the step, the least probable by chance first.
     tried
         Refits with one more cause, the best first.
+    overdispersion
+        Of each video, by what the model leaves unexplained before the step.
     """
 
     scores: tuple[CauseScore, ...]
     tried: tuple[Trial, ...]
+    overdispersion: Float[np.ndarray, "video"]
 
 
 @dataclass(frozen=True)
@@ -61,6 +76,8 @@ class Search:
         For each cause of `best`: models in which another cause takes its place, as far as any came close.
     needed
         Gain (nats) in the predictive density that a cause must bring.
+    overdispersion
+        Factor of each video by which gains are divided.
     """
 
     base: Trial
@@ -69,6 +86,7 @@ class Search:
     lesser: tuple[Trial, ...]
     rivals: tuple[tuple[Trial, ...], ...]
     needed: float
+    overdispersion: Float[np.ndarray, "video"]
 
 
 def search(
@@ -91,7 +109,8 @@ def search(
     fit = fit.under(with_learned_spreads(fit), model_error=False)
     with (progress or SilentProgress()).stage("Trying causes", total=None) as advance:
         searcher = _Searcher(tuple(catalogue), seed, needed, advance)
-        chain, steps = [Trial((), fit)], [searcher.first(Trial((), fit))]
+        chain = [Trial((), fit)]
+        steps = [searcher.first(chain[0])]
         while len(chain) <= MOST_CAUSES:
             step = steps[-1] = searcher.tried(chain[-1], steps[-1])
             if not step.tried or gain(step.tried[0], chain[-1])[0] < needed:
@@ -100,12 +119,17 @@ def search(
             without = winner.without(winner.causes[-1])
             if gain(without, chain[-1])[0] > needed:
                 # The refit has found a better course of events, which is no merit of the cause.
-                chain[-1], steps[-1] = without, searcher.first(without)
-                continue
+                chain[-1] = without
+                if gain(winner, without)[0] < needed:
+                    steps[-1] = searcher.first(without)
+                    continue
+            after = searcher.first(winner)
+            if searcher.doubted(winner, chain[-1], after.overdispersion):
+                break
             chain.append(winner)
-            steps.append(searcher.first(winner))
+            steps.append(after)
         best, lesser, rivals = searcher.compared(chain, steps)
-    return Search(chain[0], best, tuple(steps), lesser, rivals, needed)
+    return Search(chain[0], best, tuple(steps), lesser, rivals, needed, steps[-1].overdispersion)
 
 
 @dataclass(frozen=True)
@@ -116,28 +140,66 @@ class _Searcher:
     seed: int
     needed: float
     advance: Callable[[int], None]
+    _known: dict[Trial, Step] = field(default_factory=dict)
 
     def first(self, trial: Trial) -> Step:
-        """A step in which nothing was tried yet."""
-        left = [effect for effect in self.catalogue if effect.name not in trial.names]
-        return Step(tuple(score_causes(trial.fit, ResidualModel.of(trial.fit), left, seed=self.seed)), ())
+        """A step in which nothing was tried yet; a trial that is asked for again is not scored again."""
+        if trial not in self._known:
+            left = [effect for effect in self.catalogue if effect.name not in trial.names]
+            residuals = ResidualModel.of(trial.fit)
+            scores = score_causes(trial.fit, residuals, left, seed=self.seed)
+            self._known[trial] = Step(tuple(scores), (), overdispersion(residuals, seed=self.seed))
+        return self._known[trial]
 
     def tried(self, trial: Trial, step: Step) -> Step:
         """The step with the causes tried that may be the best one.
 
-        Hidden things are tried only where nothing else explains that bodies change their velocity all at once.
+        Hidden things are tried only where nothing explains the videos better than that bodies change their velocity all
+        at once.
         """
-        found = self._refitted(trial, _shortlist(step.scores))
+        likely = _shortlist(step.scores)
+        close = [one for one in likely if one.size > CLOSE * likely[0].size]
+        found = self._refitted(trial, close)
+        if not self._settled(trial, found):
+            found += self._refitted(trial, [one for one in likely if one not in close])
+            found.sort(key=_merit, reverse=True)
         kicks = next((one for one in step.scores if isinstance(one.effect, ExternalImpulse) and one.sites), None)
-        if kicks is not None and not self._smooth(trial, found):
+        if kicks is not None and (not found or found[0].causes[-1] is kicks.effect):
             found += self._hidden(trial, found, kicks)
-        return Step(step.scores, tuple(sorted(found, key=_merit, reverse=True)))
+        found.sort(key=_merit, reverse=True)
+        if not self._settled(trial, found):
+            found += self._lost(trial, found)
+        return replace(step, tried=tuple(sorted(found, key=_merit, reverse=True)))
 
-    def _smooth(self, trial: Trial, found: Sequence[Trial]) -> bool:
-        """Whether a cause was found that leaves no sudden change of a velocity, and is not itself one."""
+    def _settled(self, trial: Trial, found: Sequence[Trial]) -> bool:
+        """Whether the best cause leaves nothing to explain, and is not a kick in each of several videos."""
         if not found or gain(found[0], trial)[0] < self.needed:
+            return not found
+        cause = found[0].causes[-1]
+        if happens_once(cause) and found[0].acting(cause) > 1:
             return False
-        return not isinstance(found[0].causes[-1], ExternalImpulse) and not _kicked(self.first(found[0]).scores)
+        left = self.first(found[0]).scores
+        return min((one.p_value for one in left), default=1.0) * len(left) > SHORTLIST_LEVEL
+
+    def _lost(self, trial: Trial, found: Sequence[Trial]) -> list[Trial]:
+        """Fits from the beginning, with causes that explain videos whose course of events nothing else explains."""
+        if trial.choices:
+            return []
+        left = [effect for effect in self.catalogue if effect.name not in trial.names]
+        reached = {one.causes[-1].name: gain(one, trial)[0] for one in reversed(found)}
+        best = found[0].fit if found else trial.fit
+        lost = [one for one in lost_videos(trial.fit) if one in lost_videos(best)]
+        told = causes_of_lost_videos(trial.fit, lost, left, self.needed, seed=self.seed)
+        again = [effect for effect, promised in told if reached.get(effect.name, 0.0) < promised]
+
+        def searched(effect: Effect) -> Trial:
+            model = trial.fit.model.with_effect(effect)
+            tracks = [part.clues.tracks for part in trial.fit.fits]
+            fit = fit_together(tracks, model=model, shared=trial.fit.shared, seed=self.seed, model_error=False)
+            self.advance(1)
+            return Trial((*trial.causes, effect), fit, trial.choices)
+
+        return [searched(effect) for effect in again]
 
     def _hidden(self, trial: Trial, found: Sequence[Trial], kicks: CauseScore) -> list[Trial]:
         """Fits with something unseen in the place of kicks."""
@@ -153,6 +215,13 @@ class _Searcher:
 
         return self._all(refit, starts)
 
+    def doubted(self, trial: Trial, lesser: Trial, divisor: Float[np.ndarray, "video"]) -> bool:
+        """Whether a cause brings too little, or brings it in too few of the videos that could have been drawn."""
+        if gain(trial, lesser, divisor)[0] < self.needed:
+            return True
+        shares = weights([trial, lesser], [0.0, self.needed], np.random.default_rng(self.seed), overdispersion=divisor)
+        return bool(shares[0] < ESTABLISHED)
+
     def compared(
         self, chain: Sequence[Trial], steps: Sequence[Step]
     ) -> tuple[Trial, tuple[Trial, ...], tuple[tuple[Trial, ...], ...]]:
@@ -161,29 +230,79 @@ class _Searcher:
         A cause that was found first may fit worse than another once a further one has joined; then they are swapped.
         """
         best = chain[-1]
+        lesser = (*self._lesser(best, best.causes[:-1]), *chain[-2:-1])
+        divisor = steps[-1].overdispersion
+
+        def merit(trial: Trial) -> float:
+            return float((trial.log_density / divisor).sum()) + trial.log_prior
+
         for _ in range(MOST_SWAPS):
-            last = chain[-2:-1] if best is chain[-1] else [best.without(cause) for cause in best.causes[-1:]]
-            lesser = (*(best.without(cause) for cause in best.causes[:-1]), *last)
-            rivals = tuple(self.rivals(best, number, steps[number], one) for number, one in enumerate(lesser))
-            better = max((one for some in rivals for one in some), key=_merit, default=best)
-            if _merit(better) <= _merit(best):
+            while lesser and self.doubted(best, weakest := max(lesser, key=merit), divisor):
+                best, lesser = weakest, self._lesser(weakest, weakest.causes)
+            rivals = self._rivals(best, lesser, steps)
+            better = max((one for some in rivals for one in some), key=merit, default=best)
+            if merit(better) <= merit(best):
                 break
             best = better
+            lesser = self._lesser(best, best.causes)
+            rivals = self._rivals(best, lesser, steps)
         return best, lesser, rivals
 
-    def rivals(self, best: Trial, number: int, step: Step, lesser: Trial) -> tuple[Trial, ...]:
-        """Models in which another cause takes the place of one, as far as it came close when that one was found."""
-        others = [one for one in step.tried if one.causes[-1].name not in best.names]
-        if len(best.causes) == 1:
-            return tuple(others)
-        most = max(float(one.log_density.sum()) for one in step.tried)
-        least = HOPEFUL * (most - float(lesser.log_density.sum()))
-        close = {one.causes[-1].name for one in others if gain(one, lesser)[0] > least}
-        return tuple(self._refitted(lesser, [one for one in step.scores if one.effect.name in close][:MOST_RIVALS]))
+    def _lesser(self, best: Trial, causes: Sequence[Effect]) -> tuple[Trial, ...]:
+        """A model without each of some causes."""
+        return tuple(self._left_out(best, cause) for cause in causes)
+
+    def _left_out(self, best: Trial, cause: Effect) -> Trial:
+        """A model without one of its causes, searched the longer the less the cause seems to bring."""
+        found = best.without(cause)
+        if gain(best, found)[0] < PLAIN * self.needed:
+            found = found.mended(doubtful(found.fit.fits), seed=self.seed)
+        return found.continued() if gain(best, found)[0] < PLAIN * self.needed else found
+
+    def _rivals(self, best: Trial, lesser: Sequence[Trial], steps: Sequence[Step]) -> tuple[tuple[Trial, ...], ...]:
+        """For each cause of a model: models in which another one takes its place.
+
+        A rival was tried when that cause was, and came close to it.
+        """
+        found = []
+        for cause, without in zip(best.causes, lesser, strict=True):
+            step = next(one for one in steps if any(trial.causes[-1].name == cause.name for trial in one.tried))
+            others = [one for one in step.tried if one.causes[-1].name not in best.names]
+            if len(best.causes) > 1 or step is not steps[0]:
+                most = max(float(one.log_density.sum()) for one in step.tried)
+                least = HOPEFUL * (most - float(without.log_density.sum()))
+                close = {one.causes[-1].name for one in others if gain(one, without)[0] > least}
+                again = [one for one in step.scores if one.effect.name in close][:MOST_RIVALS]
+                others = self._refitted(without, again)
+            found.append(tuple(others))
+        return tuple(found)
 
     def _refitted(self, trial: Trial, scores: Sequence[CauseScore]) -> list[Trial]:
-        """Fits with one cause more, the best first."""
-        return self._all(trial.with_cause, scores)
+        """Fits with one cause more, the best first.
+
+        Where the score of a cause promises more than any refit has brought, and its own brought far less, videos have
+        lost their course of events on the way to it, and are searched anew.
+        """
+        found = self._all(trial.with_cause, scores)
+        promised = {one.effect.name: one.size / 2 for one in scores if not happens_once(one.effect)}
+        for _ in range(MENDINGS):
+            most = max((gain(one, trial)[0] for one in found), default=0.0)
+            short = [
+                one
+                for one in found
+                if promised.get(one.causes[-1].name, 0.0) > max(most, gain(one, trial)[0] / SHORT, 0.0)
+                and one.fallen_from(trial)
+            ]
+            if not short:
+                break
+            hopeful = max(short, key=lambda one: promised[one.causes[-1].name])
+            mended = hopeful.mended(hopeful.fallen_from(trial), seed=self.seed)
+            if mended is hopeful:
+                promised.pop(hopeful.causes[-1].name)
+            found = [mended if one is hopeful else one for one in found]
+        most = max((gain(one, trial)[0] for one in found), default=0.0)
+        found = [one.continued() if gain(one, trial)[0] > SHORT * most > 0 else one for one in found]
+        return sorted(found, key=_merit, reverse=True)
 
     def _all(self, refit: Callable[[CauseScore], Trial | None], scores: Sequence[CauseScore]) -> list[Trial]:
         def done(score: CauseScore) -> Trial | None:
@@ -191,8 +310,7 @@ class _Searcher:
             self.advance(1)
             return found
 
-        found = [one for one in in_parallel(done, scores) if one is not None]
-        return sorted(found, key=_merit, reverse=True)
+        return [one for one in in_parallel(done, scores) if one is not None]
 
 
 def _merit(trial: Trial) -> float:
@@ -205,8 +323,3 @@ def _shortlist(scores: Sequence[CauseScore]) -> list[CauseScore]:
     largest = max((one.size for one in scores), default=0.0)
     hopeful = [one for one in scores if one.p_value < SHORTLIST_LEVEL and one.size > HOPEFUL * largest]
     return sorted(hopeful, key=lambda one: -one.size)[:MOST_REFITTED]
-
-
-def _kicked(scores: Sequence[CauseScore]) -> bool:
-    """Whether some body changes its velocity all at once, by what its residuals say."""
-    return any(isinstance(one.effect, ExternalImpulse) and one.sites for one in scores)

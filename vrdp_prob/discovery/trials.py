@@ -1,19 +1,21 @@
 """A model that is tried on all videos: its fit, and how well it predicts each video from the others."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
 from jaxtyping import Float
 
+from vrdp_prob.discovery.finding import HeldOut
+from vrdp_prob.discovery.forecast import held_out
 from vrdp_prob.discovery.held_out import Cavity, cavities
 from vrdp_prob.discovery.scores import CauseScore, happens_once
 from vrdp_prob.inference.several_videos.ascent import ImpossibleStartError
 from vrdp_prob.inference.several_videos.fitting import Owned, SharedFit
+from vrdp_prob.inference.several_videos.second_look import MOST
 from vrdp_prob.models.effects.effect import Effect
 from vrdp_prob.models.parameters import Scope
-from vrdp_prob.models.physics import PhysicsModel
 
 EACH_PARAMETER = 1.0
 """Nats by which a cause is believed less for each of its parameters.
@@ -22,7 +24,13 @@ A cause that holds another one as its limit (a bowl whose middle is far away is 
 """
 
 
-@dataclass(frozen=True)
+FIRST_ROUNDS = 5
+"""Common steps with which it is seen whether a cause can win."""
+FELL = 5.0
+"""Nats by which a video may be less probable with one more cause; beyond that it has lost its course of events."""
+
+
+@dataclass(frozen=True, eq=False)
 class Trial:
     """A base model with some causes, fitted to all videos.
 
@@ -44,6 +52,13 @@ class Trial:
     def cavities(self) -> dict[str, Cavity]:
         """What all videos but one say, and how probable that one is then."""
         return cavities(self.fit)
+
+    @cached_property
+    def held_out(self) -> HeldOut:
+        """How far off its predictions are, each video's from the others and its own first part."""
+        joint = self.fit.joint
+        points = [joint.point(index) for index in range(len(joint.videos))]
+        return held_out(joint.videos, points, list(self.cavities.values()))
 
     @property
     def log_density(self) -> Float[np.ndarray, "video"]:
@@ -71,16 +86,21 @@ class Trial:
         except ImpossibleStartError:
             return None
 
+    def fallen_from(self, base: "Trial") -> list[int]:
+        """Videos that are less probable than under a model with less, the worst first: they have lost their course."""
+        gained = gains(self, base)
+        return [int(k) for k in np.argsort(gained) if gained[k] < -FELL][: max(len(gained) // MOST, 1)]
+
     def with_cause_in_place(self, score: CauseScore, least: float) -> "Trial | None":
         """The fit with a cause in the place of the last one, from where that has brought the videos.
 
         None where no world can begin there, or the log posterior does not come near to `least` at once.
         """
         last = self.causes[-1]
-        left = self._model_without(last).with_effect(score.effect)
+        left = self.fit.model.without_effect(last).with_effect(score.effect)
         choices = {name: one for name, one in self.choices.items() if name != last.name}
         try:
-            fit = self.fit.under(left, start=score.start, least=least, model_error=False)
+            fit = self.fit.under(left, start=score.start, least=least, rounds=FIRST_ROUNDS, model_error=False)
         except ImpossibleStartError:
             return None
         return Trial((*self.causes[:-1], score.effect), fit, choices)
@@ -95,7 +115,7 @@ class Trial:
                 {(name, body): score.start[name] for name in own_fields if name in score.start for body in these}
                 for these in bodies
             ]
-            fit = self.fit.under(model, start=score.start, own=starts, model_error=False)
+            fit = self.fit.under(model, start=score.start, own=starts, rounds=FIRST_ROUNDS, model_error=False)
             return Trial((*self.causes, effect), fit, self.choices)
         sites = [[site for site in score.sites if site.video == k] for k in range(len(self.fit.fits))]
         fields = [parameter.name for parameter in effect.parameters]
@@ -109,38 +129,69 @@ class Trial:
                     for name, value in site.values.items()
                     for owner in (site.owner, None)
                 }
-            every = {(name, owner) for name in fields for owner in owners}
-            held.append(structure.held | frozenset(every - values.keys()))
+            every = {(name, owner): None for name in fields for owner in owners if (name, owner) not in values}
+            steps = {key: values[key] for key in values if key[0] in effect.stepwise}
+            held.append({**structure.held, **every, **steps})
             own.append(values)
         acting = np.array([min(len(mine), 1) for mine in sites])
         choices = {**self.choices, effect.name: np.log(max(score.places, 1)) * acting}
-        fit = self.fit.under(model, own=own, held=held, model_error=False)
+        fit = self.fit.under(model, own=own, held=held, rounds=FIRST_ROUNDS, model_error=False)
         return Trial((*self.causes, effect), fit, choices)
+
+    def continued(self) -> "Trial":
+        """The fit after as many steps as it needs."""
+        if self.fit.joint.converged:
+            return self
+        return replace(self, fit=self.fit.under(self.fit.model, model_error=False))
+
+    def acting(self, cause: Effect) -> int:
+        """Number of videos on which a cause acts that happens once."""
+        return int(np.count_nonzero(self.choices[cause.name]))
+
+    def mended(self, lost: Sequence[int], *, seed: int) -> "Trial":
+        """The fit with some videos searched anew; itself where that finds nothing better."""
+        fit = self.fit.mended(lost, seed=seed)
+        return self if fit is self.fit else replace(self, fit=fit)
 
     def without(self, cause: Effect) -> "Trial":
         """The fit without one of its causes."""
-        left = self._model_without(cause)
+        left = self.fit.model.without_effect(cause)
         choices = {name: one for name, one in self.choices.items() if name != cause.name}
-        fit = self.fit.under(left, model_error=False)
+        gone = {parameter.name for parameter in cause.parameters}
+        held = [{key: one.held[key] for key in one.held if key[0] not in gone} for one in self.fit.structures]
+        fit = self.fit.under(left, held=held, rounds=FIRST_ROUNDS, model_error=False)
         return Trial(tuple(one for one in self.causes if one is not cause), fit, choices)
 
-    def _model_without(self, cause: Effect) -> PhysicsModel:
-        model = self.fit.model
-        effects = tuple(effect for effect in model.effects if effect is not cause)
-        stated = {parameter.name for effect in effects for parameter in effect.parameters}
-        beliefs = {name: belief for name, belief in model.beliefs.items() if name in stated}
-        names = [part for part in model.name.split("+") if part != cause.name]
-        return PhysicsModel("+".join(names), effects, beliefs)
 
-
-def gain(trial: Trial, base: Trial) -> tuple[float, float]:
-    """Gain (nats) in the predictive density of all videos, and its standard error over videos."""
+def gains(
+    trial: Trial, base: Trial, overdispersion: Float[np.ndarray, "video"] | None = None
+) -> Float[np.ndarray, "video"]:
+    """Gain (nats) in the predictive density of each video, divided by its overdispersion."""
     difference = trial.log_density - base.log_density
+    return difference if overdispersion is None else difference / overdispersion
+
+
+def gain(trial: Trial, base: Trial, overdispersion: Float[np.ndarray, "video"] | None = None) -> tuple[float, float]:
+    """Gain (nats) in the predictive density of all videos, and its standard error over videos.
+
+    Parameters
+    ----------
+    trial, base
+        The models.
+    overdispersion
+        Of each video; 1 where None.
+    """
+    difference = gains(trial, base, overdispersion)
     return float(difference.sum()), float(np.sqrt(len(difference)) * difference.std(ddof=1))
 
 
 def weights(
-    trials: Sequence[Trial], log_prior: Sequence[float], generator: np.random.Generator, *, replications: int = 1000
+    trials: Sequence[Trial],
+    log_prior: Sequence[float],
+    generator: np.random.Generator,
+    *,
+    overdispersion: Float[np.ndarray, "video"] | None = None,
+    replications: int = 1000,
 ) -> Float[np.ndarray, "trial"]:
     """Probabilities of models by their predictive densities, with the videos drawn anew.
 
@@ -148,6 +199,8 @@ def weights(
     Analysis 13 (2018), pseudo-BMA+.
     """
     densities = np.array([trial.log_density for trial in trials])
+    if overdispersion is not None:
+        densities = densities / overdispersion
     shares = generator.dirichlet(np.ones(densities.shape[1]), size=replications) * densities.shape[1]
     totals = shares @ densities.T + np.asarray(log_prior)
     totals -= totals.max(axis=1, keepdims=True)

@@ -59,6 +59,10 @@ class Transform(StrEnum):
         """Parameter that belongs to a coordinate."""
         return coordinate.clamp(-LARGEST_LOG, LARGEST_LOG).exp() if self is Transform.LOG else coordinate
 
+    def to_coordinate(self, value: float) -> float:
+        """Coordinate that stands for a value of the parameter."""
+        return math.log(value) if self is Transform.LOG else value
+
     @property
     def support(self) -> tuple[float, float]:
         """Open interval of values the parameter can take."""

@@ -82,6 +82,14 @@ class PhysicsModel:
         """The model with one more cause."""
         return PhysicsModel(f"{self.name}+{effect.name}", (*self.effects, effect), self.beliefs)
 
+    def without_effect(self, effect: Effect) -> "PhysicsModel":
+        """The model without one of its causes, and without what was believed of it alone."""
+        effects = tuple(one for one in self.effects if one is not effect)
+        stated = {parameter.name for one in effects for parameter in one.parameters}
+        beliefs = {name: belief for name, belief in self.beliefs.items() if name in stated}
+        name = "+".join(part for part in self.name.split("+") if part != effect.name)
+        return PhysicsModel(name, effects, beliefs)
+
     @classmethod
     def read(cls, path: Path | str) -> "PhysicsModel":
         """Read a model file that `write` wrote, or that a person did.

@@ -1,8 +1,8 @@
 """Which numbers of a video are unknown, and what is believed of them before its motion is looked at."""
 
 import math
-from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from jaxtyping import Float
@@ -55,13 +55,14 @@ class Structure:
     bouncing
         Bodies that meet walls, which say nothing about a mass, but about the rest.
     held
-        Quantities (with their owner, None for the video's) that keep their default though the model has them.
+        Quantities (with their owner, None for the video's) that are not unknown though the model has them, and the
+        value that each keeps; None for its default.
     """
 
     moving: frozenset[int]
     colliding: frozenset[int]
     bouncing: frozenset[int] = frozenset()
-    held: frozenset[tuple[str, int | None]] = frozenset()
+    held: Mapping[tuple[str, int | None], float | None] = field(default_factory=dict)
 
     @property
     def meeting(self) -> frozenset[int]:
@@ -91,6 +92,9 @@ def unknowns(
     if model_error is not None:
         defaults[NOISE] = np.full(1, model_error.noise_scale)
         defaults[ANGLE_NOISE] = np.full(1, model_error.angle_noise_scale)
+    for (name, owner), value in structure.held.items():
+        if value is not None and name in defaults:
+            defaults[name][owner or 0] = value
     return Coordinates(tuple(one for one in entries if (one.field, one.owner) not in structure.held), defaults)
 
 

@@ -15,7 +15,7 @@ from vrdp_prob.inference.several_videos.fitting import fit_together
 from vrdp_prob.inference.several_videos.following import follow
 from vrdp_prob.inference.several_videos.linking import LinkedVideo
 from vrdp_prob.inference.several_videos.parts import stream
-from vrdp_prob.inference.several_videos.second_look import look_again
+from vrdp_prob.inference.several_videos.second_look import doubtful, look_again
 from vrdp_prob.models.coordinates import Coordinate, Coordinates
 from vrdp_prob.models.likelihood import Likelihood
 from vrdp_prob.models.parameters import Prior, Transform
@@ -69,9 +69,11 @@ def test_they_stop_before_an_edge_behind_which_all_is_worse() -> None:
 def test_a_video_that_is_worse_than_the_others_is_fitted_anew() -> None:
     videos = [colliding(0), colliding(1), sliding(2)]
     fits = [fit_map(one, default_model(), stream(0, one.video), model_error=False) for one in videos]
-    assert look_again(fits, default_model(), None, 0) == fits
+    assert not doubtful(fits)
+    assert look_again(fits, [], default_model(), None, seed=0) == fits
     spoilt = replace(fits[1], misfit=replace(fits[1].misfit, residual_sd=3 * fits[1].misfit.residual_sd))
-    found = look_again([fits[0], spoilt, fits[2]], default_model(), None, 0)
+    assert doubtful([fits[0], spoilt, fits[2]]) == [1]
+    found = look_again([fits[0], spoilt, fits[2]], [1], default_model(), None, seed=0)
     assert (found[0], found[2]) == (fits[0], fits[2])
     assert found[1].misfit.residual_sd == pytest.approx(fits[1].misfit.residual_sd, rel=0.02)
     assert found[1].likelihood.model == default_model()

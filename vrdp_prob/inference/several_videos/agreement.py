@@ -32,6 +32,26 @@ def first_guess(
         Whose fits are asked.
     """
     agreed = consensus(numbers, videos, [points[0] for points in starts], trusted).mean
+    return agreed, following_ones(numbers, videos, starts, agreed)
+
+
+def following_ones(
+    numbers: SharedNumbers,
+    videos: Sequence[LinkedVideo],
+    starts: Sequence[Float[np.ndarray, "_ _"]],
+    agreed: Float[np.ndarray, "shared"],
+) -> list[Float[np.ndarray, "_"]]:
+    """Each video's own numbers at some shared ones.
+
+    Parameters
+    ----------
+    numbers, videos
+        What is fitted.
+    starts
+        Vectors of each video, whose own numbers follow the shared ones from there; the best outcome is taken.
+    agreed
+        The shared numbers.
+    """
 
     def followed(index: int) -> Float[np.ndarray, "_"]:
         video, found = videos[index], []
@@ -42,7 +62,7 @@ def first_guess(
         values = video.log_density(np.tile(agreed, (len(found), 1)), np.array(found))
         return found[int(np.argmax(values))]
 
-    return agreed, in_parallel(followed, range(len(videos)))
+    return in_parallel(followed, range(len(videos)))
 
 
 def consensus(

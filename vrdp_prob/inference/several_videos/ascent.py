@@ -69,6 +69,7 @@ def climb(
     *,
     towards: Float[np.ndarray, "shared"] | None = None,
     least: float | None = None,
+    rounds: int = ROUNDS,
 ) -> JointFit:
     """Climb the joint log posterior.
 
@@ -82,6 +83,8 @@ def climb(
         Shared numbers to which the first step goes, as far as it goes up.
     least
         Log posterior that the videos must reach by their own numbers alone, for the climb to be worth its while.
+    rounds
+        Common steps, at most.
 
     Raises
     ------
@@ -97,7 +100,7 @@ def climb(
     if towards is not None and not np.array_equal(towards, shared):
         state = _improved(numbers, videos, state, slopes, towards - shared)
         slopes = _expanded(numbers, videos, state)
-    for _ in range(ROUNDS):
+    for _ in range(rounds):
         smooth = _of(slopes, _inside(slopes))
         expected = smooth.expected_gain
         converged = expected < TOLERANCE

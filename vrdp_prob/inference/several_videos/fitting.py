@@ -14,18 +14,22 @@ from vrdp_prob.inference.mode import Mode
 from vrdp_prob.inference.model_error_fit import TURNS, next_model_error
 from vrdp_prob.inference.parallel import in_parallel
 from vrdp_prob.inference.plan import FitPlan
-from vrdp_prob.inference.several_videos.agreement import first_guess
-from vrdp_prob.inference.several_videos.ascent import climb
+from vrdp_prob.inference.several_videos.agreement import first_guess, following_ones
+from vrdp_prob.inference.several_videos.ascent import ROUNDS, climb
 from vrdp_prob.inference.several_videos.joint_fit import JointFit, with_alternatives
 from vrdp_prob.inference.several_videos.linking import LinkedVideo, SharedNumbers, check_names, link
 from vrdp_prob.inference.several_videos.parts import carried_starts, plain_likelihood, stream, structure_of
-from vrdp_prob.inference.several_videos.second_look import WORSE, look_again, trusted
-from vrdp_prob.inference.several_videos.transfer import coordinate, first_numbers
+from vrdp_prob.inference.several_videos.second_look import WORSE, doubtful, look_again, trusted
+from vrdp_prob.inference.several_videos.transfer import first_numbers
+from vrdp_prob.models.effects.effect import Effect
 from vrdp_prob.models.likelihood import Likelihood
 from vrdp_prob.models.physics import PhysicsModel
 from vrdp_prob.models.unknowns import Structure, unknowns
 from vrdp_prob.progress import ProgressDisplay, SilentProgress
 from vrdp_prob.scene import Tracks
+
+MENDING_LOOKS = 2
+"""Fits that are made anew of a video that may have lost its course of events in a joint fit."""
 
 Owned = tuple[str, int | None]
 """A number of a video: its name and its owner, None for the video's."""
@@ -79,8 +83,9 @@ class SharedFit:
         *,
         start: Mapping[str, float] | None = None,
         own: Sequence[Mapping[Owned, float]] | None = None,
-        held: Sequence[frozenset[Owned]] | None = None,
+        held: Sequence[Mapping[Owned, float | None]] | None = None,
         least: float | None = None,
+        rounds: int = ROUNDS,
         model_error: bool = True,
     ) -> "SharedFit":
         """The fit of another model, from the values of this one; much faster than a new one.
@@ -95,9 +100,12 @@ class SharedFit:
         own
             Where further numbers of each video begin, by name and owner and in their units.
         held
-            Numbers of each video that keep their default though the model has them; those that do now where None.
+            Numbers of each video that are not unknown though the model has them, and the value that each keeps (None
+            for its default); those that do now where None.
         least
             Log posterior that must be reached at the start, where the videos' own numbers alone have followed.
+        rounds
+            Common steps of all videos, at most.
         model_error
             Whether what the model leaves unexplained is looked for.
 
@@ -114,7 +122,7 @@ class SharedFit:
             plain_likelihood(fit.clues, model, structure) for fit, structure in zip(self.fits, structures, strict=True)
         ]
         numbers, videos = link(likelihoods, self.shared)
-        shared, towards = first_numbers(joint, numbers, self._vanishing(model), start or {})
+        shared, towards = first_numbers(joint, numbers, self.vanishing(model.effects), start or {})
         locals_ = [
             video.split(old.likelihood.coordinates.carried(joint.point(index), video.likelihood.coordinates))[1]
             for index, (old, video) in enumerate(zip(joint.videos, videos, strict=True))
@@ -124,15 +132,59 @@ class SharedFit:
             for number, place in enumerate(video.local_places):
                 entry = entries[place]
                 if (entry.field, entry.owner) in values:
-                    mine[number] = coordinate(entry.transform, values[entry.field, entry.owner])
-        found = climb(numbers, videos, shared, locals_, towards=towards, least=least)
+                    mine[number] = entry.transform.to_coordinate(values[entry.field, entry.owner])
+        found = climb(numbers, videos, shared, locals_, towards=towards, least=least, rounds=rounds)
         return _finished(found, model, self.fits, structures, self.shared, model_error=model_error)
 
-    def _vanishing(self, model: PhysicsModel) -> dict[str, float]:
-        """Values at which the model's effects vanish, given what is known now."""
-        likes = [pair for effect in model.effects for pair in effect.vanishes_like.items()]
+    def mended(self, lost: Sequence[int], *, seed: int) -> "SharedFit":
+        """The fit with a new search for what happened in some videos, given what the others say; the better of both.
+
+        Videos in which single numbers are held keep what they have.
+
+        Parameters
+        ----------
+        lost
+            Videos that may have lost their course of events.
+        seed
+            Seed of the searches.
+        """
+        joint = self.joint
+        lost = [index for index in lost if not self.structures[index].held]
+        others = [index for index in range(len(self.fits)) if index not in lost]
+        if not lost or not others:
+            return self
+        agreed = climb(
+            joint.numbers,
+            [joint.videos[index] for index in others],
+            joint.gaussian.mean,
+            [joint.gaussian.locals[index].centre for index in others],
+        ).gaussian.mean
+        settled = [
+            replace(fit, modes=(replace(fit.modes[0], point=video.points(agreed, local.centre)),))
+            for fit, video, local in zip(self.fits, joint.videos, joint.gaussian.locals, strict=True)
+        ]
+        fits = look_again(settled, lost, self.model, self.shared, seed=seed, looks=MENDING_LOOKS)
+        changed = [index for index in lost if fits[index] is not settled[index]]
+        if not changed:
+            return self
+        structures = list(self.structures)
+        for index in changed:
+            structures[index] = structure_of(fits[index].likelihood.coordinates)
+        likelihoods = [
+            plain_likelihood(fit.clues, self.model, structure) for fit, structure in zip(fits, structures, strict=True)
+        ]
+        numbers, videos = link(likelihoods, self.shared)
+        locals_ = following_ones(numbers, videos, carried_starts(fits, videos), agreed)
+        found = climb(numbers, videos, agreed, locals_)
+        if found.log_density < joint.log_density:
+            return self
+        return _finished(found, self.model, fits, tuple(structures), self.shared, model_error=False)
+
+    def vanishing(self, effects: Sequence[Effect]) -> dict[str, float]:
+        """Values of parameters at which nothing is left of some effects, given what this fit has found."""
+        likes = [pair for effect in effects for pair in effect.vanishes_like.items()]
         alike = {name: value for name, other in likes if (value := self.value(other)) is not None}
-        return {name: value for effect in model.effects for name, value in effect.vanishes_at.items()} | alike
+        return {name: value for effect in effects for name, value in effect.vanishes_at.items()} | alike
 
 
 def fit_together(
@@ -178,11 +230,12 @@ def fit_together(
             advance(1)
             return found
 
-        fits = look_again(in_parallel(fit, videos), model, shared, seed)
+        alone = in_parallel(fit, videos)
+        fits = look_again(alone, doubtful(alone), model, shared, seed=seed)
     numbers, linked, guess = _guessed(fits, model, shared)
     seen = [_with_misfit(fit, video, guess[0], own) for fit, video, own in zip(fits, linked, guess[1], strict=True)]
     lost = [k for k, fit in enumerate(fits) if seen[k].misfit.residual_sd > WORSE * fit.misfit.residual_sd]
-    found_again = look_again(seen, model, shared, seed, among=lost)
+    found_again = look_again(seen, doubtful(seen, lost), model, shared, seed=seed)
     if any(one is not other for one, other in zip(found_again, seen, strict=True)):
         pairs = zip(found_again, seen, fits, strict=True)
         fits = [fit if one is other else one for one, other, fit in pairs]

@@ -39,38 +39,65 @@ def trusted(fits: Sequence[MapFit]) -> Bool[np.ndarray, "video"]:
     return _excess(fits) < FAR_WORSE
 
 
-def look_again(
-    fits: Sequence[MapFit],
-    model: PhysicsModel,
-    shared: Sequence[str] | None,
-    seed: int,
-    among: Collection[int] | None = None,
-) -> list[MapFit]:
-    """The fits of single videos, with those improved that are worse than the others.
+def doubtful(fits: Sequence[MapFit], among: Collection[int] | None = None) -> list[int]:
+    """Videos that are fitted worse than the others, the worst first.
 
     Parameters
     ----------
     fits
         The fits, each by itself.
+    among
+        Videos that may be; all where None.
+    """
+    excess = _excess(fits)
+    order = np.argsort(-excess, kind="stable")[: len(fits) // MOST]
+    possible = range(len(fits)) if among is None else among
+    return [
+        int(index)
+        for index in order
+        if excess[index] > WORSE and index in possible and may_take_another_course(fits[index])
+    ]
+
+
+def may_take_another_course(fit: MapFit) -> bool:
+    """Whether anything can happen in a video: one body without walls has but one course of events."""
+    return len(fit.clues.tracks.bodies) > 1 or bool(fit.clues.tracks.walls)
+
+
+def look_again(
+    fits: Sequence[MapFit],
+    chosen: Sequence[int],
+    model: PhysicsModel,
+    shared: Sequence[str] | None,
+    *,
+    seed: int,
+    looks: int = LOOKS,
+) -> list[MapFit]:
+    """The fits of single videos, with some of them searched anew, and improved where that is better.
+
+    Parameters
+    ----------
+    fits
+        The fits, each by itself.
+    chosen
+        Videos that are looked at again.
     model
         The physics.
     shared
         Names of the quantities that are shared; all that have one value per video where None.
     seed
         Seed of the searches.
-    among
-        Videos that may be looked at again; all where None.
+    looks
+        Fits that are made anew of one video, at most.
     """
-    excess = _excess(fits)
-    order = np.argsort(-excess, kind="stable")[: len(fits) // MOST]
-    doubtful = [int(index) for index in order if excess[index] > WORSE and (among is None or index in among)]
-    if not doubtful:
+    if not chosen:
         return list(fits)
+    excess = _excess(fits)
     told = _told(fits, model, shared)
 
     def looked(index: int) -> MapFit:
         best, goal = fits[index], WORSE * np.median([one.misfit.residual_sd for one in fits])
-        for look in range(LOOKS):
+        for look in range(looks):
             generator = stream(seed, f"{best.clues.tracks.video} {look}")
             found = fit_map(best.clues.tracks, told, generator, plan=FitPlan(attempts=1), model_error=False)
             gained = best.misfit.residual_sd / found.misfit.residual_sd - 1
@@ -81,7 +108,7 @@ def look_again(
                 break
         return best
 
-    improved = dict(zip(doubtful, in_parallel(looked, doubtful), strict=True))
+    improved = dict(zip(chosen, in_parallel(looked, chosen), strict=True))
     return [improved.get(index, fit) for index, fit in enumerate(fits)]
 
 

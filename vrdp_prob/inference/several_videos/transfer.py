@@ -37,18 +37,13 @@ def first_numbers(
             same[place] = towards[place] = known[key]
             continue
         if key[0] in start:
-            same[place] = towards[place] = coordinate(entry.transform, start[key[0]])
+            same[place] = towards[place] = entry.transform.to_coordinate(start[key[0]])
         if key[0] in vanishing:
             same[place] = _nearly_vanished(entry.transform, vanishing[key[0]], towards[place])
             towards[place] = towards[place] if key[0] in start else same[place]
     return same, towards
 
 
-def coordinate(transform: Transform, value: float) -> float:
-    """The number that stands for a value."""
-    return float(np.log(value)) if transform is Transform.LOG else value
-
-
 def _nearly_vanished(transform: Transform, value: float, expected: float) -> float:
     """Coordinate at which a strength vanishes; where that is infinitely far, one far below what is expected."""
-    return expected + LOG_FAINT if transform is Transform.LOG and value == 0.0 else coordinate(transform, value)
+    return expected + LOG_FAINT if transform is Transform.LOG and value == 0.0 else transform.to_coordinate(value)

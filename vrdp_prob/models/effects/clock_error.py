@@ -44,6 +44,7 @@ class ClockError(Effect):
     source: ClassVar = "definition"
     parameters: ClassVar = (LOST_TIME, LOST_AT)
     vanishes_at: ClassVar = {"lost_time": 0.0}
+    stepwise: ClassVar = frozenset({"lost_at"})
 
     def search_points(self, videos: Sequence[Tracks]) -> Sequence[Mapping[str, float]]:
         """Between any two frames."""

@@ -1,0 +1,105 @@
+"""Causes that explain the worst explained videos, each video searched by itself with every cause in turn.
+
+Scores and refits begin at the fit without the cause. Where that has taken the wrong course of events there is nothing
+near it to be found, and a search from the beginning is the only way.
+"""
+
+from collections.abc import Sequence
+
+from vrdp_prob.discovery.scores import happens_once
+from vrdp_prob.inference.map_fit import MapFit, fit_map
+from vrdp_prob.inference.parallel import in_parallel
+from vrdp_prob.inference.plan import FitPlan
+from vrdp_prob.inference.several_videos.fitting import SharedFit
+from vrdp_prob.inference.several_videos.parts import stream
+from vrdp_prob.inference.several_videos.second_look import may_take_another_course
+from vrdp_prob.models.effects.effect import Effect
+from vrdp_prob.models.parameters import Scope
+from vrdp_prob.models.physics import PhysicsModel
+
+LOST = 1.2
+"""Residuals in units of the noise from which a video may have taken the wrong course of events."""
+SECOND_LOOKS = 3
+"""Causes, the best first, with which a second video is searched."""
+NEARLY = 0.6
+"""Share of the largest gain from which another cause is told of, too."""
+MOST = 2
+
+
+EXPLAINED = 1.1
+"""Residuals in units of the noise from which a cause explains a video; no further ones are tried then."""
+CONTACT_HOOKS = ("tangential_impulse", "contact_radius", "slip_friction", "restitution", "pair_force")
+"""What an effect overrides that acts in contacts or on what follows from them."""
+AT_ONCE = 4
+"""Causes that are tried side by side."""
+
+
+def lost_videos(fit: SharedFit) -> list[int]:
+    """Videos that may have taken the wrong course of events, the worst first."""
+    ratios = [_ratio(part) for part in fit.fits]
+    order = sorted(range(len(ratios)), key=lambda index: -ratios[index])
+    return [index for index in order if ratios[index] > LOST and may_take_another_course(fit.fits[index])]
+
+
+def causes_of_lost_videos(
+    fit: SharedFit, lost: Sequence[int], catalogue: Sequence[Effect], needed: float, *, seed: int
+) -> list[tuple[Effect, float]]:
+    """Causes with which lost videos are explained much better, the best first, and what is gained (nats).
+
+    Parameters
+    ----------
+    fit
+        Fit of the model without any of them.
+    lost
+        The videos, the worst first; two are looked at.
+    catalogue
+        The causes. Those that happen once, vanish nowhere or belong to materials are left out: one video says too
+        little of them.
+    needed
+        Gain (nats) from which a cause is told of.
+    seed
+        Seed of the searches.
+    """
+    # What acts in contacts comes first: it is what makes a search lose its way.
+    effects = sorted(
+        (effect for effect in catalogue if _tells(effect)), key=lambda effect: not _acts_in_contacts(effect)
+    )
+
+    def searched(video: int, model: PhysicsModel) -> MapFit:
+        tracks = fit.fits[video].clues.tracks
+        return fit_map(tracks, model, stream(seed, tracks.video), plan=FitPlan(attempts=1), model_error=False)
+
+    def tried(video: int, effects: Sequence[Effect]) -> list[tuple[Effect, MapFit]]:
+        """Searches with causes, until one of them explains the video."""
+        found: list[tuple[Effect, MapFit]] = []
+        for first in range(0, len(effects), AT_ONCE):
+            some = effects[first : first + AT_ONCE]
+            fits = in_parallel(lambda effect: searched(video, fit.model.with_effect(effect)), some)
+            found += zip(some, fits, strict=True)
+            if min(_ratio(one) for one in fits) < EXPLAINED:
+                break
+        return found
+
+    gains: dict[str, float] = {}
+    for video in lost[:2]:
+        before = searched(video, fit.model).modes[0].log_density
+        found = tried(video, effects)
+        gains = {effect.name: one.modes[0].log_density - before + gains.get(effect.name, 0.0) for effect, one in found}
+        effects = sorted((effect for effect, _ in found), key=lambda effect: -gains[effect.name])[:SECOND_LOOKS]
+    ranked = [(effect, gains[effect.name]) for effect in effects if effect.name in gains]
+    return [pair for pair in ranked if pair[1] > max(needed, NEARLY * ranked[0][1])][:MOST]
+
+
+def _tells(effect: Effect) -> bool:
+    """Whether one video can say much about an effect."""
+    of_materials = any(parameter.scope is Scope.MATERIAL for parameter in effect.parameters)
+    return bool(effect.vanishes_at or effect.vanishes_like) and not happens_once(effect) and not of_materials
+
+
+def _acts_in_contacts(effect: Effect) -> bool:
+    return any(effect.overrides(hook) for hook in CONTACT_HOOKS)
+
+
+def _ratio(fit: MapFit) -> float:
+    """Residuals in units of the noise."""
+    return fit.misfit.residual_sd / fit.misfit.noise_sd

@@ -10,7 +10,7 @@ from vrdp_prob.discovery.forecast import held_out
 from vrdp_prob.discovery.held_out import cavities
 from vrdp_prob.discovery.residual_model import ResidualModel
 from vrdp_prob.discovery.scores import score_causes
-from vrdp_prob.discovery.trials import Trial, gain, weights
+from vrdp_prob.discovery.trials import Trial, gain, gains, weights
 from vrdp_prob.inference.several_videos.fitting import fit_together
 from vrdp_prob.models.effects.surface_tilt import SurfaceTilt
 
@@ -65,3 +65,18 @@ def test_forecasts_of_a_null_are_as_far_off_as_they_say() -> None:
     assert found.rmse_end is not None
     assert found.coverage_50 < found.coverage_90
     assert found.coverage_90 > 0.6
+
+
+def test_a_new_search_of_a_video_never_makes_a_fit_worse() -> None:
+    _, fit = fitted("surface_tilt", 3.0, seed=2)
+    trial = Trial((), fit)
+    assert trial.mended([], seed=0) is trial
+    assert trial.mended([1], seed=0).fit.joint.log_density >= fit.joint.log_density
+
+
+def test_a_cause_that_one_video_shows_by_little_is_less_sure_than_one_that_all_show() -> None:
+    _, fit = fitted(seed=1)
+    base = Trial((), fit)
+    divisor = np.full(3, 4.0)
+    assert (gains(base, base, divisor) == 0).all()
+    assert gain(base, base, divisor) == (0.0, 0.0)

@@ -2,7 +2,7 @@
 
 Log probabilities count every frame as new information. What a model leaves unexplained is larger than the noise and
 alike in neighbouring frames, so it is divided out: by the mean square of sums of neighbouring residuals, over what
-noise would leave of it. Source: quasi-likelihood (McCullagh and Nelder, Generalized linear models, 2nd ed. 1989,
+noise would leave of it at most. Source: quasi-likelihood (McCullagh and Nelder, Generalized linear models, 2nd ed. 1989,
 section 9) and its use for choosing models with the factor of the most general one (Burnham and Anderson, Model
 selection and multimodel inference, 2nd ed. 2002, section 2.5); sums of neighbours for what is correlated: the batch
 means estimator of the variance of a mean (Alexopoulos and Seila, 1998).
@@ -16,7 +16,7 @@ from jaxtyping import Float, Int
 from vrdp_prob.discovery.residual_model import ResidualModel, VideoResiduals
 
 LENGTHS = (1, 3, 9, 27, 81)
-"""Numbers of neighbouring frames whose residuals are summed; the length of which noise would leave least decides."""
+"""Numbers of neighbouring frames whose residuals are summed; the one that exceeds noise most decides."""
 REPLICATIONS = 200
 LEVEL = 0.95
 """Share of replications that may not be taken for overdispersed."""
@@ -42,9 +42,8 @@ def _factor(video: VideoResiduals, left: Float[np.ndarray, "_"], drawn: Float[np
     series = _series(video)
     seen = _sums(left[:, None], series)[:, 0]
     chance = _sums(drawn, series)
-    expected = chance.mean(axis=1)
-    usual = np.quantile((chance / expected[:, None]).max(axis=0), LEVEL)
-    return max(1.0, float((seen / expected).max() / usual))
+    usual = np.quantile(chance, 1 - (1 - LEVEL) / len(LENGTHS), axis=1)
+    return max(1.0, float((seen / usual).max()))
 
 
 def _series(video: VideoResiduals) -> list[Int[np.ndarray, "_"]]:

@@ -1,0 +1,53 @@
+"""Lost frames are found where they were lost, though the time of the loss has no slope."""
+
+import numpy as np
+import pytest
+
+from tests.discovery.fitted import fitted
+from vrdp_prob.discovery.estimates import estimates
+from vrdp_prob.discovery.residual_model import ResidualModel
+from vrdp_prob.discovery.scores import score_causes
+from vrdp_prob.discovery.trials import Trial, gain
+from vrdp_prob.models.effects.clock_error import ClockError
+
+SIZE, SEED = 6.0, 1
+
+
+@pytest.fixture(scope="module")
+def found() -> tuple[Trial, Trial]:
+    _, fit = fitted("clock_error", SIZE, seed=SEED)
+    base = Trial((), fit)
+    score = score_causes(fit, ResidualModel.of(fit), [ClockError()], seed=0)[0]
+    trial = base.with_cause(score)
+    assert trial is not None
+    return base, trial
+
+
+def test_the_lost_time_is_that_of_the_truth(found: tuple[Trial, Trial]) -> None:
+    data, _ = fitted("clock_error", SIZE, seed=SEED)
+    base, trial = found
+    assert gain(trial, base)[0] > 100
+    values = estimates(trial.fit, ClockError())
+    lost = [one for name, one in values.items() if name.startswith("lost_time")]
+    assert len(lost) == len(trial.fit.videos)
+    strength = data.truth.causes[0].strength
+    assert np.mean([abs(one.mean - strength) < 4 * one.sd for one in lost]) > 0.5
+
+
+def test_the_time_of_the_loss_is_told_with_the_interval_between_two_frames(found: tuple[Trial, Trial]) -> None:
+    _, trial = found
+    values = {name: one for name, one in estimates(trial.fit, ClockError()).items() if name.startswith("lost_at")}
+    assert len(values) == len(trial.fit.videos)
+    for index, (name, one) in enumerate(values.items()):
+        times = trial.fit.joint.videos[index].likelihood.tracks.times
+        assert trial.fit.videos[index] in name
+        frame = int(np.searchsorted(times, one.mean))
+        assert times[frame - 1] < one.q025 < one.q975 < times[frame]
+
+
+def test_without_the_cause_nothing_is_held_any_more(found: tuple[Trial, Trial]) -> None:
+    _, trial = found
+    assert all(structure.held for structure in trial.fit.structures)
+    without = trial.without(trial.causes[0])
+    assert not any(structure.held for structure in without.fit.structures)
+    assert without.names == ()

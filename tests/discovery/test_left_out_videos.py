@@ -74,9 +74,12 @@ def test_a_new_search_of_a_video_never_makes_a_fit_worse() -> None:
     assert trial.mended([1], seed=0).fit.joint.log_density >= fit.joint.log_density
 
 
-def test_a_cause_that_one_video_shows_by_little_is_less_sure_than_one_that_all_show() -> None:
-    _, fit = fitted(seed=1)
+def test_gains_are_divided_by_the_overdispersion_of_each_video() -> None:
+    _, fit = fitted("surface_tilt", 3.0, seed=2)
+    score = score_causes(fit, ResidualModel.of(fit), [SurfaceTilt()], seed=0)[0]
     base = Trial((), fit)
-    divisor = np.full(3, 4.0)
-    assert (gains(base, base, divisor) == 0).all()
-    assert gain(base, base, divisor) == (0.0, 0.0)
+    found = base.with_cause(score)
+    assert found is not None
+    divisor = np.array([1.0, 4.0, 100.0])
+    assert gains(found, base, divisor) == pytest.approx(gains(found, base) / divisor)
+    assert gain(found, base, divisor)[0] == pytest.approx(float((gains(found, base) / divisor).sum()))

@@ -2,10 +2,12 @@
 
 Log probabilities count every frame as new information. What a model leaves unexplained is larger than the noise and
 alike in neighbouring frames, so it is divided out: by the mean square of sums of neighbouring residuals, over what
-noise would leave of it at most. Source: quasi-likelihood (McCullagh and Nelder, Generalized linear models, 2nd ed. 1989,
-section 9) and its use for choosing models with the factor of the most general one (Burnham and Anderson, Model
-selection and multimodel inference, 2nd ed. 2002, section 2.5); sums of neighbours for what is correlated: the batch
-means estimator of the variance of a mean (Alexopoulos and Seila, 1998).
+noise would leave of it at most.
+
+Source: quasi-likelihood (McCullagh and Nelder, Generalized linear models, 2nd ed. 1989, section 9) and its use for
+choosing models, with the factor of the most general one (Burnham and Anderson, Model selection and multimodel
+inference, 2nd ed. 2002, section 2.5); sums of neighbours for what is correlated: the batch means estimator of the
+variance of a mean (Alexopoulos and Seila, 1998).
 """
 
 from collections.abc import Sequence

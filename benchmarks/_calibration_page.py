@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+from _page import write_between
 from _resumable import Result
 from scipy.stats import binomtest
 
@@ -17,7 +18,6 @@ Results = Mapping[str, Sequence[Result]]
 INTERVALS = (0.5, 0.8, 0.95)
 ERROR_RATE = 0.05
 """Probability with which a sampler that is calibrated would miss a goal by chance, over all kinds together."""
-MARKS = "<!-- measured: begin -->", "<!-- measured: end -->"
 FEWEST = 10
 """Scenes below which nothing is said of a kind."""
 
@@ -137,11 +137,8 @@ def _table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
 
 def page(results: Results, path: Path) -> None:
     """Write the tables and figures between the marks of a page."""
-    text = path.read_text(encoding="utf-8")
-    before, after = text.split(MARKS[0])[0], text.split(MARKS[1])[1]
     pictures = [f"![Ranks of the truth, {name}](figures/calibration-{name}.svg)" for name in results]
-    measured = "\n\n".join([*pictures, tables(results)])
-    path.write_text(f"{before}{MARKS[0]}\n\n{measured}\n\n{MARKS[1]}{after}", encoding="utf-8")
+    write_between(path, "\n\n".join([*pictures, tables(results)]))
 
 
 def figures(results: Results, folder: Path) -> None:

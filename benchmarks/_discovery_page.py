@@ -28,11 +28,10 @@ from _discovery_results import (
     unknown,
 )
 from _discovery_tasks import SIZES, Kind
+from _page import write_between
 
 from tests.discovery.causes import CATALOGUE
 from tests.discovery.other_effects import ALL
-
-MARKS = "<!-- measured: begin -->", "<!-- measured: end -->"
 
 
 def tables(results: Sequence[Result]) -> str:
@@ -203,6 +202,4 @@ def _table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
 
 def page(results: Sequence[Result], path: Path) -> None:
     """Write the tables between the marks of a page."""
-    text = path.read_text(encoding="utf-8")
-    before, after = text.split(MARKS[0])[0], text.split(MARKS[1])[1]
-    path.write_text(f"{before}{MARKS[0]}\n\n{tables(results)}\n\n{MARKS[1]}{after}", encoding="utf-8")
+    write_between(path, tables(results))

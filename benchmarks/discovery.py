@@ -43,6 +43,7 @@ from vrdp_prob.models.model_file import known_effects
 from vrdp_prob.models.simulator.rollout import compile_model
 
 RESULTS = Path("out") / "discovery.jsonl"
+KINDS = {kind.name.lower(): kind for kind in Kind}
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -50,6 +51,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--json", type=Path, help="file for the checks")
     parser.add_argument("--docs", type=Path, help="folder of the documentation, whose page is written anew")
     parser.add_argument("--causes", help="what is hidden, separated by commas; everything by default")
+    parser.add_argument(
+        "--kinds", help=f"what is asked, separated by commas; everything by default: {', '.join(KINDS)}"
+    )
     parser.add_argument(
         "--sizes", default=",".join(f"{size:g}" for size in SIZES), help="effect sizes of single causes"
     )
@@ -65,6 +69,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     for name in causes or ():
         if name not in ALL:
             parser.error(f"nothing is called {name}; there are {', '.join(ALL)}")
+    kinds = options.kinds.split(",") if options.kinds else list(KINDS)
+    for name in kinds:
+        if name not in KINDS:
+            parser.error(f"nothing is asked by the name {name}; there are {', '.join(KINDS)}")
     listed = tasks(
         causes=causes,
         sizes=[float(size) for size in options.sizes.split(",")],
@@ -73,6 +81,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         videos=options.videos,
         bodies=options.bodies,
     )
+    listed = [task for task in listed if task.kind in {KINDS[name] for name in kinds}]
     if options.show:
         results = list({result["task"]: result for result in read(options.results)}.values())
     else:

@@ -23,6 +23,7 @@ from _clock import interleaved
 from _clock import seconds as seconds_of
 from _fixed_step_torch import FORMULATIONS, positions
 from _memory import peak
+from _page import write_between
 from _peers import COMPILED, HAS_JAX, JAX, OURS, TORCH, laws_of, peers
 from _scenes import (
     BASE,
@@ -224,15 +225,6 @@ def main() -> None:
     if options.docs:
         figures(by_bodies, by_worlds, options.docs / "figures")
         write_between(options.docs / "simulator-speed.md", text)
-
-
-def write_between(path: Path, text: str) -> None:
-    """Replace what stands between the marks in a page."""
-    before, rest = path.read_text(encoding="utf-8").split(BEGIN)
-    path.write_text(f"{before}{BEGIN}\n\n{text}\n\n{END}{rest.split(END)[1]}", encoding="utf-8")
-
-
-BEGIN, END = "<!-- measured: begin -->", "<!-- measured: end -->"
 
 
 if __name__ == "__main__":

@@ -174,7 +174,7 @@ class _Searcher:
     def _settled(self, trial: Trial, found: Sequence[Trial]) -> bool:
         """Whether the best cause leaves nothing to explain, and is not a kick in each of several videos."""
         if not found or gain(found[0], trial)[0] < self.needed:
-            return not found
+            return False
         cause = found[0].causes[-1]
         if happens_once(cause) and found[0].acting(cause) > 1:
             return False

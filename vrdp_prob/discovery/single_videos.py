@@ -6,6 +6,8 @@ near it to be found, and a search from the beginning is the only way.
 
 from collections.abc import Sequence
 
+import numpy as np
+
 from vrdp_prob.discovery.scores import happens_once
 from vrdp_prob.inference.map_fit import MapFit, fit_map
 from vrdp_prob.inference.parallel import in_parallel
@@ -18,7 +20,7 @@ from vrdp_prob.models.parameters import Scope
 from vrdp_prob.models.physics import PhysicsModel
 
 LOST = 1.2
-"""Residuals in units of the noise from which a video may have taken the wrong course of events."""
+"""Residuals in units of the noise, and of those of the video in the middle, from which a video may be lost."""
 SECOND_LOOKS = 3
 """Causes, the best first, with which a second video is searched."""
 NEARLY = 0.6
@@ -37,8 +39,9 @@ AT_ONCE = 4
 def lost_videos(fit: SharedFit) -> list[int]:
     """Videos that may have taken the wrong course of events, the worst first."""
     ratios = [_ratio(part) for part in fit.fits]
+    least = LOST * max(1.0, float(np.median(ratios)))
     order = sorted(range(len(ratios)), key=lambda index: -ratios[index])
-    return [index for index in order if ratios[index] > LOST and may_take_another_course(fit.fits[index])]
+    return [index for index in order if ratios[index] > least and may_take_another_course(fit.fits[index])]
 
 
 def causes_of_lost_videos(

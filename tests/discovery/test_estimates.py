@@ -1,16 +1,20 @@
 """What is said of the parameters of a cause."""
 
 import math
+from dataclasses import replace
+from typing import ClassVar
 
 import pytest
 
 from tests.discovery.fitted import fitted
-from vrdp_prob.discovery.estimates import cause_sentence, estimates
+from vrdp_prob.discovery.estimates import cause_sentence, estimates, surprise
 from vrdp_prob.discovery.finding import Estimate
 from vrdp_prob.models.effects.air_drag import AirDrag
 from vrdp_prob.models.effects.body_friction import BodyFriction
+from vrdp_prob.models.effects.effect import Effect
 from vrdp_prob.models.effects.linear_drag import LinearDrag
 from vrdp_prob.models.effects.wall import Wall
+from vrdp_prob.models.parameters import AIR_DRAG, Prior
 
 
 def test_a_logarithm_is_told_in_its_unit() -> None:
@@ -36,3 +40,16 @@ def test_a_sentence_holds_the_strength_in_brackets() -> None:
         "Bodies are slowed in proportion to their speed (linear_drag = 0.187 ± 0.0082 1/s)."
     )
     assert cause_sentence(Wall(), {}) == Wall.sentence
+
+
+class _Placed(Effect):
+    """An effect with the number of the air drag, as if that were a place."""
+
+    name: ClassVar = "placed"
+    parameters: ClassVar = (replace(AIR_DRAG, prior=Prior(math.log(1000.0), 0.1)),)
+
+
+def test_a_strength_may_surprise_but_not_a_place() -> None:
+    _, fit = fitted(seed=1)
+    assert surprise(fit, AirDrag()) == 1.0
+    assert surprise(fit, _Placed()) < 1e-6

@@ -8,7 +8,7 @@ from jaxtyping import Float
 from vrdp_prob.discovery.checking import check_video_count
 from vrdp_prob.discovery.checks import run_checks
 from vrdp_prob.discovery.describe import describe
-from vrdp_prob.discovery.estimates import cause_sentence, estimates, upper_bounds
+from vrdp_prob.discovery.estimates import cause_sentence, estimates, surprise, upper_bounds
 from vrdp_prob.discovery.figures import residual_figures
 from vrdp_prob.discovery.finding import Check, Finding, FoundCause, Gain, UpperBound, Verdict
 from vrdp_prob.discovery.search import Search, search
@@ -29,6 +29,8 @@ LEFT_LEVEL = 0.005
 """Probability, over all checks, with which a model that explains everything is taken to leave something."""
 TELLING = 2.0
 """Overdispersion of a video that is told of."""
+SURPRISING = 0.01
+"""Probability below which parameters of a cause are so far from what was expected that it stands for something else."""
 LEAST_SHARE = 0.01
 """Probability from which a cause is told of that could take the place of a named one."""
 
@@ -95,8 +97,15 @@ def _verdict(found: Search, after: Sequence[Check]) -> Verdict:
     left = min((check.p_value for check in after), default=1.0) * len(after) < LEFT_LEVEL
     if not found.best.causes:
         return Verdict.UNKNOWN if left else Verdict.NONE
+    if _strange(found):
+        return Verdict.UNKNOWN
     before, now = _excess(found.base), _excess(found.best)
     return Verdict.UNKNOWN if left and now > (1 - EXPLAINED) * before else Verdict.NAMED
+
+
+def _strange(found: Search) -> list[str]:
+    """Causes of the best model whose parameters are far from what was expected of them."""
+    return [one.name for one in found.best.causes if surprise(found.best.fit, one) < SURPRISING]
 
 
 def _excess(trial: Trial) -> float:
@@ -135,9 +144,10 @@ def _cause(
     named: bool,
 ) -> FoundCause:
     values = estimates(trial.fit, effect, overdispersion)
+    credible = min(1.0, surprise(trial.fit, effect) / SURPRISING)
     return FoundCause(
         name=effect.name,
-        probability=min(max(probability, 0.0), 1.0),
+        probability=min(max(credible * probability, 0.0), 1.0),
         sentence=cause_sentence(effect, values),
         parameters=values,
         gain=_gain(lesser, trial, overdispersion),
@@ -171,6 +181,11 @@ def _notes(found: Search) -> list[str]:
         notes.append(
             "The joint fit ended before it had converged: some video is at the edge between two courses of events."
         )
+    notes += [
+        f"The parameters of '{name}' are far from what was expected of this cause: it may stand for something that it "
+        "has as its limit, and its probability counts that."
+        for name in _strange(found)
+    ]
     worst = int(np.argmax(found.overdispersion))
     if found.overdispersion[worst] > TELLING:
         notes.append(

@@ -5,6 +5,7 @@ from collections.abc import Mapping
 
 import numpy as np
 from jaxtyping import Float
+from scipy.stats import chi2
 
 from vrdp_prob.discovery.finding import Estimate, UpperBound
 from vrdp_prob.discovery.scores import CauseScore
@@ -75,6 +76,30 @@ def _between_frames(middle: float, interval: float, unit: str) -> Estimate:
     """A time of which only the two frames around it are known."""
     half = CERTAIN * interval / 2
     return Estimate(middle, interval / math.sqrt(12), middle - half, middle + half, unit)
+
+
+def surprise(fit: SharedFit, effect: Effect) -> float:
+    """Probability that the shared parameters of an effect lie so far from what was expected of them, strengths aside.
+
+    A cause that holds another one as its limit takes its place with parameters far off: a bowl whose middle is far away
+    is a slope. How strong a cause is may surprise. Source: prior-data conflict (Evans and Moshonov, Checking for
+    prior-data conflict, Bayesian Analysis 1, 2006), with the most probable values in the place of the data.
+
+    Parameters
+    ----------
+    fit
+        Fit of a model with the effect.
+    effect
+        The effect.
+    """
+    joint = fit.joint
+    strengths = {*effect.vanishes_at, *effect.vanishes_like}
+    priors = {one.name: one.prior for one in effect.parameters if one.name not in strengths}
+    found = [
+        (priors[key[0]], joint.gaussian.mean[place]) for place, key in enumerate(joint.numbers.keys) if key[0] in priors
+    ]
+    squares = sum(((float(mean) - prior.mean) / prior.sd) ** 2 for prior, mean in found)
+    return float(chi2.sf(squares, len(found))) if found else 1.0
 
 
 def cause_sentence(effect: Effect, found: Mapping[str, Estimate]) -> str:

@@ -15,7 +15,7 @@ from vrdp_prob.inference.model_error_fit import TURNS, next_model_error
 from vrdp_prob.inference.parallel import in_parallel
 from vrdp_prob.inference.plan import FitPlan
 from vrdp_prob.inference.several_videos.agreement import first_guess, following_ones
-from vrdp_prob.inference.several_videos.ascent import ROUNDS, climb
+from vrdp_prob.inference.several_videos.ascent import ROUNDS, ImpossibleStartError, climb
 from vrdp_prob.inference.several_videos.joint_fit import JointFit, with_alternatives
 from vrdp_prob.inference.several_videos.linking import LinkedVideo, SharedNumbers, check_names, link
 from vrdp_prob.inference.several_videos.parts import carried_starts, plain_likelihood, stream, structure_of
@@ -175,7 +175,10 @@ class SharedFit:
         ]
         numbers, videos = link(likelihoods, self.shared)
         locals_ = following_ones(numbers, videos, carried_starts(fits, videos), agreed)
-        found = climb(numbers, videos, agreed, locals_)
+        try:
+            found = climb(numbers, videos, agreed, locals_)
+        except ImpossibleStartError:  # a video has no world where the others agree
+            return self
         if found.log_density < joint.log_density:
             return self
         return _finished(found, self.model, fits, tuple(structures), self.shared, model_error=False)

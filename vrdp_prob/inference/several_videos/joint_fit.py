@@ -140,7 +140,8 @@ def _noise_rows(
 ) -> Float[np.ndarray, "noise dimension"]:
     """Residual derivatives that make up the curvature along the noise scales."""
     rows = np.zeros((len(places), dimension))
-    rows[:, places] = np.linalg.cholesky(curvature).T
+    values, vectors = np.linalg.eigh(curvature)
+    rows[:, places] = np.sqrt(np.maximum(values, 0.0))[:, None] * vectors.T
     return rows
 
 

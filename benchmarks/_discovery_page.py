@@ -52,11 +52,14 @@ def tables(results: Sequence[Result]) -> str:
 
 
 def _summary(results: Sequence[Result]) -> str:
-    rows = [
-        (one["name"], _figure(one["value"]), _figure(one["goal"]), "yes" if one["ok"] else "**no**")
-        for one in checks(results)
-    ]
+    rows = [(one["name"], _figure(one["value"]), _figure(one["goal"]), _met(one)) for one in checks(results)]
     return _table(("", "measured", "goal", "met"), rows)
+
+
+def _met(check: Result) -> str:
+    if check["value"] is None:
+        return "not measured"
+    return "yes" if check["ok"] else "**no**"
 
 
 def _figure(value: float | None) -> str:

@@ -124,13 +124,13 @@ def _causes(found: Search, seed: int) -> list[FoundCause]:
         log_prior = [one.log_prior - simplest - found.needed for one in (found.best, *best_of.values())]
         log_prior.insert(1, 0.0)
         shares = weights(trials, log_prior, np.random.default_rng(seed), overdispersion=found.overdispersion)
-        named.append(
-            _cause(found.best, found.best.causes[number], lesser, found.overdispersion, float(shares[0]), named=True)
-        )
+        cause = found.best.causes[number]
+        expected = cause.name not in _strange(found)
+        named.append(_cause(found.best, cause, lesser, found.overdispersion, float(shares[0]), named=expected))
         for rival, share in zip(best_of.values(), shares[2:], strict=True):
             if share >= LEAST_SHARE:
                 others.append(_cause(rival, rival.causes[-1], lesser, found.overdispersion, float(share), named=False))
-    named.sort(key=lambda one: -one.probability)
+    named.sort(key=lambda one: (not one.named, -one.probability))
     return named + sorted(others, key=lambda one: -one.probability)
 
 

@@ -16,8 +16,10 @@ from vrdp_prob.models.effects.wall import Wall
 from vrdp_prob.models.model_file import known_effects
 
 
-def scored(way: str | None, *, seed: int, names: tuple[str, ...] | None = None) -> dict[str, CauseScore]:
-    _, fit = fitted(way, seed=seed)
+def scored(
+    way: str | None, effect_size: float = 5.0, *, seed: int, names: tuple[str, ...] | None = None
+) -> dict[str, CauseScore]:
+    _, fit = fitted(way, effect_size, seed=seed)
     present = {effect.name for effect in fit.model.effects}
     effects = [
         effect() for name, effect in known_effects().items() if name not in present and (names is None or name in names)
@@ -33,8 +35,8 @@ def test_a_null_gives_no_cause_a_small_p_value() -> None:
 
 
 def test_a_hidden_slope_has_the_largest_score_and_the_right_size() -> None:
-    data, _ = fitted("surface_tilt", seed=1)
-    found = scored("surface_tilt", seed=1, names=("surface_tilt", "linear_drag", "friction_patch"))
+    data, _ = fitted("surface_tilt", 3.0, seed=2)
+    found = scored("surface_tilt", 3.0, seed=2, names=("surface_tilt", "linear_drag", "friction_patch"))
     first = next(iter(found.values()))
     assert first.effect.name == "surface_tilt"
     assert first.p_value < 1e-9

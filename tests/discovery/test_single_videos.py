@@ -16,7 +16,7 @@ def test_no_video_of_a_null_is_lost() -> None:
 
 def test_friction_of_contacts_is_told_by_the_videos_that_nothing_else_explains() -> None:
     _, fit = fitted("contact_friction", 3.0, seed=1)
-    ratios = [part.misfit.residual_sd / part.misfit.noise_sd for part in fit.fits]
+    ratios = [part.misfit.ratio for part in fit.fits]
     worst = ratios.index(max(ratios))
     assert ratios[worst] > 1.2
     effects = [SurfaceTilt(), ContactFriction(), ClockError(), MaterialFriction()]

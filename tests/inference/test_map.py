@@ -1,5 +1,6 @@
 """The most probable values of random videos; the whole rate is in `benchmarks/map.py`."""
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -16,6 +17,7 @@ from vrdp_prob.inference.events import courses
 from vrdp_prob.inference.hypothesis import distances, yaw_places
 from vrdp_prob.inference.map_fit import MapFit, fit_map
 from vrdp_prob.inference.mode_search import ModeSearch
+from vrdp_prob.inference.modes import structure_at, with_all_that_meet
 from vrdp_prob.inference.plan import CURRICULUM, GROWING, FitPlan, Optimiser
 from vrdp_prob.models.likelihood import Likelihood
 from vrdp_prob.models.simulator.events import RolloutEventKind
@@ -67,6 +69,22 @@ def test_a_contact_before_the_second_frame_is_found() -> None:
     comparison = compare(truth, fit_map(truth.tracks, default_model(), np.random.default_rng(0)))
     assert comparison.succeeded, comparison.cause
     assert comparison.fitted_pairs == ((1, 2), (0, 2))
+
+
+def test_bodies_that_begin_to_meet_on_the_way_get_their_unknowns() -> None:
+    fit, _ = fitted(4)
+    likelihood, points = fit.likelihood, [mode.point for mode in fit.modes]
+    complete = structure_at(likelihood, points, fit.clues.moving)
+    assert complete.colliding
+    assert with_all_that_meet(likelihood, complete, points) is None
+    bare = replace(complete, colliding=frozenset())
+    poorer = replace(likelihood, coordinates=unknowns(likelihood.tracks, likelihood.model, bare, likelihood.noise))
+    carried = [likelihood.coordinates.carried(point, poorer.coordinates) for point in points]
+    wider = with_all_that_meet(poorer, bare, carried)
+    assert wider is not None
+    assert wider[0].colliding <= complete.colliding
+    added = set(wider[1].coordinates.places) - set(poorer.coordinates.places)
+    assert added >= {(name, body) for name in ("mass", "restitution") for body in wider[0].colliding}
 
 
 def test_contacts_in_quick_succession_are_crowded() -> None:

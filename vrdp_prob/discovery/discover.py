@@ -117,6 +117,7 @@ def _causes(found: Search, seed: int) -> list[FoundCause]:
     """The causes of the best model, and those that could take the place of one."""
     named: list[FoundCause] = []
     others: list[FoundCause] = []
+    strange = _strange(found)
     for number, (lesser, rivals) in enumerate(zip(found.lesser, found.rivals, strict=True)):
         best_of = {one.causes[-1].name: one for one in reversed(rivals)}
         trials = [found.best, lesser, *best_of.values()]
@@ -125,7 +126,7 @@ def _causes(found: Search, seed: int) -> list[FoundCause]:
         log_prior.insert(1, 0.0)
         shares = weights(trials, log_prior, np.random.default_rng(seed), overdispersion=found.overdispersion)
         cause = found.best.causes[number]
-        expected = cause.name not in _strange(found)
+        expected = cause.name not in strange
         named.append(_cause(found.best, cause, lesser, found.overdispersion, float(shares[0]), named=expected))
         for rival, share in zip(best_of.values(), shares[2:], strict=True):
             if share >= LEAST_SHARE:

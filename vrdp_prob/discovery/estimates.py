@@ -13,11 +13,12 @@ from vrdp_prob.inference.several_videos.fitting import SharedFit
 from vrdp_prob.inference.several_videos.linking import place_words
 from vrdp_prob.models.effects.effect import Effect
 from vrdp_prob.models.parameters import Transform
+from vrdp_prob.scene import Tracks
 
-MIDDLE = 1.959964
-"""Standard deviations from the middle of a normal distribution to the ends of its middle 95 %."""
 CERTAIN = 0.95
 """Probability of the intervals."""
+MIDDLE = 1.959964
+"""Standard deviations from the middle of a normal distribution to the ends of its middle 95 %."""
 ONE_SIDED = 1.644854
 """The same to the end of its lower 95 %."""
 
@@ -37,7 +38,8 @@ def estimates(
         Factor of each video by which variances are larger than what the likelihood says, shared numbers by their mean;
         1 where None.
     """
-    wider = np.sqrt(np.ones(len(fit.videos)) if overdispersion is None else overdispersion)
+    factors = np.ones(len(fit.videos)) if overdispersion is None else overdispersion
+    shared_sd = fit.joint.gaussian.sd * np.sqrt(factors.mean())
     units = {parameter.name: parameter for parameter in effect.parameters}
     found: dict[str, Estimate] = {}
     joint = fit.joint
@@ -45,22 +47,21 @@ def estimates(
         if key[0] in units:
             words = place_words(key[1])
             name = f"{key[0]}[{words}]" if words else key[0]
-            mean, sd = joint.gaussian.mean[place], joint.gaussian.sd[place] * np.sqrt(np.mean(wider**2))
-            found[name] = _estimate(units[key[0]].transform, float(mean), float(sd), units[key[0]].unit)
+            mean, sd = float(joint.gaussian.mean[place]), float(shared_sd[place])
+            found[name] = _estimate(units[key[0]].transform, mean, sd, units[key[0]].unit)
     for index, video in enumerate(joint.videos):
         coordinates, point = video.likelihood.coordinates, joint.point(index)
-        sd = np.sqrt(np.diag(np.linalg.inv(joint.precision(index))))
+        sd = np.sqrt(factors[index] * np.diag(np.linalg.inv(joint.precision(index))))
         for place in video.local_places:
             entry = coordinates.entries[place]
             if entry.field in units:
                 body = "" if entry.owner is None else f"{video.likelihood.tracks.bodies[entry.owner].id} in "
                 found[f"{entry.field}[{body}{video.name}]"] = _estimate(
-                    entry.transform, float(point[place]), float(sd[place] * wider[index]), units[entry.field].unit
+                    entry.transform, float(point[place]), float(sd[place]), units[entry.field].unit
                 )
-        interval = float(np.median(np.diff(video.likelihood.tracks.times)))
         for (name, _), value in fit.structures[index].held.items():
             if name in effect.stepwise and value is not None:
-                found[f"{name}[{video.name}]"] = _between_frames(value, interval, units[name].unit)
+                found[f"{name}[{video.name}]"] = _between_frames(value, video.likelihood.tracks, units[name].unit)
     return found
 
 
@@ -72,8 +73,9 @@ def _estimate(transform: Transform, mean: float, sd: float, unit: str) -> Estima
     return Estimate(middle, middle * math.sqrt(math.expm1(sd**2)), math.exp(low), math.exp(high), unit)
 
 
-def _between_frames(middle: float, interval: float, unit: str) -> Estimate:
+def _between_frames(middle: float, tracks: Tracks, unit: str) -> Estimate:
     """A time of which only the two frames around it are known."""
+    interval = float(np.median(np.diff(tracks.times)))
     half = CERTAIN * interval / 2
     return Estimate(middle, interval / math.sqrt(12), middle - half, middle + half, unit)
 

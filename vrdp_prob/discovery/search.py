@@ -188,7 +188,8 @@ class _Searcher:
         left = [effect for effect in self.catalogue if effect.name not in trial.names]
         reached = {one.causes[-1].name: gain(one, trial)[0] for one in reversed(found)}
         best = found[0].fit if found else trial.fit
-        lost = [one for one in lost_videos(trial.fit) if one in lost_videos(best)]
+        still_lost = lost_videos(best)
+        lost = [one for one in lost_videos(trial.fit) if one in still_lost]
         told = causes_of_lost_videos(trial.fit, lost, left, self.needed, seed=self.seed)
         again = [effect for effect, promised in told if reached.get(effect.name, 0.0) < promised]
 

@@ -21,13 +21,10 @@ from vrdp_prob.models.physics import PhysicsModel
 
 LOST = 1.2
 """Residuals in units of the noise, and of those of the video in the middle, from which a video may be lost."""
-SECOND_LOOKS = 3
-"""Causes, the best first, with which a second video is searched."""
-NEARLY = 0.6
-"""Share of the largest gain from which another cause is told of, too."""
-MOST = 2
-
-
+VIDEOS, SECOND_LOOKS = 2, 3
+"""Lost videos that are looked at, and causes, the best first, with which all but the first of them are searched."""
+NEARLY, MOST_TOLD = 0.6, 2
+"""Share of the largest gain from which another cause is told of, too, and number of causes that are."""
 EXPLAINED = 1.1
 """Residuals in units of the noise from which a cause explains a video; no further ones are tried then."""
 CONTACT_HOOKS = ("tangential_impulse", "contact_radius", "slip_friction", "restitution", "pair_force")
@@ -38,7 +35,7 @@ AT_ONCE = 4
 
 def lost_videos(fit: SharedFit) -> list[int]:
     """Videos that may have taken the wrong course of events, the worst first."""
-    ratios = [_ratio(part) for part in fit.fits]
+    ratios = [part.misfit.ratio for part in fit.fits]
     least = LOST * max(1.0, float(np.median(ratios)))
     order = sorted(range(len(ratios)), key=lambda index: -ratios[index])
     return [index for index in order if ratios[index] > least and may_take_another_course(fit.fits[index])]
@@ -54,7 +51,7 @@ def causes_of_lost_videos(
     fit
         Fit of the model without any of them.
     lost
-        The videos, the worst first; two are looked at.
+        The videos, the worst first; the first two are looked at.
     catalogue
         The causes. Those that happen once, vanish nowhere or belong to materials are left out: one video says too
         little of them.
@@ -79,18 +76,18 @@ def causes_of_lost_videos(
             some = effects[first : first + AT_ONCE]
             fits = in_parallel(lambda effect: searched(video, fit.model.with_effect(effect)), some)
             found += zip(some, fits, strict=True)
-            if min(_ratio(one) for one in fits) < EXPLAINED:
+            if min(one.misfit.ratio for one in fits) < EXPLAINED:
                 break
         return found
 
     gains: dict[str, float] = {}
-    for video in lost[:2]:
+    for video in lost[:VIDEOS]:
         before = searched(video, fit.model).modes[0].log_density
         found = tried(video, effects)
         gains = {effect.name: one.modes[0].log_density - before + gains.get(effect.name, 0.0) for effect, one in found}
         effects = sorted((effect for effect, _ in found), key=lambda effect: -gains[effect.name])[:SECOND_LOOKS]
     ranked = [(effect, gains[effect.name]) for effect in effects if effect.name in gains]
-    return [pair for pair in ranked if pair[1] > max(needed, NEARLY * ranked[0][1])][:MOST]
+    return [pair for pair in ranked if pair[1] > max(needed, NEARLY * ranked[0][1])][:MOST_TOLD]
 
 
 def _tells(effect: Effect) -> bool:
@@ -101,8 +98,3 @@ def _tells(effect: Effect) -> bool:
 
 def _acts_in_contacts(effect: Effect) -> bool:
     return any(effect.overrides(hook) for hook in CONTACT_HOOKS)
-
-
-def _ratio(fit: MapFit) -> float:
-    """Residuals in units of the noise."""
-    return fit.misfit.residual_sd / fit.misfit.noise_sd

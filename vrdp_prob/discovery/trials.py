@@ -22,8 +22,6 @@ EACH_PARAMETER = 1.0
 
 A cause that holds another one as its limit (a bowl whose middle is far away is a slope) predicts as well as that one.
 """
-
-
 FIRST_ROUNDS = 5
 """Common steps with which it is seen whether a cause can win."""
 FELL = 5.0
@@ -82,7 +80,7 @@ class Trial:
     def with_cause(self, score: CauseScore) -> "Trial | None":
         """The fit with one more cause, from what its score says of it; None where no world can begin there."""
         try:
-            return self._extended(score)
+            return self._with_single_events(score) if happens_once(score.effect) else self._with_lasting(score)
         except ImpossibleStartError:
             return None
 
@@ -105,18 +103,22 @@ class Trial:
             return None
         return Trial((*self.causes[:-1], score.effect), fit, choices)
 
-    def _extended(self, score: CauseScore) -> "Trial":
+    def _with_lasting(self, score: CauseScore) -> "Trial":
+        """The fit with an effect that acts on all videos."""
         effect = score.effect
+        own_fields = [one.name for one in effect.parameters if one.scope is Scope.BODY]
+        bodies = [range(len(part.likelihood.tracks.bodies)) for part in self.fit.fits]
+        starts: list[dict[Owned, float]] = [
+            {(name, body): score.start[name] for name in own_fields if name in score.start for body in these}
+            for these in bodies
+        ]
         model = self.fit.model.with_effect(effect)
-        if not happens_once(effect):
-            own_fields = [one.name for one in effect.parameters if one.scope is Scope.BODY]
-            bodies = [range(len(part.likelihood.tracks.bodies)) for part in self.fit.fits]
-            starts: list[dict[Owned, float]] = [
-                {(name, body): score.start[name] for name in own_fields if name in score.start for body in these}
-                for these in bodies
-            ]
-            fit = self.fit.under(model, start=score.start, own=starts, rounds=FIRST_ROUNDS, model_error=False)
-            return Trial((*self.causes, effect), fit, self.choices)
+        fit = self.fit.under(model, start=score.start, own=starts, rounds=FIRST_ROUNDS, model_error=False)
+        return Trial((*self.causes, effect), fit, self.choices)
+
+    def _with_single_events(self, score: CauseScore) -> "Trial":
+        """The fit with an effect that happens at most once in each video, where its scan has found it."""
+        effect = score.effect
         sites = [[site for site in score.sites if site.video == k] for k in range(len(self.fit.fits))]
         fields = [parameter.name for parameter in effect.parameters]
         held, own = [], []
@@ -129,12 +131,13 @@ class Trial:
                     for name, value in site.values.items()
                     for owner in (site.owner, None)
                 }
-            every = {(name, owner): None for name in fields for owner in owners if (name, owner) not in values}
-            steps = {key: values[key] for key in values if key[0] in effect.stepwise}
-            held.append({**structure.held, **every, **steps})
+            absent = {(name, owner): None for name in fields for owner in owners if (name, owner) not in values}
+            steps = {key: value for key, value in values.items() if key[0] in effect.stepwise}
+            held.append({**structure.held, **absent, **steps})
             own.append(values)
         acting = np.array([min(len(mine), 1) for mine in sites])
         choices = {**self.choices, effect.name: np.log(max(score.places, 1)) * acting}
+        model = self.fit.model.with_effect(effect)
         fit = self.fit.under(model, own=own, held=held, rounds=FIRST_ROUNDS, model_error=False)
         return Trial((*self.causes, effect), fit, choices)
 

@@ -21,7 +21,14 @@ from vrdp_prob.inference.misfit import Misfit, judge
 from vrdp_prob.inference.mode import Mode
 from vrdp_prob.inference.mode_search import ModeSearch
 from vrdp_prob.inference.model_error_fit import TURNS, next_model_error
-from vrdp_prob.inference.modes import HOPELESS, distinct_modes, restricted, structure_at, without_idle
+from vrdp_prob.inference.modes import (
+    HOPELESS,
+    distinct_modes,
+    restricted,
+    structure_at,
+    with_all_that_meet,
+    without_idle,
+)
 from vrdp_prob.inference.plan import FitPlan
 from vrdp_prob.inference.refinement import Refined, climb, refine
 from vrdp_prob.models.likelihood import Likelihood
@@ -159,7 +166,12 @@ def fit_map(
         likelihood = widened
         evaluations += sum(one.evaluations for one in found)
         misfit = misfit.with_error(error, likelihood.observations.position_reference)
-    climbed = [climb(likelihood, mode, LBFGS_ITERATIONS) for mode in distinct_modes(likelihood, found)]
+    climbed = _climbed(likelihood, found)
+    while (wider := with_all_that_meet(likelihood, structure, [one.point for one in climbed])) is not None:
+        structure, widened = wider
+        climbed = _climbed(widened, _refined(likelihood, [one.point for one in climbed], widened, stages))
+        likelihood = widened
+        evaluations += sum(one.evaluations for one in climbed)
     likelihood, modes = without_idle(likelihood, distinct_modes(likelihood, climbed), clues.moving)
     converged = found[0].converged or max(climbed, key=lambda one: one.log_density).converged
     search = ModeSearch(stages.alternatives, len(attempts), not _in_doubt(attempts))
@@ -174,6 +186,11 @@ def _refined(
     found = [refine(descent, source.coordinates.carried(point, likelihood.coordinates)) for point in starts]
     found.sort(key=lambda one: -one.log_density)
     return [one for one in found if one is found[0] or one.log_density > found[0].log_density - HOPELESS]
+
+
+def _climbed(likelihood: Likelihood, found: Sequence[Refined]) -> list[Refined]:
+    """The distinct ones of some maxima on the exact log posterior."""
+    return [climb(likelihood, mode, LBFGS_ITERATIONS) for mode in distinct_modes(likelihood, found)]
 
 
 @dataclass(frozen=True)

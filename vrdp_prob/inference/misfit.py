@@ -48,9 +48,14 @@ class Misfit:
     error_duration: float | None = None
 
     @property
+    def ratio(self) -> float:
+        """Residuals in units of the noise; about 1 where the model fits."""
+        return self.residual_sd / self.noise_sd
+
+    @property
     def chi_square(self) -> float:
         """Mean squared residual in units of the squared noise; about 1 where the model fits."""
-        return (self.residual_sd / self.noise_sd) ** 2
+        return self.ratio**2
 
     @property
     def large(self) -> bool:

@@ -39,6 +39,22 @@ def distinct_modes(likelihood: Likelihood, found: Sequence[Refined]) -> tuple[Mo
     return tuple(mode for index, mode in enumerate(kept) if not index or mode.log_evidence > best - LEAST_EVIDENCE)
 
 
+def with_all_that_meet(
+    likelihood: Likelihood, structure: Structure, points: Sequence[Float[np.ndarray, "dimension"]]
+) -> tuple[Structure, Likelihood] | None:
+    """The density with the unknowns of bodies that meet others at the points and have none yet; None where none do."""
+    met = structure_at(likelihood, points, structure.moving)
+    if met.colliding <= structure.colliding and met.bouncing <= structure.bouncing:
+        return None
+    wider = replace(
+        structure, colliding=structure.colliding | met.colliding, bouncing=structure.bouncing | met.bouncing
+    )
+    coordinates = unknowns(
+        likelihood.tracks, likelihood.model, wider, likelihood.noise, model_error=likelihood.model_error
+    )
+    return wider, replace(likelihood, coordinates=coordinates)
+
+
 def without_idle(
     likelihood: Likelihood, modes: Sequence[Mode], moving: frozenset[int]
 ) -> tuple[Likelihood, tuple[Mode, ...]]:

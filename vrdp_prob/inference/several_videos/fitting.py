@@ -18,7 +18,7 @@ from vrdp_prob.inference.several_videos.agreement import first_guess, following_
 from vrdp_prob.inference.several_videos.ascent import ROUNDS, ImpossibleStartError, climb
 from vrdp_prob.inference.several_videos.joint_fit import JointFit, with_alternatives
 from vrdp_prob.inference.several_videos.linking import LinkedVideo, SharedNumbers, check_names, link
-from vrdp_prob.inference.several_videos.parts import carried_starts, plain_likelihood, stream, structure_of
+from vrdp_prob.inference.several_videos.parts import carried_starts, link_fits, stream, structure_of
 from vrdp_prob.inference.several_videos.second_look import WORSE, doubtful, look_again, trusted
 from vrdp_prob.inference.several_videos.transfer import first_numbers
 from vrdp_prob.models.effects.effect import Effect
@@ -118,10 +118,7 @@ class SharedFit:
         structures = self.structures
         if held is not None:
             structures = tuple(replace(one, held=mine) for one, mine in zip(structures, held, strict=True))
-        likelihoods = [
-            plain_likelihood(fit.clues, model, structure) for fit, structure in zip(self.fits, structures, strict=True)
-        ]
-        numbers, videos = link(likelihoods, self.shared)
+        numbers, videos = link_fits(self.fits, model, self.shared, structures)
         shared, towards = first_numbers(joint, numbers, self.vanishing(model.effects), start or {})
         locals_ = [
             video.split(old.likelihood.coordinates.carried(joint.point(index), video.likelihood.coordinates))[1]
@@ -170,10 +167,7 @@ class SharedFit:
         structures = list(self.structures)
         for index in changed:
             structures[index] = structure_of(fits[index].likelihood.coordinates)
-        likelihoods = [
-            plain_likelihood(fit.clues, self.model, structure) for fit, structure in zip(fits, structures, strict=True)
-        ]
-        numbers, videos = link(likelihoods, self.shared)
+        numbers, videos = link_fits(fits, self.model, self.shared, structures)
         locals_ = following_ones(numbers, videos, carried_starts(fits, videos), agreed)
         try:
             found = climb(numbers, videos, agreed, locals_)
@@ -254,8 +248,7 @@ def _guessed(
     fits: Sequence[MapFit], model: PhysicsModel, shared: Sequence[str] | None
 ) -> tuple[SharedNumbers, tuple[LinkedVideo, ...], tuple[Float[np.ndarray, "shared"], list[Float[np.ndarray, "_"]]]]:
     """The videos linked by what they share, and where their climb begins."""
-    likelihoods = [plain_likelihood(one.clues, model, structure_of(one.likelihood.coordinates)) for one in fits]
-    numbers, linked = link(likelihoods, shared)
+    numbers, linked = link_fits(fits, model, shared)
     return numbers, linked, first_guess(numbers, linked, carried_starts(fits, linked), trusted(fits).tolist())
 
 

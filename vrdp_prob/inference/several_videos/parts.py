@@ -1,14 +1,14 @@
 """What a video brings to a joint fit: its randomness, its density and the modes of its own fit."""
 
 import zlib
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 import numpy as np
 from jaxtyping import Float
 
 from vrdp_prob.inference.clues import Clues
 from vrdp_prob.inference.map_fit import MapFit
-from vrdp_prob.inference.several_videos.linking import LinkedVideo
+from vrdp_prob.inference.several_videos.linking import LinkedVideo, SharedNumbers, link
 from vrdp_prob.models.coordinates import Coordinates
 from vrdp_prob.models.likelihood import Likelihood
 from vrdp_prob.models.parameters import MASS, RESTITUTION
@@ -33,6 +33,33 @@ def plain_likelihood(clues: Clues, model: PhysicsModel, structure: Structure) ->
     """Density of a video without a model error."""
     tracks, family = clues.tracks, clues.noise_family
     return Likelihood(tracks, model, unknowns(tracks, model, structure, family), family)
+
+
+def link_fits(
+    fits: Sequence[MapFit],
+    model: PhysicsModel,
+    shared: Collection[str] | None,
+    structures: Sequence[Structure] | None = None,
+) -> tuple[SharedNumbers, tuple[LinkedVideo, ...]]:
+    """Videos linked by what they share, without model errors.
+
+    Parameters
+    ----------
+    fits
+        Their own fits.
+    model
+        The physics.
+    shared
+        Names of the quantities that are shared; all that have one value per video where None.
+    structures
+        Which bodies of each video have which unknowns; as in its own fit where None.
+    """
+    if structures is None:
+        structures = [structure_of(fit.likelihood.coordinates) for fit in fits]
+    likelihoods = [
+        plain_likelihood(fit.clues, model, structure) for fit, structure in zip(fits, structures, strict=True)
+    ]
+    return link(likelihoods, shared)
 
 
 def structure_of(coordinates: Coordinates) -> Structure:

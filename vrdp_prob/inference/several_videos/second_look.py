@@ -14,8 +14,7 @@ from vrdp_prob.inference.map_fit import MapFit, fit_map
 from vrdp_prob.inference.parallel import in_parallel
 from vrdp_prob.inference.plan import FitPlan
 from vrdp_prob.inference.several_videos.agreement import consensus
-from vrdp_prob.inference.several_videos.linking import link
-from vrdp_prob.inference.several_videos.parts import carried_starts, plain_likelihood, stream, structure_of
+from vrdp_prob.inference.several_videos.parts import carried_starts, link_fits, plain_likelihood, stream, structure_of
 from vrdp_prob.models.parameters import Prior, Scope
 from vrdp_prob.models.physics import PhysicsModel
 
@@ -114,14 +113,13 @@ def look_again(
 
 def _excess(fits: Sequence[MapFit]) -> np.ndarray:
     """Residuals of each video over those of the one in the middle, both in units of the noise."""
-    ratios = np.array([fit.misfit.residual_sd / fit.misfit.noise_sd for fit in fits])
+    ratios = np.array([fit.misfit.ratio for fit in fits])
     return ratios / np.median(ratios)
 
 
 def _told(fits: Sequence[MapFit], model: PhysicsModel, shared: Sequence[str] | None) -> PhysicsModel:
     """The model with what the trusted videos say of shared parameters as their prior."""
-    likelihoods = [plain_likelihood(fit.clues, model, structure_of(fit.likelihood.coordinates)) for fit in fits]
-    numbers, videos = link(likelihoods, shared)
+    numbers, videos = link_fits(fits, model, shared)
     points = [starts[0] for starts in carried_starts(fits, videos)]
     found = consensus(numbers, videos, points, trusted(fits).tolist())
     known = dict(zip(numbers.keys, zip(found.mean, found.sd, strict=True), strict=True))

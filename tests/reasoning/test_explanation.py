@@ -26,7 +26,9 @@ TRUTHS = 32
 
 
 def asked(known: KnownPosterior | PosteriorWorlds, *choices: str) -> Answer:
-    return ask(known, QUESTION, choices=choices or (OPEN,))
+    """An answer where all motion is known to follow the model, as the discs do."""
+    worlds = known if isinstance(known, PosteriorWorlds) else PosteriorWorlds(known, deviating=None)
+    return ask(worlds, QUESTION, choices=choices or (OPEN,))
 
 
 def explained(**options: object) -> Part:
@@ -40,7 +42,7 @@ def part() -> Part:
 
 
 def entropy_of(known: KnownPosterior) -> float:
-    probability = asked(PosteriorWorlds(known, draws=200)).choices[0].probability
+    probability = asked(PosteriorWorlds(known, draws=200, deviating=None)).choices[0].probability
     return entropy(np.array([probability, 1 - probability]))
 
 
@@ -132,7 +134,7 @@ def test_the_share_of_the_parameters_is_that_of_a_nested_simulation() -> None:
     """Many twins of every draw instead of one: the intraclass correlation of their answers."""
     discs = (*DISCS[:2], Disc((3.4, 0.0)))
     known = replace(posterior(mass_spread=0.03), discs=discs, tracks=tracks_of(discs, FRAMES, noise=0.01))
-    worlds = PosteriorWorlds(known, draws=200)
+    worlds = PosteriorWorlds(known, draws=200, deviating=None)
     (told,) = asked(worlds).explain().parts
     assert told.shares is not None
     kept = {Purpose.FRICTION: 1.0, Purpose.LAST_FRICTION: 1.0}
@@ -157,7 +159,7 @@ def test_where_all_that_matters_is_known_the_rest_is_motion_or_chaos() -> None:
     )
     known = KnownPosterior(tracks_of(discs, 11, noise=0.003), discs, spread=0.0)
     choice = "The yellow object collides with the purple object"
-    (told,) = ask(PosteriorWorlds(known, draws=300), QUESTION, choices=[choice]).explain().parts
+    (told,) = ask(PosteriorWorlds(known, draws=300, deviating=None), QUESTION, choices=[choice]).explain().parts
     assert told.shares is not None
     assert told.shares.parameters < 0.4
     assert told.shares.motion > 0.5

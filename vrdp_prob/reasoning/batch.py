@@ -12,17 +12,38 @@ from vrdp_prob.models.simulator.rollout import Rollout, simulate
 from vrdp_prob.models.simulator.worlds import Worlds
 from vrdp_prob.reasoning.chance import Chance, Purpose
 from vrdp_prob.reasoning.counterfactual import Counterfactual
+from vrdp_prob.reasoning.deviations import Deviation, DeviationModel, seen_deviations, turns
 from vrdp_prob.reasoning.facts import draw_attributes
 from vrdp_prob.reasoning.friction import OwnFriction, ToldFriction, apply_friction, told_friction, with_friction_ratio
 from vrdp_prob.reasoning.refit import state_at_end
+from vrdp_prob.reasoning.scales import Examples
+from vrdp_prob.reasoning.scattering import INSTANTS, Scattering, advance_scattered
 from vrdp_prob.reasoning.seen import SeenVideo
 from vrdp_prob.reasoning.sight import Sight
-from vrdp_prob.reasoning.stretch import State, advance
+from vrdp_prob.reasoning.stretch import State
 from vrdp_prob.reasoning.timeline import Timeline, WorldDraws
 from vrdp_prob.reasoning.values import Change, Label
+from vrdp_prob.reasoning.wander import Foretelling
 
 FUTURE_FRAMES = 58
 """Frames after the video that predictive questions ask about: 128 to 185 of a CLEVRER video."""
+
+FORETOLD_DRAWS = 60
+"""Draws with which flights are foretold: enough for the variance of a place."""
+
+
+@dataclass(frozen=True)
+class Horizon:
+    """The time that questions about the future ask about.
+
+    Parameters
+    ----------
+    start, stop
+        From when to when, in s; it may begin later than the tracks end.
+    """
+
+    start: float
+    stop: float
 
 
 @dataclass(frozen=True)
@@ -37,11 +58,23 @@ class Common:
         The physics.
     middle
         One world in the middle of the posterior.
+    deviating
+        How motion deviates from the model; None where it follows it exactly.
+    asked
+        The time that questions about the future ask about; `FUTURE_FRAMES` after the video where None.
     """
 
     sight: Sight
     model: PhysicsModel
     middle: Worlds
+    deviating: DeviationModel | None = None
+    asked: Horizon | None = None
+
+    @property
+    def horizon(self) -> Horizon:
+        """The time that questions about the future ask about."""
+        end = float(self.sight.tracks.times[-1])
+        return self.asked or Horizon(end, end + FUTURE_FRAMES / self.sight.tracks.frame_rate)
 
     @cached_property
     def friction(self) -> ToldFriction | None:
@@ -124,25 +157,30 @@ class Batch:
 
     @cached_property
     def future(self) -> WorldDraws:
-        """What happens after the video, at frames after its last one."""
+        """What happens after the video, up to the end of the time that is asked about."""
         seen, (worlds, model) = self.seen, self._extended
         state, log_ratio = self.end
         state = state.copy()
         if self.friction is not None:
             worlds = apply_friction(worlds, log_ratio)
         end = float(seen.tracks.times[-1])
-        times = end + np.arange(FUTURE_FRAMES + 1) / seen.tracks.frame_rate
+        horizon, rate = self.common.horizon, seen.tracks.frame_rate
+        times = end + np.arange(round((horizon.stop - end) * rate) + 1) / rate
         # in view of the last frame, bodies are held to start there; those that left are on their way since they did
         here = seen.presence[:, 1] >= len(seen.tracks.times)
         unseen = np.where(here, end - state.release[0], 0.0)
         state.position += state.velocity * unseen[:, None]
         state.release[:, here] = end
-        stretch = advance(worlds, state, times[1:], model)
+        stretch = advance_scattered(worlds, state, times, model, self.scattering)
         timeline = Timeline(seen.universe, seen.draws, seen.tracks.camera)
         timeline.met[:, seen.universe.collisions] = seen.events.happens[:, seen.universe.collisions]
         for meeting in stretch.meetings():
-            timeline.note_meeting(meeting, meeting.time > end)
-        timeline.note_crossings(stretch.times, stretch.position, stretch.exists, np.ones_like(timeline.collided))
+            timeline.note_earlier(meeting, meeting.time <= horizon.start)
+            timeline.note_meeting(meeting, meeting.time > horizon.start)
+        later = stretch.times >= horizon.start
+        timeline.note_crossings(
+            stretch.times[later], stretch.position[:, later], stretch.exists[:, later], np.ones_like(timeline.collided)
+        )
         trajectory = np.concatenate([stretch.position, stretch.angle[..., None]], axis=-1)
         return WorldDraws(
             stretch.times, trajectory, stretch.exists, timeline.table, timeline.collided, stretch.broke_off
@@ -152,7 +190,7 @@ class Batch:
         """What happens when one object (by its place) is changed from the beginning."""
         if (change, body) not in self._changed:
             counterfactual = Counterfactual(
-                self.seen, self._acting, self._extended[1], self.turning, change=change, body=body
+                self.seen, self._acting, self._extended[1], self.turning, self.scattering, change=change, body=body
             )
             self._changed[change, body] = counterfactual.run()
         return self._changed[change, body]
@@ -174,6 +212,39 @@ class Batch:
         rate = np.gradient(np.interp(times, times[known], measured[known, body]), times)
         passed = np.interp(times[frame], times[known], measured[known, body]) - measured[known[0], body]
         return turned[:, known[0]] + passed, np.full(len(self), rate[frame])
+
+    @cached_property
+    def deviations(self) -> tuple[Deviation, ...]:
+        """How the contacts that were seen deviate from the model."""
+        return seen_deviations(self.seen, self._acting, self._extended[1], self.turning)
+
+    @cached_property
+    def wandering(self) -> Examples:
+        """How flights that were seen deviate from the model; nothing for a model without dry friction."""
+        if self.friction is None:
+            return ()
+        worlds, model = self._extended
+        few = worlds.select(range(min(len(self), FORETOLD_DRAWS)))
+        normal = self.chance.numbers(Purpose.FORETOLD).standard_normal((len(worlds.shapes), len(few), 5))
+        return Foretelling(few, model, self.friction).errors(self.common.sight.seen.smoothers, normal)
+
+    @cached_property
+    def scattering(self) -> Scattering | None:
+        """How simulated motion deviates from the model; None where it does not."""
+        prior = self.common.deviating
+        if prior is None:
+            return None
+        bodies, numbers = len(self.common.sight.tracks.bodies), self.chance.numbers(Purpose.DEVIATIONS)
+        level = self.chance.numbers(Purpose.DEVIATION_SCALES).random((2, len(self)))
+        reused = self.deviations if prior.reused else ()
+        return Scattering.of(
+            reused,
+            prior.impulse.quantiles(turns(self.deviations), level[0]),
+            prior.acceleration.quantiles(self.wandering, level[1]),
+            fresh=numbers.standard_normal((len(self), bodies, bodies, 2)),
+            shaking=numbers.standard_normal((len(self), bodies, INSTANTS, 2)),
+            noise=numbers.standard_normal((len(reused), len(self), 2)),
+        )
 
     @cached_property
     def _acting(self) -> Worlds:

@@ -23,6 +23,9 @@ class Purpose(IntEnum):
     LAST_FRICTION = 9
     ORDER = 10
     EXPLANATION = 11
+    DEVIATION_SCALES = 12
+    DEVIATIONS = 13
+    FORETOLD = 14
 
 
 @runtime_checkable

@@ -20,8 +20,9 @@ from vrdp_prob.models.physics import PhysicsModel
 from vrdp_prob.models.simulator.worlds import Worlds
 from vrdp_prob.reasoning.contacts import Contact
 from vrdp_prob.reasoning.refit import Turning
+from vrdp_prob.reasoning.scattering import Scattering, advance_scattered
 from vrdp_prob.reasoning.seen import SeenVideo
-from vrdp_prob.reasoning.stretch import State, Stretch, advance
+from vrdp_prob.reasoning.stretch import State, Stretch
 from vrdp_prob.reasoning.timeline import Timeline, WorldDraws
 from vrdp_prob.reasoning.values import MASS_FACTOR, Change
 from vrdp_prob.scene import Shape
@@ -46,13 +47,24 @@ class Counterfactual:
         The physics.
     turning
         Gives angle (rad) and spin (rad/s) of a body at a time (s).
+    scattering
+        How simulated contacts deviate from the model; None where they follow it exactly.
     change, body
         What is done, to which body.
     """
 
     def __init__(
-        self, seen: SeenVideo, worlds: Worlds, model: PhysicsModel, turning: Turning, *, change: Change, body: int
+        self,
+        seen: SeenVideo,
+        worlds: Worlds,
+        model: PhysicsModel,
+        turning: Turning,
+        scattering: Scattering | None = None,
+        *,
+        change: Change,
+        body: int,
     ) -> None:
+        self._scattering = scattering
         self._seen, self._model, self._turning = seen, model, turning
         self._change, self._body = change, body
         factor = {Change.REMOVED: 1.0, Change.HEAVIER: MASS_FACTOR, Change.LIGHTER: 1 / MASS_FACTOR}[change]
@@ -142,17 +154,17 @@ class Counterfactual:
             angle, spin = self._turning(body, at)
             free = ~held[:, body]
             state.position[free, body], state.velocity[free, body] = position[free], velocity[free]
+            state.rolling[free, body] = drawn.state(np.array([at]), before=True)[1][free, 0]
             state.angle[free, body], state.spin[free, body] = angle[free], spin[free]
             state.release[free, body] = at
         return state
 
     def _nowhere(self, time: float) -> State:
-        shape = (self._seen.draws, len(self._seen.drawn))
-        present = np.ones(shape, dtype=bool)
+        state = State.nowhere((self._seen.draws, len(self._seen.drawn)), time)
+        state.present[:] = True
         if self._change is Change.REMOVED:
-            present[:, self._body] = False
-        zero = np.zeros(shape)
-        return State(np.zeros((*shape, 2)), np.zeros((*shape, 2)), zero, zero.copy(), np.full(shape, time), present)
+            state.present[:, self._body] = False
+        return state
 
     def _near_reached(self, state: State) -> Bool[np.ndarray, "draw body"]:
         apart = np.linalg.norm(state.position[:, :, None] - state.position[:, None], axis=-1)
@@ -212,15 +224,19 @@ class Counterfactual:
         """Simulate from one cut to the next and note what happens to reached bodies."""
         frames = self._seen.tracks.times
         own = np.flatnonzero((frames > begin + 1e-9) & (frames < stop - 1e-9))
-        times = np.append(frames[own], stop)
+        times = np.concatenate([[begin], frames[own], [stop]])
         active = np.flatnonzero(self._reached.any(axis=1))
-        stretch = advance(self._worlds.select(active.tolist()), state.select(active), times, self._model)
+        scattering = None if self._scattering is None else self._scattering.select(active)
+        stretch = advance_scattered(
+            self._worlds.select(active.tolist()), state.select(active), times, self._model, scattering
+        )
         self._broke_off[active] |= stretch.broke_off
         self._spread(stretch, active)
         self._record(stretch, active, own, stop)
         after = state.copy()
         after.position[active], after.velocity[active] = stretch.position[:, -1], stretch.velocity[:, -1]
         after.angle[active], after.spin[active] = stretch.angle[:, -1], stretch.spin[:, -1]
+        after.rolling[active] = stretch.velocity[:, -1]
         after.release[active] = np.maximum(after.release[active], stop)
         return after
 

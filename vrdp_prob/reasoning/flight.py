@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import torch
-from jaxtyping import Bool, Float
+from jaxtyping import Float
 
 from vrdp_prob.models.effects.body_friction import FRICTION_RATIO
 from vrdp_prob.models.physics import PhysicsModel
@@ -123,13 +123,9 @@ class Flight:
     def _linearised(self, at: Float[np.ndarray, "draw 5"]) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """Path and final state, and their derivatives by the start and the friction."""
         flat = (at + STEP * np.concatenate([np.zeros((1, 5)), np.eye(5)])[:, None, :]).reshape(-1, 5)
-        count, bodies = len(flat), len(self._worlds.shapes)
-        present: Bool[np.ndarray, "draw body"] = np.zeros((count, bodies), dtype=bool)
-        present[:, self._body] = True
-        position, velocity = np.zeros((count, bodies, 2)), np.zeros((count, bodies, 2))
-        position[:, self._body], velocity[:, self._body] = flat[:, :2], flat[:, 2:4]
-        zero = np.zeros((count, bodies))
-        state = State(position, velocity, zero, zero, np.full_like(zero, self._begin), present)
+        state = State.nowhere((len(flat), len(self._worlds.shapes)), self._begin)
+        state.position[:, self._body], state.velocity[:, self._body] = flat[:, :2], flat[:, 2:4]
+        state.rolling[:, self._body], state.present[:, self._body] = flat[:, 2:4], True
         worlds = scaled_friction(self._worlds, self._body, flat[:, 4])
         times = np.maximum(self._track.times, self._begin + 1e-9)
         stretch = advance(worlds, state, times, self._model)

@@ -16,10 +16,12 @@ from jaxtyping import Float
 from vrdp_prob.models.effects.body_friction import FRICTION_RATIO, BodyFriction
 from vrdp_prob.models.effects.dry_friction import DryFriction
 from vrdp_prob.models.physics import PhysicsModel
+from vrdp_prob.models.simulator.motion import slips
 from vrdp_prob.models.simulator.worlds import Worlds
 from vrdp_prob.reasoning.chance import Random
 from vrdp_prob.reasoning.flight import Flight, scaled_friction
 from vrdp_prob.reasoning.smoother import BodyTrack, Smoother
+from vrdp_prob.scene import Shape
 
 PRIOR_SD = 0.8
 """Standard deviation of the log friction ratio of a body before its flights are looked at."""
@@ -34,8 +36,8 @@ LONGEST_FLIGHT = 40
 SLOWEST = 0.15
 """Flights whose fastest speed in m/s is below this tell nothing."""
 
-PAUSE = 0.02
-"""Time in s after and before a contact that is left out."""
+PAUSE, SETTLING = 0.02, 0.15
+"""Time in s after and before a contact that is left out; after one of a sphere that slips before it rolls."""
 
 
 @dataclass(frozen=True)
@@ -98,7 +100,10 @@ def told_friction(smoothers: Sequence[Smoother], world: Worlds, model: PhysicsMo
     """
     mean, sd = np.zeros(len(smoothers)), np.full(len(smoothers), PRIOR_SD)
     for body, smoother in enumerate(smoothers):
-        told = [_one_flight(smoother, world, model, body, track) for track in _flights(smoother)]
+        told = [
+            _one_flight(smoother, world, model, body, track)
+            for track in flights(smoother, settling(model, world.shapes[body]))
+        ]
         weights = np.array([1 / (1 / precision + FLIGHT_SPREAD**2) for _, precision in told if precision > 0])
         values = np.array([value for value, precision in told if precision > 0])
         total = weights.sum() + PRIOR_SD**-2
@@ -113,19 +118,24 @@ def apply_friction(worlds: Worlds, log_ratio: Float[np.ndarray, "draw body"]) ->
     return worlds
 
 
-def _flights(smoother: Smoother) -> list[BodyTrack]:
-    """Parts of a track between contacts, in which the body moves."""
+def settling(model: PhysicsModel, shape: Shape) -> float:
+    """Time in s after a contact from which on a body slides, or rolls, as it then goes on to do."""
+    return SETTLING if shape is Shape.SPHERE and slips(model.effects) else PAUSE
+
+
+def flights(smoother: Smoother, pause: float) -> list[BodyTrack]:
+    """Parts of a track between contacts and a pause (s) after them in which the body moves: the last frames of each."""
     track = smoother.track
     bounds = [float(track.times[0]) - PAUSE, *smoother.kicks, float(track.times[-1]) + PAUSE]
-    flights = []
+    found = []
     for start, stop in pairwise(bounds):
-        rows = np.flatnonzero((track.times >= start + PAUSE - 1e-9) & (track.times <= stop - PAUSE + 1e-9))
+        rows = np.flatnonzero((track.times >= start + pause - 1e-9) & (track.times <= stop - PAUSE + 1e-9))
         rows = rows[-LONGEST_FLIGHT:]
         if len(rows) < SHORTEST_FLIGHT:
             continue
         if np.linalg.norm(smoother.state(track.times[rows])[1], axis=1).max() > SLOWEST:
-            flights.append(BodyTrack(track.times[rows], track.positions[rows], track.noise[rows]))
-    return flights
+            found.append(BodyTrack(track.times[rows], track.positions[rows], track.noise[rows]))
+    return found
 
 
 def _one_flight(

@@ -14,9 +14,9 @@ from vrdp_prob.models.physics import PhysicsModel
 from vrdp_prob.models.simulator.worlds import Worlds
 from vrdp_prob.reasoning.chance import Purpose
 from vrdp_prob.reasoning.flight import Flight
-from vrdp_prob.reasoning.friction import OwnFriction
+from vrdp_prob.reasoning.friction import OwnFriction, settling
 from vrdp_prob.reasoning.seen import SeenVideo
-from vrdp_prob.reasoning.smoother import BodyTrack
+from vrdp_prob.reasoning.smoother import BodyTrack, Smoother
 from vrdp_prob.reasoning.stretch import State
 from vrdp_prob.scene import Shape
 
@@ -25,9 +25,6 @@ LONGEST_WINDOW = 0.8
 
 SHORTEST_WINDOW = 5
 """Frames below which the smooth motion is taken as it is."""
-
-PAUSE = 0.02
-"""Time in s after a contact that is left out."""
 
 CHANGE_SD = {True: 1.0, False: 0.15}
 """Standard deviation by which the log friction ratio of the last flight differs from the body's own, for spheres (they
@@ -57,10 +54,8 @@ def state_at_end(
     """
     shape = (seen.draws, len(seen.drawn))
     log_ratio = np.zeros(shape) if friction is None else friction.log_ratio.copy()
-    zero = np.zeros(shape)
-    state = State(
-        np.zeros((*shape, 2)), np.zeros((*shape, 2)), zero.copy(), zero.copy(), zero.copy(), np.ones(shape, dtype=bool)
-    )
+    state = State.nowhere(shape, 0.0)
+    state.present[:] = True
     normal = np.concatenate(
         [
             seen.chance.numbers(Purpose.LAST_FRICTION).standard_normal((*shape, 1)),
@@ -77,25 +72,31 @@ def state_at_end(
         state.velocity[:, body] = np.where(still[:, None], 0.0, smooth[1])
         state.angle[:, body], state.spin[:, body] = turning(body, last)
         state.release[:, body] = last
-        window = _window(seen, body)
+        window = _window(seen.seen.smoothers[body], settling(model, worlds.shapes[body]))
         if friction is None or window is None or still.all():
             continue
         begin = float(window.times[0])
         start = np.concatenate([array[:, 0] for array in drawn.state(np.array([begin]))], axis=1)
         flight = Flight(worlds, model, body, track=window, begin=begin)
-        prior_sd = float(np.hypot(friction.sd[body], CHANGE_SD[worlds.shapes[body] is Shape.SPHERE]))
-        fitted = flight.fit(start, np.full(seen.draws, log_ratio[:, body].mean()), prior_sd, normal[:, body])
+        mean = np.full(seen.draws, log_ratio[:, body].mean())
+        fitted = flight.fit(start, mean, one_flight_sd(friction, body, worlds.shapes[body]), normal[:, body])
         moves = ~still
         state.position[moves, body], state.velocity[moves, body] = fitted.position[moves], fitted.velocity[moves]
         log_ratio[moves, body] = fitted.log_ratio[moves]
+    state.rolling[:] = state.velocity
     return state, log_ratio
 
 
-def _window(seen: SeenVideo, body: int) -> BodyTrack | None:
+def one_flight_sd(friction: OwnFriction, body: int, shape: Shape) -> float:
+    """Standard deviation of the log friction ratio of a body in one of its flights, before that is looked at."""
+    return float(np.hypot(friction.sd[body], CHANGE_SD[shape is Shape.SPHERE]))
+
+
+def _window(smoother: Smoother, pause: float) -> BodyTrack | None:
     """The part of a track after the last contact that tells where the body is going; None where it is too short."""
-    track, kicks = seen.seen.smoothers[body].track, seen.seen.smoothers[body].kicks
+    track, kicks = smoother.track, smoother.kicks
     last = float(track.times[-1])
-    begin = max([float(track.times[0]), last - LONGEST_WINDOW, *(kick + PAUSE for kick in kicks if kick < last)])
+    begin = max([float(track.times[0]), last - LONGEST_WINDOW, *(kick + pause for kick in kicks if kick < last)])
     chosen = track.times >= begin - 1e-9
     if chosen.sum() < SHORTEST_WINDOW:
         return None

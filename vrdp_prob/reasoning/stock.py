@@ -5,9 +5,10 @@ from jaxtyping import Int
 
 from vrdp_prob.inference.identifiability import BodyStatus
 from vrdp_prob.models.simulator.worlds import Worlds
-from vrdp_prob.reasoning.batch import Batch, Common, Released
+from vrdp_prob.reasoning.batch import Batch, Common, Horizon, Released
 from vrdp_prob.reasoning.chance import Chance, Purpose, Seeded
 from vrdp_prob.reasoning.defaults import Defaults, with_defaults
+from vrdp_prob.reasoning.deviations import DeviationModel
 from vrdp_prob.reasoning.posterior_like import PosteriorLike
 from vrdp_prob.reasoning.sight import Sight
 
@@ -27,12 +28,25 @@ class Stock:
         See `vrdp_prob.reasoning.defaults`.
     chance
         Where draws of what the tracks leave open come from.
+    deviating
+        How motion deviates from the model; None where it follows it exactly.
+    horizon
+        The time that questions about the future ask about; right after the video where None.
     """
 
-    def __init__(self, posterior: PosteriorLike, size: int, defaults: Defaults, chance: Chance) -> None:
+    def __init__(
+        self,
+        posterior: PosteriorLike,
+        size: int,
+        *,
+        defaults: Defaults,
+        chance: Chance,
+        deviating: DeviationModel | None = None,
+        horizon: Horizon | None = None,
+    ) -> None:
         self.posterior, self._size, self._defaults, self._chance = posterior, size, defaults, chance
         drawn = posterior.worlds(size)
-        common = Common(Sight(posterior.tracks), posterior.model, drawn.select([len(drawn) // 2]))
+        common = Common(Sight(posterior.tracks), posterior.model, drawn.select([len(drawn) // 2]), deviating, horizon)
         self._common = common
         self._batches = [self._batch(drawn, 0)]
         self._left: tuple[Worlds, Int[np.ndarray, "left"]] | None = None

@@ -16,6 +16,9 @@ from vrdp_prob.models.simulator.worlds import Worlds
 EVENT_LIMIT = 1000
 """Events of one draw in one stretch after which it is left as it is: bodies pressed together touch without end."""
 
+INSTANT = 1e-7
+"""Time in s by which states before and after a contact differ from its own."""
+
 
 @dataclass
 class State:
@@ -31,6 +34,8 @@ class State:
         Time in s from which on a body has this state and moves.
     present
         Whether it takes part.
+    rolling
+        Velocity in m/s at which it would roll by its spin, which matters for spheres in models in which they slip.
     """
 
     position: Float[np.ndarray, "draw body 2"]
@@ -39,6 +44,15 @@ class State:
     spin: Float[np.ndarray, "draw body"]
     release: Float[np.ndarray, "draw body"]
     present: Bool[np.ndarray, "draw body"]
+    rolling: Float[np.ndarray, "draw body 2"]
+
+    @classmethod
+    def nowhere(cls, shape: tuple[int, int], release: float) -> "State":
+        """Nobody present yet: bodies (draw, body) at rest at the origin, released at a time (s)."""
+        position, velocity = np.zeros((*shape, 2)), np.zeros((*shape, 2))
+        present = np.zeros(shape, dtype=bool)
+        released = np.full(shape, release)
+        return cls(position, velocity, np.zeros(shape), np.zeros(shape), released, present, velocity.copy())
 
     def copy(self) -> "State":
         """The same state in arrays of its own."""
@@ -47,6 +61,11 @@ class State:
     def select(self, draws: np.ndarray) -> "State":
         """The state in some of the draws."""
         return State(*(array[draws] for array in vars(self).values()))
+
+    def put(self, draws: np.ndarray, other: "State") -> None:
+        """Take over the state of some draws."""
+        for name, array in vars(self).items():
+            array[draws] = getattr(other, name)
 
 
 @dataclass(frozen=True)
@@ -63,6 +82,8 @@ class Meeting:
         Which bodies.
     point
         Where, in m.
+    normal
+        Unit vector from the first to the second.
     """
 
     draws: Int[np.ndarray, "contact"]
@@ -70,10 +91,26 @@ class Meeting:
     first: Int[np.ndarray, "contact"]
     second: Int[np.ndarray, "contact"]
     point: Float[np.ndarray, "contact 2"]
+    normal: Float[np.ndarray, "contact 2"]
 
     def of_draws(self, draws: Int[np.ndarray, "contact"]) -> "Meeting":
         """The same contacts under other numbers of their draws."""
         return replace(self, draws=draws)
+
+    def where(self, keep: np.ndarray) -> "Meeting":
+        """Some of the contacts."""
+        return Meeting(*(array[keep] for array in vars(self).values()))
+
+    def followed_by(self, other: "Meeting") -> "Meeting":
+        """These contacts and others, in order of draws and times; of an unbroken series of a pair the first."""
+        pairs = zip(vars(self).values(), vars(other).values(), strict=True)
+        return Meeting(*(np.concatenate(pair) for pair in pairs)).in_order()
+
+    def in_order(self) -> "Meeting":
+        """The contacts in order of draws and times; of an unbroken series of the same pair the first."""
+        order = np.lexsort((self.time, self.draws))
+        same = [np.diff(array[order], prepend=-1) == 0 for array in (self.draws, self.first, self.second)]
+        return self.where(order[~np.all(same, axis=0)])
 
 
 @dataclass(frozen=True)
@@ -107,13 +144,46 @@ class Stretch:
 
     def meetings(self) -> Iterator[Meeting]:
         """First contacts of all draws, then second contacts, and so on: every draw in order of time."""
-        contacts = self.contacts
-        rank = _rank(contacts.draws)
+        rank = _rank(self.contacts.draws)
         for number in range(int(rank.max(initial=-1)) + 1):
-            own = rank == number
-            yield Meeting(
-                contacts.draws[own], contacts.time[own], contacts.first[own], contacts.second[own], contacts.point[own]
-            )
+            yield self.contacts.where(rank == number)
+
+    def end(self, begin: State) -> State:
+        """The state at the last time, of a stretch that began in another one; spheres roll by then."""
+        last = float(self.times[-1])
+        return State(
+            self.position[:, -1].copy(),
+            self.velocity[:, -1].copy(),
+            self.angle[:, -1].copy(),
+            self.spin[:, -1].copy(),
+            np.maximum(begin.release, last),
+            begin.present.copy(),
+            self.velocity[:, -1].copy(),
+        )
+
+    def next_meeting(self, after: Float[np.ndarray, "draw"]) -> Meeting:
+        """The first contact of each draw later than a time (s) of each; of draws that have one."""
+        later = self.contacts.where(self.contacts.time > after[self.contacts.draws])
+        return later.where(_rank(later.draws) == 0)
+
+
+@dataclass(frozen=True)
+class Moments:
+    """All bodies immediately before and after a contact of each draw; spheres roll until then.
+
+    Parameters
+    ----------
+    before, after
+        The two states; bodies that are not released yet are as they will be.
+    """
+
+    before: State
+    after: State
+
+    @property
+    def kick(self) -> Float[np.ndarray, "draw body 2"]:
+        """Changes of the velocities in m/s."""
+        return self.after.velocity - self.before.velocity
 
 
 def advance(worlds: Worlds, state: State, times: Float[np.ndarray, "time"], model: PhysicsModel) -> Stretch:
@@ -130,21 +200,10 @@ def advance(worlds: Worlds, state: State, times: Float[np.ndarray, "time"], mode
     model
         The physics.
     """
-    released = replace(
-        worlds,
-        position=torch.from_numpy(np.ascontiguousarray(state.position)),
-        velocity=torch.from_numpy(np.ascontiguousarray(state.velocity)),
-        angle=torch.from_numpy(np.ascontiguousarray(state.angle)),
-        spin=torch.from_numpy(np.ascontiguousarray(state.spin)),
-        release_time=torch.from_numpy(np.ascontiguousarray(state.release)),
-        present=torch.from_numpy(np.ascontiguousarray(state.present)),
-    )
+    released = _released(worlds, state)
     with torch.no_grad():
         rollout = simulate(released, torch.from_numpy(np.ascontiguousarray(times)), model, event_limit=EVENT_LIMIT)
     events = rollout.events.of_kind(RolloutEventKind.COLLISION)
-    order = np.lexsort((events.time, events.world))
-    same = [np.diff(array[order], prepend=-1) == 0 for array in (events.world, events.first, events.second)]
-    order = order[~np.all(same, axis=0)]
     trajectory, velocity = rollout.trajectory.numpy(), rollout.velocity.numpy()
     return Stretch(
         np.asarray(times),
@@ -154,13 +213,50 @@ def advance(worlds: Worlds, state: State, times: Float[np.ndarray, "time"], mode
         velocity[..., 2],
         rollout.exists.numpy(),
         Meeting(
-            np.asarray(events.world[order], dtype=np.int64),
-            np.asarray(events.time[order], dtype=float),
-            np.asarray(events.first[order], dtype=np.int64),
-            np.asarray(events.second[order], dtype=np.int64),
-            np.asarray(events.point[order], dtype=float),
-        ),
+            np.asarray(events.world, dtype=np.int64),
+            np.asarray(events.time, dtype=float),
+            np.asarray(events.first, dtype=np.int64),
+            np.asarray(events.second, dtype=np.int64),
+            np.asarray(events.point, dtype=float),
+            np.asarray(events.normal, dtype=float),
+        ).in_order(),
         np.array([outcome not in (Outcome.OK, Outcome.OVERLAP) for outcome in rollout.outcome]),
+    )
+
+
+def around(worlds: Worlds, state: State, time: Float[np.ndarray, "draw"], model: PhysicsModel) -> Moments:
+    """The states immediately before and after a time (s) of each draw; see `advance` for the rest."""
+    times = torch.from_numpy(time[:, None] + INSTANT * np.array([-1.0, 1.0]))
+    with torch.no_grad():
+        rollout = simulate(_released(worlds, state), times, model, event_limit=EVENT_LIMIT)
+    trajectory, velocity = rollout.trajectory.numpy(), rollout.velocity.numpy()
+    release = np.maximum(state.release, time[:, None] + INSTANT)
+    before, after = (
+        State(
+            trajectory[:, side, :, :2].copy(),
+            velocity[:, side, :, :2].copy(),
+            trajectory[:, side, :, 2].copy(),
+            velocity[:, side, :, 2].copy(),
+            release.copy(),
+            state.present.copy(),
+            velocity[:, 0, :, :2].copy(),
+        )
+        for side in (0, 1)
+    )
+    return Moments(before, after)
+
+
+def _released(worlds: Worlds, state: State) -> Worlds:
+    """The worlds with bodies in given states."""
+    return replace(
+        worlds,
+        position=torch.from_numpy(np.ascontiguousarray(state.position)),
+        velocity=torch.from_numpy(np.ascontiguousarray(state.velocity)),
+        angle=torch.from_numpy(np.ascontiguousarray(state.angle)),
+        spin=torch.from_numpy(np.ascontiguousarray(state.spin)),
+        release_time=torch.from_numpy(np.ascontiguousarray(state.release)),
+        present=torch.from_numpy(np.ascontiguousarray(state.present)),
+        rolling=torch.from_numpy(np.ascontiguousarray(state.rolling)),
     )
 
 

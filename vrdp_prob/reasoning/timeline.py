@@ -65,6 +65,13 @@ class Timeline:
         self.collided[draws, second] = True
         self.note(draws, self._places[first, second], meeting.time[keep], in_view=in_view)
 
+    def note_earlier(self, meeting: Meeting, earlier: Bool[np.ndarray, "contact"]) -> None:
+        """Note contacts before the time that is asked about: their pairs have met, and that is all."""
+        draws, first, second = meeting.draws[earlier], meeting.first[earlier], meeting.second[earlier]
+        self.collided[draws, first] = True
+        self.collided[draws, second] = True
+        self.met[draws, self._places[first, second]] = True
+
     def note_crossings(
         self,
         times: Float[np.ndarray, "time"],

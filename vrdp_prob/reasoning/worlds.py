@@ -11,10 +11,11 @@ from functools import cached_property
 from vrdp_prob.errors import InputError
 from vrdp_prob.models.simulator.rollout import Rollout
 from vrdp_prob.progress import ProgressDisplay, SilentProgress
-from vrdp_prob.reasoning.batch import Batch
+from vrdp_prob.reasoning.batch import Batch, Horizon
 from vrdp_prob.reasoning.chance import Chance, Purpose, Seeded
 from vrdp_prob.reasoning.coupled import Coupled
 from vrdp_prob.reasoning.defaults import DEFAULT, Defaults
+from vrdp_prob.reasoning.deviations import DeviationModel
 from vrdp_prob.reasoning.events import EventTable
 from vrdp_prob.reasoning.facts import Motion
 from vrdp_prob.reasoning.notes import share_words
@@ -27,6 +28,9 @@ from vrdp_prob.scene import Body
 
 DRAWS = 400
 """Posterior draws that answer the questions, unless the caller says otherwise."""
+
+DEVIATING = DeviationModel()
+"""How motion deviates from the model where the caller does not say."""
 
 RELEVANT_SHARE = 0.01
 """An object counts as one that an answer depends on if it collides in this share of the draws."""
@@ -46,6 +50,10 @@ class PosteriorWorlds:
         (`prior`).
     chance
         Where draws of what the tracks leave open come from; the posterior's seed where None.
+    deviating
+        How simulated motion deviates from the model, but for what the tracks say of it; None where it does not.
+    horizon
+        The time that questions about the future ask about; the 58 frames after the video where None.
     progress
         Who follows the simulation of each world.
 
@@ -62,12 +70,15 @@ class PosteriorWorlds:
         draws: int = DRAWS,
         defaults: Defaults = "fixed",
         chance: Chance | None = None,
+        deviating: DeviationModel | None = DEVIATING,
+        horizon: Horizon | None = None,
         progress: ProgressDisplay | None = None,
     ) -> None:
         if draws < 1:
             raise InputError(f"draws is {draws}; ask for at least 1.")
         self.posterior = posterior
-        self._stock = Stock(posterior, draws, defaults, chance or Seeded(posterior.seed))
+        chance = chance or Seeded(posterior.seed)
+        self._stock = Stock(posterior, draws, defaults=defaults, chance=chance, deviating=deviating, horizon=horizon)
         self._progress = progress or SilentProgress()
         first = self._stock.batch(0)
         self._batches: tuple[Batch, ...] = () if first is None else (first,)

@@ -110,7 +110,7 @@ def _body_starts(worlds: Worlds, effects: "Sequence[Effect]") -> Float[Tensor, "
     rolling = torch.zeros_like(worlds.velocity)
     if slips(effects):
         stated = [effect.rolling_velocity(worlds.velocity, worlds.parameters) for effect in effects]
-        of_spheres = ([rolling] + [value for value in stated if value is not None])[-1]
+        of_spheres = ([rolling] + [value for value in (*stated, worlds.rolling) if value is not None])[-1]
         rolling = torch.where(_is_sphere(worlds)[:, None] > 0, of_spheres, worlds.velocity)
     parts = [worlds.position, *columns, rolling, worlds.release_time[..., None]]
     return torch.cat([part.to(torch.float64) for part in parts], dim=-1)

@@ -43,6 +43,9 @@ class Worlds:
     inertia
         Known moments of inertia about the vertical axis in kg m^2, NaN where they follow from mass and shape; None
         where none is known.
+    rolling
+        Velocity in m/s at which each sphere would roll by its spin when it is released, for models in which spheres
+        slip; None where the model's effect says it.
 
     Raises
     ------
@@ -65,6 +68,7 @@ class Worlds:
     walls: Float[Tensor, "wall 4"] = field(default_factory=lambda: torch.zeros(0, 4, dtype=torch.float64))
     wall_restitution: Float[Tensor, "world wall"] | None = None
     inertia: Float[Tensor, "world body"] | None = None
+    rolling: Float[Tensor, "world body 2"] | None = None
 
     def __post_init__(self) -> None:
         if len(self.shapes) != self.position.shape[1]:
@@ -121,6 +125,7 @@ class Worlds:
             **{name: getattr(self, name)[index] for name in _BATCHED},
             parameters={name: values[index] for name, values in self.parameters.items()},
             inertia=None if self.inertia is None else self.inertia[index],
+            rolling=None if self.rolling is None else self.rolling[index],
         )
 
 

@@ -1,0 +1,288 @@
+"""Answers about all practice scenes, what each part of the reasoning adds to them, and what bounds them.
+
+    python benchmarks/practice.py [--json FILE] [--docs docs] [--scenes 60] [--model FILE.toml] [--extended FILE.toml]
+
+Tracks of ../shared/data/clevrer_bullet. Two-fold cross-fitting: how much motion deviates from the model is learned on
+the odd scenes for the even ones, and the other way round. Fits (Laplace draws) and judgements are written to
+`--results` as they come, so that a run that was interrupted goes on; delete that folder after a change of the code.
+`--extended` names the model file of the row `extended model`, whose fits take a minute a scene; without it the row is
+left out. `--docs` writes the tables into `practice.md` there.
+"""
+
+import argparse
+import json
+import os
+import sys
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+os.environ.setdefault("OMP_NUM_THREADS", "1")
+
+import numpy as np
+import torch
+from _page import write_between
+from _released_worlds import ReleasedWorlds
+from _resumable import Result, measured
+from _true_posterior import TruePosterior
+
+from vrdp_prob.datasets import load, read_questions
+from vrdp_prob.evaluation.judgement import Judgement, Kind, judge
+from vrdp_prob.evaluation.scores import Scores, brier_gain
+from vrdp_prob.files import write_atomically
+from vrdp_prob.inference import default_model, infer
+from vrdp_prob.models.physics import PhysicsModel
+from vrdp_prob.models.simulator.rollout import compile_model
+from vrdp_prob.reasoning import AskablePosterior, PosteriorWorlds
+from vrdp_prob.reasoning.batch import FUTURE_FRAMES, Horizon
+from vrdp_prob.reasoning.deviations import DeviationModel, turns
+from vrdp_prob.reasoning.entropy import entropy
+from vrdp_prob.reasoning.facts import Facts
+from vrdp_prob.reasoning.plug_in import plug_in_worlds
+from vrdp_prob.reasoning.scales import ScalePrior
+from vrdp_prob.scene import Question, QuestionType, Tracks
+
+DATA = Path(__file__).parents[2] / "shared" / "data" / "clevrer_bullet"
+RESULTS = Path("out") / "practice"
+DRAWS = 100
+FEWER_FRAMES = (40, 80, 128)
+FULL, BEST_FIT, TRUE, EXTENDED = "everything", "best fit (VRDP's way)", "true masses and restitutions", "extended model"
+CALIBRATION = ("ECE", "95 % quantile if calibrated")
+GOALS = {
+    Kind.DESCRIPTIVE: (None, 0.97),
+    Kind.EXPLANATORY: (None, 0.95),
+    Kind.PREDICTIVE: (0.92, 0.90),
+    Kind.REMOVAL: (0.92, 0.84),
+    Kind.MASS: (0.88, 0.76),
+}
+"""Wanted accuracy per option and per question."""
+
+
+@dataclass(frozen=True)
+class Task:
+    """One scene, with how much motion deviates as the other half of the scenes has it."""
+
+    scene: int
+    model: PhysicsModel
+    extended: PhysicsModel | None
+    folder: Path
+    deviating: DeviationModel | None = None
+
+    @property
+    def video(self) -> str:
+        """Name of its video."""
+        return f"video_{self.scene:05d}"
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    options = _parser().parse_args(arguments)
+    if not DATA.is_dir():
+        print(f"no data at {DATA}: nothing measured")
+        return 0
+    model = PhysicsModel.read(options.model) if options.model else default_model()
+    extended = PhysicsModel.read(options.extended) if options.extended else None
+    for one in filter(None, (model, extended)):
+        compile_model(one)
+    tasks = {scene: Task(scene, model, extended, options.results) for scene in range(options.scenes)}
+    told = _measured(deviations, tasks, options, "deviations", "How motion deviates")
+    halves = [_learned([told[scene] for scene in tasks if scene % 2 == half]) for half in (0, 1)]
+    for half, learned in enumerate(halves):
+        print(f"learned on {('even', 'odd')[half]} scenes: {learned}")
+    tasks = {k: Task(k, model, extended, options.results, halves[1 - k % 2]) for k in tasks}
+    judged = _measured(judgements, tasks, options, "judgements", "Answers")
+    fewer = _measured(with_fewer_frames, tasks, options, "fewer", "With fewer frames")
+    rows = _rows(list(judged.values()))
+    text = "\n".join([*_tables(rows), "", *_fewer_table(list(fewer.values()))])
+    print(text)
+    if options.docs:
+        write_between(options.docs / "practice.md", text)
+    if options.json:
+        with write_atomically(options.json) as temporary:
+            temporary.write_text(json.dumps({"checks": _checks(rows)}, indent=1) + "\n", encoding="utf-8")
+    return 0
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--json", type=Path, help="file for the checks")
+    parser.add_argument("--docs", type=Path, help="folder of the documentation, whose page is written anew")
+    parser.add_argument("--scenes", type=int, default=60, help="how many of the scenes, from the first")
+    parser.add_argument("--model", type=Path, help="model file of all rows but one; the default model where not given")
+    parser.add_argument("--extended", type=Path, help="model file of the row 'extended model'")
+    parser.add_argument("--results", type=Path, default=RESULTS, help="folder of the results, which are gone on with")
+    parser.add_argument("--processes", type=int, default=os.cpu_count() or 1)
+    return parser
+
+
+def _measured(
+    work: Callable[[Task], Result], tasks: Mapping[int, Task], options: argparse.Namespace, name: str, label: str
+) -> dict[int, Result]:
+    path = options.results / f"{name}.jsonl"
+    found = measured(work, tasks, path, field="scene", label=label, processes=options.processes)
+    return dict(zip(tasks, found, strict=True))
+
+
+def posterior_of(task: Task, tracks: Tracks, name: str, model: PhysicsModel) -> AskablePosterior:
+    """The posterior of tracks, from its file where there is one."""
+    torch.set_num_threads(1)
+    path = task.folder / "posteriors" / name / f"{task.video}.nc"
+    if not path.exists():
+        path.parent.mkdir(parents=True, exist_ok=True)
+        posterior = infer(tracks, sampler="laplace", model=model, seed=0, hand_on=False)
+        with write_atomically(path) as temporary:
+            posterior.write(temporary)
+    return AskablePosterior.read(path)
+
+
+def deviations(task: Task) -> Result:
+    """What a scene says of how motion deviates from the model, and the same under the extended one."""
+    told = {}
+    for name, model in (("base", task.model), ("extended", task.extended)):
+        if model is not None:
+            posterior = posterior_of(task, load(DATA, video=task.video), name, model)
+            batch = PosteriorWorlds(posterior, draws=DRAWS).batches[0]
+            told[name] = {"impulse": turns(batch.deviations), "acceleration": list(batch.wandering)}
+    return {"scene": task.scene, **told}
+
+
+def _learned(told: Sequence[Result]) -> DeviationModel:
+    impulse, acceleration = (
+        ScalePrior.learned([one["base"][name] for one in told]) for name in ("impulse", "acceleration")
+    )
+    return DeviationModel(impulse, acceleration)
+
+
+def judgements(task: Task) -> Result:
+    """Judgements of all answers about a scene, by the name of the row."""
+    tracks = load(DATA, video=task.video)
+    asked = read_questions(DATA / "questions.json")[task.video]
+    rows = {name: [_judged(task, facts, one) for one in asked] for name, facts in _worlds(task, tracks).items()}
+    return {"scene": task.scene, "rows": rows}
+
+
+def _judged(task: Task, facts: Facts, question: Question) -> dict[str, object]:
+    return judge(task.video, facts, question).to_document()
+
+
+def _worlds(task: Task, tracks: Tracks) -> dict[str, Facts]:
+    """The worlds of a scene, with and without each part."""
+    posterior, deviating = posterior_of(task, tracks, "base", task.model), task.deviating
+    assert deviating is not None
+    worlds: dict[str, Facts] = {
+        FULL: PosteriorWorlds(posterior, draws=DRAWS, deviating=deviating),
+        BEST_FIT: plug_in_worlds(posterior),
+        "defaults from the prior": PosteriorWorlds(posterior, draws=DRAWS, deviating=deviating, defaults="prior"),
+        "no deviations": PosteriorWorlds(posterior, draws=DRAWS, deviating=None),
+        "seen deviations not reused": PosteriorWorlds(
+            posterior, draws=DRAWS, deviating=DeviationModel(deviating.impulse, deviating.acceleration, reused=False)
+        ),
+        "nothing kept: all simulated from the release": ReleasedWorlds(posterior, DRAWS),
+        TRUE: PosteriorWorlds(TruePosterior(tracks, DATA / "truth"), draws=DRAWS, deviating=deviating),
+    }
+    if task.extended is not None:
+        extended = posterior_of(task, tracks, "extended", task.extended)
+        worlds[EXTENDED] = PosteriorWorlds(extended, draws=DRAWS, deviating=deviating)
+    return worlds
+
+
+def with_fewer_frames(task: Task) -> Result:
+    """Judgements of the predictive questions where only the first frames were seen, by their number."""
+    tracks = load(DATA, video=task.video)
+    every = read_questions(DATA / "questions.json")[task.video]
+    asked = [one for one in every if one.question_type is QuestionType.PREDICTIVE]
+    end, rate = float(tracks.times[-1]), tracks.frame_rate
+    horizon, rows = Horizon(end, end + FUTURE_FRAMES / rate), {}
+    for frames in FEWER_FRAMES if asked else ():
+        shorter = tracks.until((frames - 1) / rate)
+        name = "base" if frames >= len(tracks.times) else f"frames-{frames}"
+        posterior = posterior_of(task, shorter, name, task.model)
+        worlds = PosteriorWorlds(posterior, draws=DRAWS, deviating=task.deviating, horizon=horizon)
+        rows[str(frames)] = [_judged(task, worlds, one) for one in asked]
+    return {"scene": task.scene, "rows": rows}
+
+
+def _rows(results: Sequence[Result]) -> dict[str, list[Judgement]]:
+    rows: dict[str, list[Judgement]] = {}
+    for result in results:
+        for name, made in result["rows"].items():
+            rows.setdefault(name, []).extend(Judgement.of_document(one) for one in made)
+    return rows
+
+
+def _tables(rows: Mapping[str, Sequence[Judgement]]) -> list[str]:
+    head = ("questions", "right, per question", "per option", "Brier", "lower than the best fit's by", *CALIBRATION)
+    lines = [_row(*head), _row(*["---"] * len(head))]
+    for kind in Kind:
+        ours, plain = ([one for one in rows[name] if one.kind is kind] for name in (FULL, BEST_FIT))
+        score, (gain, interval) = Scores.of(ours), brier_gain(ours, plain)
+        shares = [_with_interval(score, f"accuracy_per_{unit}") for unit in ("question", "option")]
+        lower = f"{gain:.4f} ({interval.low:.4f} to {interval.high:.4f})"
+        lines.append(_row(f"{_title(kind)} ({score.questions})", *shares, _number(score.brier), lower, *_ece(score)))
+    lines += ["", _row("right per question, Brier", *map(_title, Kind)), _row(*["---"] * (len(Kind) + 1))]
+    for name, made in rows.items():
+        scores = [Scores.of([one for one in made if one.kind is kind]) for kind in Kind]
+        lines.append(_row(name, *(f"{_percent(one.accuracy_per_question)}, {_number(one.brier)}" for one in scores)))
+    return lines
+
+
+def _fewer_table(results: Sequence[Result]) -> list[str]:
+    head = ("frames seen", "questions", "right, per question", "per option", "Brier", "entropy of an option, nats")
+    lines = [_row(*head, *CALIBRATION), _row(*["---"] * (len(head) + len(CALIBRATION)))]
+    for frames in map(str, FEWER_FRAMES):
+        made = [Judgement.of_document(one) for result in results for one in result["rows"].get(frames, ())]
+        score = Scores.of(made)
+        doubt = np.mean([entropy(np.array([p, 1 - p])) for one in made for p, _ in one.choices])
+        shares = [_percent(score.accuracy_per_question), _percent(score.accuracy_per_option)]
+        lines.append(_row(frames, str(score.questions), *shares, _number(score.brier), f"{doubt:.3f}", *_ece(score)))
+    return lines
+
+
+def _row(*cells: str) -> str:
+    return f"| {' | '.join(cells)} |"
+
+
+def _title(kind: Kind) -> str:
+    return kind.value.replace("_", ", ")
+
+
+def _with_interval(score: Scores, name: str) -> str:
+    value, interval = getattr(score, name), score.intervals.get(name)
+    if value is None or interval is None:
+        return ""
+    return f"{_percent(value)} ({_percent(interval.low)} to {_percent(interval.high)})"
+
+
+def _ece(score: Scores) -> tuple[str, str]:
+    return _number(score.ece), _number(score.ece_if_calibrated_q95)
+
+
+def _number(value: float | None) -> str:
+    return "" if value is None else f"{value:.4f}"
+
+
+def _percent(value: float | None) -> str:
+    return "" if value is None else f"{100 * value:.1f} %"
+
+
+def _checks(rows: Mapping[str, Sequence[Judgement]]) -> list[dict[str, object]]:
+    checks: list[dict[str, object]] = []
+    for kind, goals in GOALS.items():
+        ours, plain = ([one for one in rows[name] if one.kind is kind] for name in (FULL, BEST_FIT))
+        score = Scores.of(ours)
+        reached = (score.accuracy_per_option, score.accuracy_per_question)
+        for goal, unit, value in zip(goals, ("option", "question"), reached, strict=True):
+            if goal is not None:
+                checks.append(_check(f"{kind}, per {unit}", value, goal, ok=value is not None and value >= goal))
+        limit = score.ece_if_calibrated_q95 or 0.0
+        checks.append(_check(f"{kind}, calibration error", score.ece, limit, ok=(score.ece or 0.0) <= limit))
+        gain = brier_gain(ours, plain)[0]
+        checks.append(_check(f"{kind}, Brier score below the best fit's by", gain, 0.0, ok=gain > 0))
+    return checks
+
+
+def _check(name: str, value: float | None, goal: float, *, ok: bool) -> dict[str, object]:
+    return {"name": name, "value": value, "goal": goal, "ok": ok}
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -23,6 +23,7 @@ class Purpose(IntEnum):
     LAST_FRICTION = 9
     ORDER = 10
     EXPLANATION = 11
+    MEANING = 12
 
 
 @runtime_checkable

@@ -6,9 +6,9 @@ import numpy as np
 from jaxtyping import Float
 
 from vrdp_prob.reasoning.answer import monte_carlo_error
+from vrdp_prob.reasoning.changes import Change
 from vrdp_prob.reasoning.events import EventTable
 from vrdp_prob.reasoning.timeline import WorldDraws
-from vrdp_prob.reasoning.values import Change
 from vrdp_prob.reasoning.worlds import PosteriorWorlds
 from vrdp_prob.report.content import Collisions, PairShare, WorldContent, WorldKind
 from vrdp_prob.scene import Tracks

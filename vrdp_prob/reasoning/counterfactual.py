@@ -2,10 +2,10 @@
 
 Abduction, action, prediction. Until the changed object first touches another, nothing differs from what was seen; where
 its speed or its friction changes, its own course differs from its release on. From then on a body is *reached* once it
-touches, or fails to touch, one that is reached (or the changed one); a reached body is simulated from its last observed
-state, every other body keeps its observed course and its observed events. Time is cut at the observed contacts and at
-regular steps; at each cut the bodies that are not reached are put back on their observed course, so that no error of the
-model grows in them.
+touches, or fails to touch, one that is reached (or the changed one); a reached body is simulated from its last
+observed state, every other body keeps its observed course and its observed events. Time is cut at the observed contacts
+and at regular steps; at each cut the bodies that are not reached are put back on their observed course, so that no
+error of the model grows in them.
 
 At the first contact of an object that became heavier, lighter or bouncier the geometry is what it was: the observed
 velocity changes are kept and scaled as the impulse of the pair scales, which carries over the part of the contact that

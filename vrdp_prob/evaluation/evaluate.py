@@ -20,7 +20,7 @@ from vrdp_prob.datasets import (
 )
 from vrdp_prob.datasets.loading import CameraChoice
 from vrdp_prob.errors import InputError
-from vrdp_prob.evaluation.judgement import Judgement, Kind, is_answered
+from vrdp_prob.evaluation.judgement import Judgement, Kind
 from vrdp_prob.evaluation.one_scene import BEST_FIT, POSTERIOR, VARIANTS, SceneResult, Settings, Task, evaluate_scene
 from vrdp_prob.evaluation.scores import Interval, Scores, brier_gain
 from vrdp_prob.evaluation.workers import cluster, local_workers
@@ -179,7 +179,7 @@ def _asked(path: Path, scenes: tuple[int, int] | None) -> dict[str, list[Questio
     """Questions with answers of the scenes that are wanted, understood before any work."""
     index = scene_indices(path)
     asked = {
-        name: [question for question in several if is_answered(question)]
+        name: [question for question in several if question.is_answered]
         for name, several in read_questions(path).items()
         if scenes is None or scenes[0] <= index[name] < scenes[1]
     }

@@ -10,9 +10,8 @@ from vrdp_prob.reasoning import Answer, ask
 from vrdp_prob.reasoning.facts import Facts
 from vrdp_prob.reasoning.prepared import prepare
 from vrdp_prob.scene import Question, QuestionType
+from vrdp_prob.scene.question import RIGHT
 
-RIGHT_CHOICE = "correct"
-"""Judgement of a choice in CLEVRER's files."""
 MASS_TOKENS = {"counterfact_heavier", "counterfact_lighter", "apply_heavier", "apply_lighter"}
 
 
@@ -85,13 +84,6 @@ class Judgement:
         return cls(**{**document, "kind": Kind(document["kind"]), "choices": choices})
 
 
-def is_answered(question: Question) -> bool:
-    """Whether the question file holds the right answer."""
-    if question.choices:
-        return all(choice.answer is not None for choice in question.choices)
-    return question.answer is not None
-
-
 def judge(scene: str, facts: Facts, question: Question) -> Judgement:
     """Ask a question and compare the answer with the truth."""
     try:
@@ -102,7 +94,7 @@ def judge(scene: str, facts: Facts, question: Question) -> Judgement:
     given = _key(answer)
     probability = answer.distribution.get(truth, 0.0)
     squares = sum(share**2 for share in answer.distribution.values())
-    rights = [choice.answer == RIGHT_CHOICE for choice in question.choices]
+    rights = [choice.answer == RIGHT for choice in question.choices]
     return Judgement(
         scene=scene,
         question_id=str(question.question_id),
@@ -131,7 +123,7 @@ def unanswered(scene: str, question: Question, reason: str) -> Judgement:
         confidence=0.0,
         probability=0.0,
         squared_error=1.0,
-        choices=tuple((0.5, choice.answer == RIGHT_CHOICE) for choice in question.choices),
+        choices=tuple((0.5, choice.answer == RIGHT) for choice in question.choices),
         refused=reason,
     )
 
@@ -156,7 +148,7 @@ def kind_of(question: Question) -> Kind:
 def _truth(question: Question) -> str:
     if not question.choices:
         return str(question.answer)
-    return ",".join(str(choice.choice_id) for choice in question.choices if choice.answer == RIGHT_CHOICE)
+    return ",".join(str(choice.choice_id) for choice in question.choices if choice.answer == RIGHT)
 
 
 def _key(answer: Answer) -> str:

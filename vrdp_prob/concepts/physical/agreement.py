@@ -62,7 +62,7 @@ def agreements_of(
     *,
     draws: int,
     seed: int,
-    advance: Callable[[float], None],
+    advance: Callable[[float], None] | None = None,
 ) -> tuple[Agreement, ...]:
     """How far every meaning of a word agrees with the answers to questions about one video.
 
@@ -93,7 +93,8 @@ def agreements_of(
     for shift in MEANINGS:
         for place, question in enumerate(questions):
             counted[place].append(_counts(worlds, question, _change(word, shift)))
-        advance(1)
+        if advance is not None:
+            advance(1)
     return tuple(Agreement(np.stack(counts)) for counts in counted)
 
 

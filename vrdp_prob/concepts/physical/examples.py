@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from vrdp_prob.errors import InputError
 from vrdp_prob.reasoning.change_operations import APPLY, COUNTERFACT
 from vrdp_prob.reasoning.changes import Change
+from vrdp_prob.reasoning.language.words import split
 from vrdp_prob.reasoning.posterior_like import PosteriorLike
 from vrdp_prob.reasoning.prepared import PreparedQuestion, prepare
 from vrdp_prob.reasoning.vocabulary import Vocabulary
@@ -80,7 +81,20 @@ def prepared(question: Question, change: Change) -> PreparedQuestion:
     return asked
 
 
+def mentions(question: Question, word: str) -> bool:
+    """Whether a question, or one of its choices, has a word among its words or in its programs, understood or not."""
+    parts: tuple[Question | Choice, ...] = (question, *question.choices)
+    tokens = {token for part in parts for token in part.program or ()}
+    spoken = {spoken for part in parts if part.program is None for spoken in split(part.text)}
+    return word in spoken or bool(_tokens(word) & tokens)
+
+
 def uses(asked: PreparedQuestion, word: str) -> bool:
     """Whether a question, or one of its choices, uses a word for a change."""
     programs = [program for _, program in asked.options] + ([] if asked.program is None else [asked.program])
-    return any({f"{APPLY}{word}", f"{COUNTERFACT}{word}"} & set(program.tokens) for program in programs)
+    return any(_tokens(word) & set(program.tokens) for program in programs)
+
+
+def _tokens(word: str) -> set[str]:
+    """The tokens that a word makes."""
+    return {f"{APPLY}{word}", f"{COUNTERFACT}{word}"}

@@ -52,6 +52,7 @@ def build(
     """
     tracks = posterior.tracks
     asked = tuple(AnswerContent.of(answer, world_of(answer, tracks.bodies)) for answer in answers)
+    led_to = {item.world for item in asked if item.world is not None}
     few = PosteriorWorlds(posterior, draws=draws, progress=progress)
     return ReportContent(
         tracks=tracks,
@@ -61,9 +62,7 @@ def build(
         convergence=posterior.convergence,
         warnings=posterior.warnings,
         answers=asked,
-        worlds=player_worlds(
-            few, asked={item.world for item in asked if item.world is not None}, many=worlds, words=words
-        ),
+        worlds=player_worlds(few, asked=led_to, many=worlds, words=words),
         model=posterior.model.name,
         effects=tuple(effect.name for effect in posterior.model.effects),
         seed=posterior.seed,

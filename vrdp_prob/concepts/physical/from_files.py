@@ -96,7 +96,7 @@ def learn_from_files(
     check_draws(draws)
     settings = Settings(name, model or default_model(), sampler, draws, seed)
     asked = _asked(name, Path(questions), scenes)
-    lessons = _lessons(Path(folder), asked, camera, settings)
+    lessons = _lessons(Path(folder), asked, camera, settings, progress)
     kept = None if checkpoint is None else Checkpoint(checkpoint, _facts(Path(folder), Path(questions), settings))
     found = {lesson.tracks.video: known for lesson in lessons if (known := _kept(kept, lesson)) is not None}
     waiting = [lesson for lesson in lessons if lesson.tracks.video not in found]
@@ -111,8 +111,8 @@ def learn_from_files(
                 if kept is not None:
                     kept.keep(video, {str(place): one.draws for place, one in enumerate(agreements)})
                 advance(1)
-    agreements = [one for lesson in lessons for one in found[lesson.tracks.video]]
-    return word_of(name, agreements, videos=len(lessons), draws=draws, seed=seed)
+    every = [one for lesson in lessons for one in found[lesson.tracks.video]]
+    return word_of(name, every, videos=len(lessons), draws=draws, seed=seed)
 
 
 def _asked(name: str, path: Path, scenes: tuple[int, int] | None) -> dict[str, tuple[Question, ...]]:
@@ -125,9 +125,7 @@ def _asked(name: str, path: Path, scenes: tuple[int, int] | None) -> dict[str, t
     }
     if not any(asked.values()):
         where = "" if scenes is None else f" about scenes {scenes[0]} to {scenes[1] - 1}"
-        raise InputError(
-            f"{path}: no question{where} uses the word '{name}'; check its spelling, or give other scenes."
-        )
+        raise InputError(f"{path}: no question{where} uses the word '{name}'; check its spelling, or the scenes.")
     for video, several in asked.items():
         for question in several:
             try:
@@ -138,7 +136,11 @@ def _asked(name: str, path: Path, scenes: tuple[int, int] | None) -> dict[str, t
 
 
 def _lessons(
-    folder: Path, asked: dict[str, tuple[Question, ...]], camera: CameraChoice, settings: Settings
+    folder: Path,
+    asked: dict[str, tuple[Question, ...]],
+    camera: CameraChoice,
+    settings: Settings,
+    progress: ProgressDisplay | None,
 ) -> list[Lesson]:
     there = set(video_names(folder))
     names = [video for video in asked if video in there]
@@ -146,7 +148,8 @@ def _lessons(
         raise InputError(
             f"{folder}: none of the videos that the questions with '{settings.word}' are about is in the folder."
         )
-    return [Lesson(one, asked[one.video], settings) for one in load_all(folder, videos=names, camera=camera)]
+    videos = load_all(folder, videos=names, camera=camera, progress=progress)
+    return [Lesson(one, asked[one.video], settings) for one in videos]
 
 
 def _taught(lesson: Lesson) -> tuple[str, tuple[Agreement, ...]]:

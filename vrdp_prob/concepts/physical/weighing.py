@@ -9,6 +9,7 @@ by Gauss-Jacobi quadrature, which is exact here up to 127 answers.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 from jaxtyping import Float
@@ -87,6 +88,7 @@ def _log_likelihood(
     return np.log(share @ of_draw)
 
 
+@cache
 def _lapse_quadrature() -> tuple[Float[np.ndarray, "lapse"], Float[np.ndarray, "lapse"]]:
     """Nodes of the lapse, and their prior probabilities."""
     alpha, beta = LAPSE_PRIOR

@@ -1,13 +1,14 @@
 """Words learned from questions and answers, and asked with: heavier, lighter, and a word that changes nothing.
 
-    python benchmarks/new_words.py [--json FILE] [--docs docs] [--teach 25] [--scenes 60] [--results DIR]
+    python benchmarks/new_words.py [--json FILE] [--docs docs] [--teach 26] [--scenes 60] [--results DIR]
 
 The questions are those of ../shared/data/clevrer_bullet about heavier and lighter objects, one of each per video. The
-words are learned as if they were unknown from the first videos (`--teach`), and the questions about the other videos
-are answered with the learned word and with the built-in one. The word that changes nothing comes from the questions
-about heavier objects with the answers of the unchanged video. Each video's posterior and results are written to
-`--results` as they come, so that a run that was interrupted goes on; those of another version of the code are to be
-deleted by hand. `--docs` writes the table into `new-words.md` there and the figure beside it (needs matplotlib).
+words are learned as if they were unknown from the first videos (`--teach`; one that has no posterior is left out), and
+the questions about the other videos are answered with the learned word and with the built-in one. The word that changes
+nothing comes from the questions about heavier objects with the answers of the unchanged video. Each video's posterior
+and results are written to `--results` as they come, so that a run that was interrupted goes on; those of another
+version of the code are to be deleted by hand. `--docs` writes the table into `new-words.md` there and the figure beside
+it (needs matplotlib).
 Without the data nothing is measured.
 """
 
@@ -62,6 +63,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             label="Teaching",
             processes=options.processes,
         )
+        taught = [one for one in taught if "failed" not in one]
         words = {word: {count: learned(word, taught[:count]) for count in counts(taught)} for word in BUILT_IN}
         asked = measured(
             ask,
@@ -71,6 +73,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             label="Asking",
             processes=options.processes,
         )
+        asked = [one for one in asked if "failed" not in one]
     else:
         print(f"no data at {DATA}: nothing measured")
     first = {word: [learned(word, taught[:count]) for count in counts(taught)] for word in (*BUILT_IN, UNCHANGED)}
@@ -88,7 +91,7 @@ def _options(arguments: Sequence[str] | None) -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--json", type=Path, help="file for the checks")
     parser.add_argument("--docs", type=Path, help="folder of the documentation, whose page and figure are written anew")
-    parser.add_argument("--teach", type=int, default=25, help="videos that the words are learned from")
+    parser.add_argument("--teach", type=int, default=26, help="videos that the words are learned from")
     parser.add_argument("--scenes", type=int, default=60, help="all videos; those that teach not are asked about")
     parser.add_argument("--results", type=Path, default=RESULTS, help="folder of the results, which are gone on with")
     parser.add_argument("--processes", type=int, default=os.cpu_count() or 1)
@@ -104,7 +107,10 @@ def teach(task: tuple[int, Path]) -> Result:
     """How far every meaning agrees with the answers about one video, word by word."""
     scene, folder = task
     torch.set_num_threads(1)
-    posterior, found = posterior_of(scene, folder), {}
+    try:
+        posterior, found = posterior_of(scene, folder), {}
+    except Exception as error:  # one video must not take the others with it; the reason stands in the results
+        return {"scene": scene, "failed": f"{type(error).__name__}: {error}"}
     for word in BUILT_IN:
         (question,) = questions_with(word, scene)
         several = [question, answers_of_the_video(question, scene)] if word == "heavier" else [question]
@@ -117,7 +123,10 @@ def ask(task: tuple[int, Path, Mapping[str, Mapping[int, LearnedWord]]]) -> Resu
     """Probability and truth of every choice about one video, with the built-in words and with the learned ones."""
     scene, folder, words = task
     torch.set_num_threads(1)
-    worlds = PosteriorWorlds(posterior_of(scene, folder))
+    try:
+        worlds = PosteriorWorlds(posterior_of(scene, folder))
+    except Exception as error:  # likewise
+        return {"scene": scene, "failed": f"{type(error).__name__}: {error}"}
     answers = {}
     for word, by_count in words.items():
         (question,) = questions_with(word, scene)

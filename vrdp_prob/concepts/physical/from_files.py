@@ -1,5 +1,6 @@
 """A word learned from a folder of videos and a question file; broken off, it can go on."""
 
+from collections.abc import Sequence
 from concurrent.futures import as_completed
 from dataclasses import dataclass
 from hashlib import sha256
@@ -88,8 +89,8 @@ def learn_from_files(
     Raises
     ------
     InputError
-        If an input cannot be used, the word is in no answered question, none of these is about a video of the folder,
-        a question cannot be asked of its video, or `checkpoint` holds what belongs to another call.
+        If an input cannot be used, the word is in no question, one of these has no answer, none is about a video of
+        the folder, no video can be used, or `checkpoint` holds what belongs to another call.
     """
     check_name(name)
     check_options(sampler=sampler)
@@ -98,7 +99,8 @@ def learn_from_files(
     asked = _asked(name, Path(questions), scenes)
     lessons = _lessons(Path(folder), asked, camera, settings, progress)
     kept = None if checkpoint is None else Checkpoint(checkpoint, _facts(Path(folder), Path(questions), settings))
-    found = {lesson.tracks.video: known for lesson in lessons if (known := _kept(kept, lesson)) is not None}
+    found: dict[str, tuple[Agreement, ...] | str] = {}
+    found |= {lesson.tracks.video: known for lesson in lessons if (known := _kept(kept, lesson)) is not None}
     waiting = [lesson for lesson in lessons if lesson.tracks.video not in found]
     if waiting:
         compile_model(settings.model)
@@ -106,13 +108,28 @@ def learn_from_files(
         advance(len(found))
         with local_workers(min(processes or len(waiting), max(len(waiting), 1))) as workers:
             for future in as_completed([workers.submit(_taught, lesson) for lesson in waiting]):
-                video, agreements = future.result()
-                found[video] = agreements
-                if kept is not None:
-                    kept.keep(video, {str(place): one.draws for place, one in enumerate(agreements)})
+                video, told = future.result()
+                found[video] = told
+                if kept is not None and not isinstance(told, str):
+                    kept.keep(video, {str(place): one.draws for place, one in enumerate(told)})
                 advance(1)
-    every = [one for lesson in lessons for one in found[lesson.tracks.video]]
-    return word_of(name, every, videos=len(lessons), draws=draws, seed=seed)
+    return _word(settings, [found[lesson.tracks.video] for lesson in lessons])
+
+
+def _word(settings: Settings, told: Sequence[tuple[Agreement, ...] | str]) -> LearnedWord:
+    """The word that the usable videos teach."""
+    usable = [agreements for agreements in told if not isinstance(agreements, str)]
+    left_out = tuple(reason for reason in told if isinstance(reason, str))
+    if not usable:
+        raise InputError(left_out[0])
+    return word_of(
+        settings.word,
+        [one for agreements in usable for one in agreements],
+        videos=len(usable),
+        draws=settings.draws,
+        seed=settings.seed,
+        left_out=left_out,
+    )
 
 
 def _asked(name: str, path: Path, scenes: tuple[int, int] | None) -> dict[str, tuple[Question, ...]]:
@@ -152,15 +169,24 @@ def _lessons(
     return [Lesson(one, asked[one.video], settings) for one in videos]
 
 
-def _taught(lesson: Lesson) -> tuple[str, tuple[Agreement, ...]]:
-    """What one video says; it runs in a process of its own."""
+def _taught(lesson: Lesson) -> tuple[str, tuple[Agreement, ...] | str]:
+    """What one video says, or why it says nothing; it runs in a process of its own."""
     torch.set_num_threads(1)
+    video = lesson.tracks.video
+    try:
+        return video, _agreements(lesson)
+    except InputError as error:
+        reason = str(error)
+    except Exception as error:  # one video must not take the others with it; the reason is told
+        reason = f"internal error, please report it: {type(error).__name__}: {error}"
+    return video, f"{video} was left out: {reason.removesuffix('.')}."
+
+
+def _agreements(lesson: Lesson) -> tuple[Agreement, ...]:
     settings = lesson.settings
     # the fast way does not hand on here: many videos would take hours
     posterior = infer(lesson.tracks, sampler=settings.sampler, model=settings.model, seed=settings.seed, hand_on=False)
-    return lesson.tracks.video, agreements_of(
-        settings.word, posterior, lesson.questions, draws=settings.draws, seed=settings.seed
-    )
+    return agreements_of(settings.word, posterior, lesson.questions, draws=settings.draws, seed=settings.seed)
 
 
 def _facts(folder: Path, questions: Path, settings: Settings) -> dict[str, str]:

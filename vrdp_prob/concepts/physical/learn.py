@@ -75,7 +75,9 @@ def learn_concept(
     return word_of(name, found, videos=len(videos), draws=draws, seed=seed)
 
 
-def word_of(name: str, agreements: Sequence[Agreement], *, videos: int, draws: int, seed: int) -> LearnedWord:
+def word_of(
+    name: str, agreements: Sequence[Agreement], *, videos: int, draws: int, seed: int, left_out: tuple[str, ...] = ()
+) -> LearnedWord:
     """The word that its examples make.
 
     Parameters
@@ -84,24 +86,24 @@ def word_of(name: str, agreements: Sequence[Agreement], *, videos: int, draws: i
         The word.
     agreements
         How far every meaning agrees with each example.
-    videos, draws, seed
+    videos, draws, seed, left_out
         How they were made; see `Evidence`.
     """
     everything = weigh(agreements)
-    left_out = [weigh(agreements, without=group) for group in range(GROUPS)]
+    without_group = [weigh(agreements, without=group) for group in range(GROUPS)]
     below = np.cumsum(everything.lapse_probability)
     low, high = (float(np.interp(level, below, everything.lapse)) for level in (0.05, 0.95))
     return LearnedWord(
         name,
-        tuple(_belief(one, everything, left_out) for one in (None, *HYPOTHESES)),
+        tuple(_belief(one, everything, without_group) for one in (None, *HYPOTHESES)),
         Interval(
             float(everything.lapse @ everything.lapse_probability),
             low,
             high,
         ),
         everything.log_gain,
-        jackknife_error([one.log_gain for one in left_out]),
-        Evidence(videos, len(agreements), sum(one.answers for one in agreements), draws, seed),
+        jackknife_error([one.log_gain for one in without_group]),
+        Evidence(videos, len(agreements), sum(one.answers for one in agreements), draws, seed, left_out),
     )
 
 
@@ -111,11 +113,11 @@ def check_draws(draws: int) -> None:
         raise InputError(f"draws is {draws}; a word is learned from at least {GROUPS} posterior draws of each video.")
 
 
-def _belief(hypothesis: Hypothesis | None, everything: Weighing, left_out: Sequence[Weighing]) -> Belief:
+def _belief(hypothesis: Hypothesis | None, everything: Weighing, without_group: Sequence[Weighing]) -> Belief:
     places = slice(0, 1) if hypothesis is None else places_of(hypothesis)
     own = everything.probability[places]
     probability = float(own.sum())
-    error = jackknife_error([float(one.probability[places].sum()) for one in left_out])
+    error = jackknife_error([float(one.probability[places].sum()) for one in without_group])
     prior = np.ones(1) if hypothesis is None else hypothesis.prior
     log_evidence = float(np.logaddexp.reduce(everything.log_evidence[places] + np.log(prior)))
     if hypothesis is None:

@@ -31,6 +31,8 @@ class Evidence:
         How many: an example with choices has as many answers as choices.
     draws, seed
         Posterior draws per video, and the seed of what the tracks leave open.
+    left_out
+        Videos that could not be used, each with the reason in a sentence.
     """
 
     videos: int
@@ -38,6 +40,7 @@ class Evidence:
     answers: int
     draws: int
     seed: int
+    left_out: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,7 @@ def summary(word: LearnedWord) -> tuple[str, ...]:
     if word.contradicts_itself:
         return (_contradiction(word),)
     told = _meaning(word.best, word.name) if _informed(word) else f"The answers do not tell what '{word.name}' means."
-    return (told, *_rivals(word), _lapse(word))
+    return (told, *_rivals(word), _lapse(word), *word.evidence.left_out)
 
 
 def _contradiction(word: LearnedWord) -> str:

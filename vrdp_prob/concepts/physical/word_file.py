@@ -2,9 +2,9 @@
 
 import json
 from collections.abc import Mapping
-from dataclasses import asdict, fields
+from dataclasses import asdict
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 
@@ -20,8 +20,6 @@ FORMAT, VERSION = "vrdp-prob word", 1
 
 TOLERANCE = 1e-6
 """By how much probabilities may miss 1 in a file that was written with rounded numbers."""
-
-Part = TypeVar("Part", Evidence, Interval)
 
 
 def write_word(word: LearnedWord, path: Path) -> None:
@@ -72,10 +70,10 @@ def _word(document: Mapping[str, Any]) -> LearnedWord:
     return LearnedWord(
         str(document["name"]),
         tuple(_belief(one) for one in document["beliefs"]),
-        _part(Interval, document["lapse"]),
+        Interval(**{name: float(value) for name, value in document["lapse"].items()}),
         float(document["log_gain"]),
         float(document["log_gain_error"]),
-        _part(Evidence, document["evidence"]),
+        Evidence(**{**document["evidence"], "left_out": tuple(document["evidence"]["left_out"])}),
     )
 
 
@@ -90,10 +88,6 @@ def _belief(entry: Mapping[str, Any]) -> Belief:
             "weights": tuple(float(weight) for weight in entry["weights"]),
         }
     )
-
-
-def _part(kind: type[Part], entry: Mapping[str, Any]) -> Part:
-    return kind(**{field.name: entry[field.name] + 0 for field in fields(kind)})
 
 
 def _check_sums(word: LearnedWord) -> None:

@@ -40,9 +40,14 @@ class Belief:
     weights: tuple[float, ...] = ()
 
     @property
+    def subject(self) -> str:
+        """What the word changes: a parameter, or `nothing`."""
+        return "nothing" if self.parameter is None else str(self.parameter)
+
+    @property
     def name(self) -> str:
         """For example `mass factor`; `nothing` where it changes nothing."""
-        return "nothing" if self.parameter is None else f"{self.parameter} {self.rule}"
+        return self.subject if self.rule is None else f"{self.subject} {self.rule}"
 
     @property
     def unit(self) -> str:

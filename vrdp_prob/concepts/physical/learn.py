@@ -17,7 +17,7 @@ from vrdp_prob.reasoning.changes import Change, Meaning
 from vrdp_prob.reasoning.posterior_like import PosteriorLike
 from vrdp_prob.scene import Question
 
-DRAWS = 100
+DRAWS = 200
 """Posterior draws of each video, unless the caller says otherwise."""
 
 
@@ -93,18 +93,25 @@ def word_of(
     without_group = [weigh(agreements, without=group) for group in range(GROUPS)]
     below = np.cumsum(everything.lapse_probability)
     low, high = (float(np.interp(level, below, everything.lapse)) for level in (0.05, 0.95))
+    beliefs = tuple(_belief(one, everything, without_group) for one in (None, *HYPOTHESES))
     return LearnedWord(
         name,
-        tuple(_belief(one, everything, without_group) for one in (None, *HYPOTHESES)),
-        Interval(
-            float(everything.lapse @ everything.lapse_probability),
-            low,
-            high,
-        ),
+        beliefs,
+        _errors(without_group),
+        Interval(float(everything.lapse @ everything.lapse_probability), low, high),
         everything.log_gain,
         jackknife_error([one.log_gain for one in without_group]),
         Evidence(videos, len(agreements), sum(one.answers for one in agreements), draws, seed, left_out),
     )
+
+
+def _errors(without_group: Sequence[Weighing]) -> dict[str, float]:
+    """Monte Carlo standard errors of the probability of each parameter, and of no change."""
+    subjects = np.array(["nothing" if shift is None else str(shift.parameter) for shift in MEANINGS])
+    return {
+        subject: jackknife_error([float(one.probability[subjects == subject].sum()) for one in without_group])
+        for subject in dict.fromkeys(subjects.tolist())
+    }
 
 
 def check_draws(draws: int) -> None:

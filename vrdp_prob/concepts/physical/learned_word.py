@@ -53,6 +53,8 @@ class LearnedWord:
         The word.
     beliefs
         Every hypothesis with its probability; the first one is that the word changes nothing.
+    mc_errors
+        Monte Carlo standard errors of `probabilities`.
     lapse
         Share of answers that no meaning explains better than guessing.
     log_gain, log_gain_error
@@ -64,6 +66,7 @@ class LearnedWord:
 
     name: str
     beliefs: tuple[Belief, ...]
+    mc_errors: Mapping[str, float]
     lapse: Interval
     log_gain: float
     log_gain_error: float
@@ -81,14 +84,19 @@ class LearnedWord:
         """Posterior probability of what the word changes: of each parameter, and of `nothing`."""
         found: dict[str, float] = {}
         for belief in self.beliefs:
-            name = "nothing" if belief.parameter is None else str(belief.parameter)
-            found[name] = found.get(name, 0.0) + belief.probability
+            found[belief.subject] = found.get(belief.subject, 0.0) + belief.probability
         return found
 
     @property
+    def subject(self) -> str:
+        """What the word most probably changes: a parameter, or `nothing`."""
+        return max(self.probabilities.items(), key=lambda entry: entry[1])[0]
+
+    @property
     def best(self) -> Belief:
-        """The most probable hypothesis."""
-        return max(self.beliefs, key=lambda belief: belief.probability)
+        """The most probable hypothesis about what the word most probably changes."""
+        about_it = [belief for belief in self.beliefs if belief.subject == self.subject]
+        return max(about_it, key=lambda belief: belief.probability)
 
     @property
     def contradicts_itself(self) -> bool:

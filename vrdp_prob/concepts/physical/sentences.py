@@ -15,8 +15,9 @@ def summary(word: LearnedWord) -> tuple[str, ...]:
     """What a word means, how sure that is, and what the answers are worth."""
     if word.contradicts_itself:
         return (_contradiction(word),)
-    told = _meaning(word.best, word.name) if _informed(word) else f"The answers do not tell what '{word.name}' means."
-    return (told, *_rivals(word), _lapse(word), *word.evidence.left_out)
+    if not _informed(word):
+        return (f"The answers do not tell what '{word.name}' means.", _lapse(word), *word.evidence.left_out)
+    return (_meaning(word), *_rivals(word), _lapse(word), *word.evidence.left_out)
 
 
 def _contradiction(word: LearnedWord) -> str:
@@ -31,17 +32,19 @@ def _informed(word: LearnedWord) -> bool:
     return max(evidences) - min(evidences) > ALIKE
 
 
-def _meaning(belief: Belief, name: str) -> str:
-    error = f"probability {belief.probability:.3f} ± {belief.mc_error:.3f}"
-    if belief.parameter is None:
-        return f"'{name}' changes nothing ({error})."
-    low, high = belief.interval()
-    middle, unit = belief.quantile(0.5), f" {belief.unit}" if belief.unit else ""
+def _meaning(word: LearnedWord) -> str:
+    probability, error = word.probabilities[word.subject], word.mc_errors[word.subject]
+    surely = "" if probability >= SETTLED else "most probably "
+    changes = "nothing" if word.best.parameter is None else f"the {word.subject}{_amount(word.best)}"
+    return f"'{word.name}' {surely}changes {changes} (probability {probability:.3f} ± {error:.3f})."
+
+
+def _amount(belief: Belief) -> str:
+    (low, high), middle = belief.interval(), belief.quantile(0.5)
     if belief.rule is Rule.FACTOR:
-        does = f"multiplies the {belief.parameter} by {middle:.2f}{unit}"
-        return f"'{name}' {does} (90 % interval {low:.2f} to {high:.2f}; {error})."
-    does = f"adds {middle:+.2f}{unit} to the {belief.parameter}"
-    return f"'{name}' {does} (90 % interval {low:+.2f} to {high:+.2f}; {error})."
+        return f": times {middle:.2f}, 90 % interval {low:.2f} to {high:.2f}"
+    unit = f" {belief.unit}" if belief.unit else ""
+    return f": by {middle:+.2f}{unit}, 90 % interval {low:+.2f} to {high:+.2f}"
 
 
 def _rivals(word: LearnedWord) -> tuple[str, ...]:
@@ -49,7 +52,7 @@ def _rivals(word: LearnedWord) -> tuple[str, ...]:
     ranked = sorted(word.probabilities.items(), key=lambda entry: -entry[1])
     if ranked[0][1] >= SETTLED:
         return ()
-    return ("What it changes is not settled: " + ", ".join(f"{name} {share:.2f}" for name, share in ranked) + ".",)
+    return ("That is not settled: " + ", ".join(f"{name} {share:.2f}" for name, share in ranked) + ".",)
 
 
 def _lapse(word: LearnedWord) -> str:

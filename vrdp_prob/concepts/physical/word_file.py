@@ -18,6 +18,10 @@ from vrdp_prob.reasoning.changes import PhysicalParameter, Rule
 
 FORMAT, VERSION = "vrdp-prob word", 1
 
+FIELDS = frozenset(
+    "format version name summary beliefs mc_errors lapse log_gain log_gain_error evidence".split()  # noqa: SIM905
+)
+
 TOLERANCE = 1e-6
 """By how much probabilities may miss 1 in a file that was written with rounded numbers."""
 
@@ -30,6 +34,7 @@ def write_word(word: LearnedWord, path: Path) -> None:
         "name": word.name,
         "summary": list(word.summary),
         "beliefs": [asdict(belief) for belief in word.beliefs],
+        "mc_errors": dict(word.mc_errors),
         "lapse": asdict(word.lapse),
         "log_gain": word.log_gain,
         "log_gain_error": word.log_gain_error,
@@ -64,12 +69,12 @@ def read_word(path: Path) -> LearnedWord:
 
 
 def _word(document: Mapping[str, Any]) -> LearnedWord:
-    known = {"format", "version", "name", "summary", "beliefs", "lapse", "log_gain", "log_gain_error", "evidence"}
-    if set(document) != known:
-        raise ValueError(f"fields {', '.join(sorted(known ^ set(document)))} are missing or unknown")
+    if set(document) != FIELDS:
+        raise ValueError(f"fields {', '.join(sorted(FIELDS ^ set(document)))} are missing or unknown")
     return LearnedWord(
         str(document["name"]),
         tuple(_belief(one) for one in document["beliefs"]),
+        {str(name): float(error) for name, error in document["mc_errors"].items()},
         Interval(**{name: float(value) for name, value in document["lapse"].items()}),
         float(document["log_gain"]),
         float(document["log_gain_error"]),

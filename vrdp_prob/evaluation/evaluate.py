@@ -245,7 +245,7 @@ def _facts(folder: Path, questions: Path, source: str | None, settings: Settings
         sampler=settings.sampler,
         seed=settings.seed,
         draws=settings.draws,
-        **({"words": [word.change for word in settings.words]} if settings.words else {}),
+        words=[word.change for word in settings.words],
     )
 
 

@@ -63,6 +63,14 @@ def test_evidence_by_hand() -> None:
     assert found.probability == pytest.approx(meaning_prior())
 
 
+def test_a_question_that_makes_sense_in_one_group_of_draws() -> None:
+    counts = np.zeros((len(MEANINGS), GROUPS, 2), dtype=np.int64)
+    counts[:, 3, 0] = 2
+    learned = word([Agreement(counts)])
+    assert learned.beliefs[0].mc_error == pytest.approx(0)
+    assert np.isfinite(learned.log_gain)
+
+
 def test_the_order_of_examples_does_not_matter() -> None:
     generator = np.random.default_rng(0)
     several = [agreement_of(generator.integers(0, 3, (len(MEANINGS), DRAWS)), 2) for _ in range(4)]

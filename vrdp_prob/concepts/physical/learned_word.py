@@ -11,6 +11,9 @@ from vrdp_prob.reasoning.changes import Change, Meaning
 NEGLIGIBLE = 1e-6
 """Meanings that are less probable than this are left out of answers."""
 
+CONTRADICTION = 1.0
+"""By how much (nats) guessing has to explain answers better until they are said to contradict each other."""
+
 
 @dataclass(frozen=True)
 class Interval:
@@ -100,8 +103,11 @@ class LearnedWord:
 
     @property
     def contradicts_itself(self) -> bool:
-        """Whether the answers contradict each other: guessing explains them at least as well as any meaning does."""
-        return self.evidence.answers > 0 and self.log_gain <= 0
+        """Whether the answers contradict each other: guessing explains them better, all meanings taken together.
+
+        By a nat at least: one question that is answered once with yes and once with no is worse by 1.1 nats.
+        """
+        return self.log_gain <= -CONTRADICTION
 
     @property
     def summary(self) -> tuple[str, ...]:

@@ -81,7 +81,9 @@ def jackknife_error(values: Sequence[float]) -> float:
 def _log_likelihood(
     agreement: Agreement, groups: list[int], lapse: Float[np.ndarray, "lapse"]
 ) -> Float[np.ndarray, "meaning lapse"]:
-    draws = agreement.draws[:, groups].sum(axis=1)
+    draws, everywhere = agreement.draws[:, groups].sum(axis=1), agreement.draws.sum(axis=1)
+    # a question that makes sense in few draws may make sense in one group alone
+    draws = np.where(draws.sum(axis=1, keepdims=True) > 0, draws, everywhere)
     share = draws / draws.sum(axis=1, keepdims=True)
     wrong = np.arange(agreement.answers + 1)[:, None]
     of_draw = (1 - lapse / 2) ** (agreement.answers - wrong) * (lapse / 2) ** wrong

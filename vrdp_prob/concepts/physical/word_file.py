@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Mapping
-from dataclasses import asdict
+from dataclasses import asdict, fields
 from pathlib import Path
 from typing import Any
 
@@ -18,9 +18,7 @@ from vrdp_prob.reasoning.changes import PhysicalParameter, Rule
 
 FORMAT, VERSION = "vrdp-prob word", 1
 
-FIELDS = frozenset(
-    "format version name summary beliefs mc_errors lapse log_gain log_gain_error evidence".split()  # noqa: SIM905
-)
+FIELDS = frozenset(("format", "version", "summary", *(field.name for field in fields(LearnedWord))))
 
 TOLERANCE = 1e-6
 """By how much probabilities may miss 1 in a file that was written with rounded numbers."""
@@ -28,18 +26,7 @@ TOLERANCE = 1e-6
 
 def write_word(word: LearnedWord, path: Path) -> None:
     """Save a word."""
-    document = {
-        "format": FORMAT,
-        "version": VERSION,
-        "name": word.name,
-        "summary": list(word.summary),
-        "beliefs": [asdict(belief) for belief in word.beliefs],
-        "mc_errors": dict(word.mc_errors),
-        "lapse": asdict(word.lapse),
-        "log_gain": word.log_gain,
-        "log_gain_error": word.log_gain_error,
-        "evidence": asdict(word.evidence),
-    }
+    document = {"format": FORMAT, "version": VERSION, "summary": list(word.summary), **asdict(word)}
     with write_atomically(path) as temporary:
         temporary.write_text(json.dumps(document, indent=1, allow_nan=False) + "\n", encoding="utf-8")
 
@@ -78,8 +65,13 @@ def _word(document: Mapping[str, Any]) -> LearnedWord:
         Interval(**{name: float(value) for name, value in document["lapse"].items()}),
         float(document["log_gain"]),
         float(document["log_gain_error"]),
-        Evidence(**{**document["evidence"], "left_out": tuple(document["evidence"]["left_out"])}),
+        _evidence(document["evidence"]),
     )
+
+
+def _evidence(entry: Mapping[str, Any]) -> Evidence:
+    counts = {name: int(value) for name, value in entry.items() if name != "left_out"}
+    return Evidence(**counts, left_out=tuple(str(reason) for reason in entry["left_out"]))
 
 
 def _belief(entry: Mapping[str, Any]) -> Belief:

@@ -6,15 +6,15 @@ from pathlib import Path
 import pytest
 from command_line import refused
 
-from tests.concepts.physical.test_learned_word import UNSURE
 from tests.concepts.physical.word_videos import faster, write_videos
+from tests.concepts.physical.words import UNSURE
 from tests.reasoning.sliding_discs import Disc
 from vrdp_prob import cli
 from vrdp_prob.concepts.physical import LearnedWord
 
 QUESTION = "If the red sphere were floppier, what would happen?"
 CHOICE = "The red sphere collides with the blue cylinder"
-ROW = (Disc((-1.5, 0.0), (1.0, 0.0)), Disc((0.0, 0.05)), Disc((0.9, 0.15)))
+ROW = (Disc((-1.5, 0.0), (0.85, 0.0)), Disc((0.0, 0.05)), Disc((0.9, 0.15)))
 """Disc 0 stops just before disc 1; faster it hits it."""
 
 

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.concepts.physical.test_learned_word import UNSURE
+from tests.concepts.physical.words import UNSURE
 from vrdp_prob.evaluation.judgement import Judgement, Kind, judge, kind_of
 from vrdp_prob.reasoning.events import EventTable, EventUniverse
 from vrdp_prob.reasoning.facts import Motion, TableFacts

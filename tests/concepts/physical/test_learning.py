@@ -22,11 +22,11 @@ from vrdp_prob.concepts.physical import Example
 from vrdp_prob.concepts.physical.from_files import learn_from_files
 from vrdp_prob.errors import InputError
 
-ROW = (Disc((-1.5, 0.0), (1.0, 0.0)), Disc((0.0, 0.05)), Disc((0.9, 0.15)), Disc((-1.0, 2.0)))
+ROW = (Disc((-1.5, 0.0), (0.85, 0.0)), Disc((0.0, 0.05)), Disc((0.9, 0.15)), Disc((-1.0, 2.0)))
 """Disc 0 stops just before disc 1; faster it hits it, which hits 2."""
 
 
-def test_one_telling_question_and_the_same_seed() -> None:
+def test_one_telling_question() -> None:
     example = example_of("faster", faster, ROW)
     learned = learn_concept("faster", [example], draws=10)
     before, after = 0.2, learned.probabilities
@@ -35,7 +35,6 @@ def test_one_telling_question_and_the_same_seed() -> None:
     assert after["speed"] > before < after["friction"]
     assert after["mass"] < before
     assert (learned.evidence.videos, learned.evidence.examples, learned.evidence.answers) == (1, 1, 6)
-    assert learn_concept("faster", [example], draws=10) == learned
 
 
 def test_examples_that_cannot_be_used() -> None:
@@ -89,7 +88,7 @@ def test_a_question_file_without_the_word_or_its_videos(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_a_word_from_files_goes_on_where_it_was_broken_off(tmp_path: Path) -> None:
-    several = [ROW, (Disc((-1.5, 0.0), (1.0, 0.0)), Disc((0.1, 0.05)), Disc((1.0, 0.1)))]
+    several = [ROW, (Disc((-1.5, 0.0), (0.85, 0.0)), Disc((0.1, 0.05)), Disc((1.0, 0.1)))]
     questions = write_videos(tmp_path, "faster", faster, several)
     learned = learn_from_files("faster", tmp_path, questions, draws=20, checkpoint=tmp_path / "kept", processes=1)
     assert learned.evidence.videos == 2
@@ -112,13 +111,21 @@ def test_a_word_from_files_goes_on_where_it_was_broken_off(tmp_path: Path) -> No
     ],
 )
 def test_words_are_found(name: str, change, subject: str, amounts: dict[str, float]) -> None:
-    learned = learn_concept(name, examples_of(name, change, 24), draws=40)
+    learned = learn_concept(name, examples_of(name, change, 16), draws=30)
     assert learned.subject == subject
     assert learned.probabilities[subject] > 0.8
     for belief in learned.beliefs:
         if belief.name in amounts:
             low, high = belief.quantile(0.005), belief.quantile(0.995)
             assert low < amounts[belief.name] < high
+
+
+@pytest.mark.slow
+def test_the_same_seed_gives_the_same_word() -> None:
+    examples = examples_of("faster", faster, 2)
+    learned = learn_concept("faster", examples, draws=20, seed=3)
+    assert learn_concept("faster", examples, draws=20, seed=3) == learned
+    assert learn_concept("faster", examples, draws=20, seed=4) != learned
 
 
 @pytest.mark.slow

@@ -9,12 +9,14 @@ import torch
 from vrdp_prob.models.simulator.worlds import Worlds
 from vrdp_prob.reasoning.batch import FUTURE_FRAMES
 from vrdp_prob.reasoning.chance import Purpose, Seeded
+from vrdp_prob.reasoning.changes import Change
 from vrdp_prob.reasoning.events import EventTable, EventUniverse
 from vrdp_prob.reasoning.facts import MOVING_SPEED, Motion, draw_attributes
+from vrdp_prob.reasoning.intervention import Intervention
 from vrdp_prob.reasoning.posterior_like import PosteriorLike
 from vrdp_prob.reasoning.stretch import State, Stretch, advance
 from vrdp_prob.reasoning.timeline import Timeline
-from vrdp_prob.reasoning.values import MASS_FACTOR, Change, Label
+from vrdp_prob.reasoning.values import Label
 from vrdp_prob.scene import Body
 
 
@@ -90,12 +92,12 @@ class ReleasedWorlds:
     def _course(self, change: Change | None, body: int) -> Stretch:
         """Motion of a world from the release on, into the time after the video."""
         worlds = self.posterior.worlds(self.draws)
-        factor = {Change.HEAVIER: MASS_FACTOR, Change.LIGHTER: 1 / MASS_FACTOR}.get(change, 1.0) if change else 1.0
-        changed = worlds.with_mass_factor(body, factor)
+        numbers = Seeded(self.posterior.seed).numbers(Purpose.MEANING)
+        changed = worlds if change is None else Intervention(change, body, worlds, numbers).worlds
         times = self.posterior.tracks.times
         more = times[-1] + np.arange(1, FUTURE_FRAMES + 1) / self.posterior.tracks.frame_rate
         state = _at_release(worlds)
-        if change is Change.REMOVED:
+        if change is not None and change.removes:
             state.present[:, body] = False
         return advance(changed, state, np.concatenate([times, more]), self.posterior.model)
 

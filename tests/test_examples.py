@@ -46,11 +46,20 @@ def test_find_the_hidden_effect(tmp_path: Path) -> None:
     assert low < 0.016 < high
 
 
+def test_teach_a_word(tmp_path: Path) -> None:
+    printed = run_example("teach_a_word.py", tmp_path)
+    assert printed.startswith("'zippier' most probably changes the speed: times ")
+    low, high = (float(end) for end in printed.split("90 % interval ")[1].split(" (")[0].split(" to "))
+    assert low < 1.5 < high
+    assert "if the red cylinder were zippier? yes (" in printed
+
+
 def test_every_example_is_run() -> None:
     scripts = {path.name for path in EXAMPLES.glob("*.py")}
     assert scripts == {
         "ask_a_question.py",
         "find_the_hidden_effect.py",
         "report_on_a_video.py",
+        "teach_a_word.py",
         "your_own_tracks.py",
     }

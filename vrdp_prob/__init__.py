@@ -8,6 +8,7 @@
 
 __version__ = "0.1.0"
 
+from vrdp_prob.concepts.physical import Example, LearnedWord, learn_concept
 from vrdp_prob.datasets import load, load_all
 from vrdp_prob.discovery.discover import discover
 from vrdp_prob.discovery.finding import Finding
@@ -24,8 +25,10 @@ __all__ = [
     "Body",
     "Camera",
     "Event",
+    "Example",
     "Finding",
     "InputError",
+    "LearnedWord",
     "PhysicsModel",
     "Posterior",
     "Question",
@@ -35,6 +38,7 @@ __all__ = [
     "ask",
     "discover",
     "infer",
+    "learn_concept",
     "load",
     "load_all",
     "report",

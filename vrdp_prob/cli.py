@@ -1,4 +1,4 @@
-"""The command line: `vrdp-prob report`, `ask`, `evaluate`, `demo`, `calibrate-camera` and `compile`.
+"""The command line: `vrdp-prob report`, `ask`, `evaluate`, `learn-word`, `demo`, `calibrate-camera` and `compile`.
 
 Exit code 0: done; 2: input that cannot be used (one line says what, where, and how to mend it); 1: anything else.
 """
@@ -12,7 +12,7 @@ from typing import Annotated
 import typer
 
 from vrdp_prob import __version__
-from vrdp_prob.command_inputs import model_at, questions_of, scene_range, videos_at
+from vrdp_prob.command_inputs import model_at, questions_of, scene_range, videos_at, words_at
 from vrdp_prob.command_options import (
     CameraOption,
     CheckpointFolder,
@@ -20,11 +20,15 @@ from vrdp_prob.command_options import (
     Input,
     Model,
     Noise,
+    Processes,
     Quiet,
     Sampler,
+    Scenes,
     Seed,
     Video,
+    Words,
 )
+from vrdp_prob.concepts.physical.from_files import learn_from_files
 from vrdp_prob.datasets import load, load_all, video_files, video_names
 from vrdp_prob.discovery.checking import check_video_count
 from vrdp_prob.discovery.discover import discover
@@ -93,6 +97,7 @@ def report(
     sampler: Sampler = DEFAULT_SAMPLER,
     noise: Noise = "auto",
     defaults: Defaults = "fixed",
+    word: Words = None,
     checkpoint: CheckpointFolder = None,
     seed: Seed = 0,
     quiet: Quiet = False,
@@ -103,9 +108,9 @@ def report(
     check_writable(out)
     if checkpoint is not None:
         check_writable(checkpoint)
-    physics = model_at(model)
+    physics, words = model_at(model), words_at(word)
     names = [name for name in video_names(path) if video in (None, name)]
-    asked = {name: [] for name in names} if questions is None else questions_of(questions, names)
+    asked = {name: [] for name in names} if questions is None else questions_of(questions, names, words)
     videos = load_all(path, videos=None if video is None else [video], camera=camera, progress=progress)
     files = video_files(path)
     for tracks in videos:
@@ -119,6 +124,7 @@ def report(
             sampler=sampler,
             noise=noise,
             defaults=defaults,
+            words=words,
             checkpoint=None if checkpoint is None else checkpoint / own,
             seed=seed,
             progress=progress,
@@ -146,6 +152,7 @@ def ask_question(
     sampler: Sampler = DEFAULT_SAMPLER,
     noise: Noise = "auto",
     defaults: Defaults = "fixed",
+    word: Words = None,
     checkpoint: CheckpointFolder = None,
     seed: Seed = 0,
     quiet: Quiet = False,
@@ -160,10 +167,10 @@ def ask_question(
         check_mc_error(mc_error)
     if checkpoint is not None:
         check_writable(checkpoint)
-    physics = model_at(model)
-    check_question(asked)
+    physics, words = model_at(model), words_at(word)
+    check_question(asked, words=words)
     tracks = load(path, video=video, camera=camera, progress=progress)
-    check_question(asked, tracks=tracks)
+    check_question(asked, tracks=tracks, words=words)
     posterior = infer(
         tracks,
         sampler=sampler,
@@ -174,7 +181,7 @@ def ask_question(
         seed=seed,
         progress=progress,
     )
-    answer = ask(posterior, asked, mc_error=mc_error, progress=progress)
+    answer = ask(posterior, asked, mc_error=mc_error, words=words, progress=progress)
     explanation = answer.explain() if explain else None
     if as_json:
         told = {} if explanation is None else {"explanation": explanation.to_document()}
@@ -225,18 +232,14 @@ def evaluate_answers(
     folder: Annotated[Path, typer.Argument(metavar="FOLDER", help="A tracks folder, or a folder of videos.")],
     *,
     questions: Annotated[Path, typer.Option(metavar="FILE", help="CLEVRER question file with the right answers.")],
-    scenes: Annotated[
-        str | None, typer.Option(metavar="A:B", help="Scenes A to B-1 of the question file; all by default.")
-    ] = None,
+    scenes: Scenes = None,
     source: Annotated[
         str | None, typer.Option("--input", metavar="tracks|videos", help="By default tracks where there are any.")
     ] = None,
     out: Annotated[
         Path, typer.Option(metavar="DIR", help="Folder of the results; the same call again goes on from what is there.")
     ] = Path("vrdp-prob-evaluation"),
-    processes: Annotated[
-        int | None, typer.Option(metavar="N", min=1, help="Videos at a time; by default one per core.")
-    ] = None,
+    processes: Processes = None,
     dask: Annotated[
         str | None, typer.Option(metavar="ADDRESS", help="Scheduler of a Dask cluster that does the work.")
     ] = None,
@@ -244,6 +247,7 @@ def evaluate_answers(
     camera: CameraOption = None,
     model: Model = None,
     sampler: Sampler = "laplace",
+    word: Words = None,
     seed: Seed = 0,
     quiet: Quiet = False,
 ) -> None:
@@ -258,6 +262,7 @@ def evaluate_answers(
         model=model_at(model),
         sampler=sampler,
         seed=seed,
+        words=words_at(word),
         out=out,
         processes=processes,
         dask=dask,
@@ -268,6 +273,42 @@ def evaluate_answers(
         print(json.dumps(to_document(evaluation), allow_nan=False))
     else:
         print("\n".join([*table(evaluation), *(str(file) for file in files)]))
+
+
+@app.command(name="learn-word")
+def learn_word(
+    word: Annotated[str, typer.Argument(metavar="WORD", help="As in 'if the cube were WORD'.")],
+    folder: Annotated[Path, typer.Argument(metavar="FOLDER", help="A tracks folder, or a folder of videos.")],
+    *,
+    questions: Annotated[Path, typer.Option(metavar="FILE", help="CLEVRER question file with the right answers.")],
+    scenes: Scenes = None,
+    out: Annotated[Path | None, typer.Option(metavar="FILE", help="File of the word; by default WORD.json.")] = None,
+    processes: Processes = None,
+    camera: CameraOption = None,
+    model: Model = None,
+    sampler: Sampler = "laplace",
+    checkpoint: CheckpointFolder = None,
+    seed: Seed = 0,
+    quiet: Quiet = False,
+) -> None:
+    """Learn a word for a change of an object from the questions that use it: what it changes, and by how much."""
+    file = Path(f"{word}.json") if out is None else out
+    check_writable(file.parent)
+    learned = learn_from_files(
+        word,
+        folder,
+        questions,
+        scenes=None if scenes is None else scene_range(scenes),
+        camera=camera,
+        model=model_at(model),
+        sampler=sampler,
+        checkpoint=checkpoint,
+        seed=seed,
+        processes=processes,
+        progress=progress_display(quiet=quiet),
+    )
+    learned.write(file)
+    print("\n".join([*learned.summary, str(file)]))
 
 
 @app.command()

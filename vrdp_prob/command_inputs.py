@@ -1,10 +1,13 @@
 """What commands read before their work, and the refusals that come with it."""
 
+from collections.abc import Sequence
 from pathlib import Path
 
+from vrdp_prob.concepts.physical import LearnedWord
 from vrdp_prob.datasets import read_questions, video_files, video_names
 from vrdp_prob.errors import InputError
 from vrdp_prob.models.physics import PhysicsModel
+from vrdp_prob.reasoning.vocabulary import ChangeWord
 from vrdp_prob.report.pipeline import check_questions
 from vrdp_prob.scene import Question
 
@@ -22,7 +25,12 @@ def model_at(path: Path | None) -> PhysicsModel | None:
     return None if path is None else PhysicsModel.read(path)
 
 
-def questions_of(path: Path, names: list[str]) -> dict[str, list[Question]]:
+def words_at(paths: list[Path] | None) -> tuple[LearnedWord, ...]:
+    """The learned words of some files."""
+    return tuple(LearnedWord.read(path) for path in paths or ())
+
+
+def questions_of(path: Path, names: list[str], words: Sequence[ChangeWord] = ()) -> dict[str, list[Question]]:
     """The questions about each video, understood as far as that goes before the video is looked at."""
     asked = read_questions(path)
     for name in names:
@@ -32,7 +40,7 @@ def questions_of(path: Path, names: list[str]) -> dict[str, list[Question]]:
                 "the stem of a scene's 'video_filename' must be the name of the video."
             )
         try:
-            check_questions(asked[name])
+            check_questions(asked[name], words=words)
         except InputError as error:
             raise InputError(f"{path}, {name}, {error}") from error
     return asked

@@ -41,4 +41,12 @@ CameraOption = Annotated[
         help="Camera file; by default camera.json beside the video or in its parent folder, or in the tracks folder.",
     ),
 ]
+Words = Annotated[
+    list[Path] | None,
+    typer.Option("--word", metavar="FILE", help="A learned word that questions may use; repeat for each."),
+]
+Scenes = Annotated[
+    str | None, typer.Option(metavar="A:B", help="Scenes A to B-1 of the question file; all by default.")
+]
+Processes = Annotated[int | None, typer.Option(metavar="N", min=1, help="Videos at a time; by default one per core.")]
 Video = Annotated[str | None, typer.Option(metavar="ID", help="Which video of a folder of several.")]

@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from tests.concepts.physical.words import UNSURE
 from vrdp_prob.evaluation.judgement import Judgement, Kind, judge, kind_of
 from vrdp_prob.reasoning.events import EventTable, EventUniverse
 from vrdp_prob.reasoning.facts import Motion, TableFacts
@@ -78,6 +79,8 @@ def test_kinds_of_what_if() -> None:
     assert kind_of(removed) is Kind.REMOVAL
     heavier = replace(removed, text="If the sphere were heavier, what would happen?")
     assert kind_of(heavier) is Kind.MASS
+    floppier = replace(removed, text="If the sphere were floppier, what would happen?")
+    assert kind_of(floppier, [UNSURE]) is Kind.MASS
 
 
 def test_a_judgement_survives_json() -> None:

@@ -4,9 +4,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from vrdp_prob.reasoning.changes import Change
 from vrdp_prob.reasoning.events import EventTable
 from vrdp_prob.reasoning.facts import Motion, TableFacts
-from vrdp_prob.reasoning.values import Change
 from vrdp_prob.scene import Body, Event, EventKind, Shape
 
 FRAME_RATE = 25.0

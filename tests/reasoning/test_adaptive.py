@@ -10,7 +10,7 @@ from vrdp_prob.errors import InputError
 from vrdp_prob.inference import Status
 from vrdp_prob.reasoning import PosteriorWorlds, ask
 from vrdp_prob.reasoning.batch import Batch
-from vrdp_prob.reasoning.values import Change
+from vrdp_prob.reasoning.changes import Change
 
 BATCH = 50
 

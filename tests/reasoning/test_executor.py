@@ -15,9 +15,9 @@ from jsonschema import validate
 from vrdp_prob.errors import InputError
 from vrdp_prob.reasoning import ask
 from vrdp_prob.reasoning.answer import monte_carlo_error
+from vrdp_prob.reasoning.changes import Change
 from vrdp_prob.reasoning.entropy import entropy
 from vrdp_prob.reasoning.facts import TableFacts
-from vrdp_prob.reasoning.values import Change
 from vrdp_prob.scene import Body, Choice, Event, Question, QuestionType, Shape
 
 CHOICES = ("The sphere collides with the cylinder", "The red cube and the cylinder collide")

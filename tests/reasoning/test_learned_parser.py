@@ -12,6 +12,7 @@ from hand_made import STORY, collision, video
 
 from vrdp_prob.errors import InputError
 from vrdp_prob.reasoning import ask
+from vrdp_prob.reasoning.changes import Change
 from vrdp_prob.reasoning.checking import check_question
 from vrdp_prob.reasoning.language import parse_choice, parse_question, read_choice, read_question
 from vrdp_prob.reasoning.language.learned.agreement import agrees
@@ -24,7 +25,6 @@ from vrdp_prob.reasoning.language.learned.training import train
 from vrdp_prob.reasoning.language.meaning import meaning_of
 from vrdp_prob.reasoning.language.wording import wordings
 from vrdp_prob.reasoning.language.words import split
-from vrdp_prob.reasoning.values import Change
 from vrdp_prob.report.asked import world_of
 from vrdp_prob.scene import QuestionType
 

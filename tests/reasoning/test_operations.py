@@ -5,12 +5,13 @@ import pytest
 from hand_made import BODIES, STORY, collision, entrance, exit_of, motion_of, video
 
 from vrdp_prob.errors import InputError
+from vrdp_prob.reasoning.changes import Change
 from vrdp_prob.reasoning.executor import answer_question
 from vrdp_prob.reasoning.facts import TableFacts
 from vrdp_prob.reasoning.operations import REGISTRY, Operation
 from vrdp_prob.reasoning.program import ENTRIES, Program, check
 from vrdp_prob.reasoning.run import Run
-from vrdp_prob.reasoning.values import Change, EventSet, ObjectSet, Value, Word
+from vrdp_prob.reasoning.values import EventSet, ObjectSet, Value, Word
 from vrdp_prob.scene import Body, Shape
 
 RED_CUBE = "objects red filter_color cube filter_shape unique"

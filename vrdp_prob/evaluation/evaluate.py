@@ -20,10 +20,9 @@ from vrdp_prob.datasets import (
 )
 from vrdp_prob.datasets.loading import CameraChoice
 from vrdp_prob.errors import InputError
-from vrdp_prob.evaluation.judgement import Judgement, Kind, is_answered
+from vrdp_prob.evaluation.judgement import Judgement, Kind
 from vrdp_prob.evaluation.one_scene import BEST_FIT, POSTERIOR, VARIANTS, SceneResult, Settings, Task, evaluate_scene
 from vrdp_prob.evaluation.scores import Interval, Scores, brier_gain
-from vrdp_prob.evaluation.workers import cluster, local_workers
 from vrdp_prob.files import write_atomically
 from vrdp_prob.inference import check_options, default_model
 from vrdp_prob.inference.checkpoint import Checkpoint, run_facts
@@ -31,8 +30,10 @@ from vrdp_prob.models.physics import PhysicsModel
 from vrdp_prob.models.simulator.rollout import compile_model
 from vrdp_prob.progress import ProgressDisplay, SilentProgress
 from vrdp_prob.reasoning.prepared import prepare
+from vrdp_prob.reasoning.vocabulary import ChangeWord, Vocabulary
 from vrdp_prob.reasoning.worlds import DRAWS
 from vrdp_prob.scene import Question
+from vrdp_prob.workers import cluster, local_workers
 
 SOURCES = ("tracks", "videos")
 """What videos may be read from."""
@@ -109,6 +110,7 @@ def evaluate(
     sampler: str = "laplace",
     seed: int = 0,
     draws: int = DRAWS,
+    words: Sequence[ChangeWord] = (),
     out: Path | str | None = None,
     processes: int | None = None,
     dask: str | None = None,
@@ -132,6 +134,8 @@ def evaluate(
         See `vrdp_prob.infer`. `laplace` does not hand on to another sampler here.
     draws
         Posterior draws that answer the questions.
+    words
+        Learned words that the questions may use.
     out
         Folder that keeps the result of each video. The same call again, after an interruption, goes on from there.
     processes
@@ -153,8 +157,8 @@ def evaluate(
         raise InputError(f"input is '{source}'; use {' or '.join(SOURCES)}.")
     if draws < 1 or (processes is not None and processes < 1):
         raise InputError(f"draws is {draws} and processes is {processes}; both must be at least 1.")
-    settings = Settings(model or default_model(), sampler, seed, draws)
-    asked = _asked(Path(questions), scenes)
+    settings = Settings(model or default_model(), sampler, seed, draws, tuple(words))
+    asked = _asked(Path(questions), scenes, Vocabulary.of(words))
     tasks = _tasks(Path(folder), asked, source, camera, settings)
     facts = _facts(Path(folder), Path(questions), source, settings)
     kept = None if out is None else Checkpoint(Path(out) / "scenes", facts)
@@ -175,11 +179,11 @@ def evaluate(
     return Evaluation(tuple(done[task.scene] for task in tasks), len(asked) - len(tasks), seed)
 
 
-def _asked(path: Path, scenes: tuple[int, int] | None) -> dict[str, list[Question]]:
+def _asked(path: Path, scenes: tuple[int, int] | None, vocabulary: Vocabulary) -> dict[str, list[Question]]:
     """Questions with answers of the scenes that are wanted, understood before any work."""
     index = scene_indices(path)
     asked = {
-        name: [question for question in several if is_answered(question)]
+        name: [question for question in several if question.is_answered]
         for name, several in read_questions(path).items()
         if scenes is None or scenes[0] <= index[name] < scenes[1]
     }
@@ -191,7 +195,7 @@ def _asked(path: Path, scenes: tuple[int, int] | None) -> dict[str, list[Questio
     for name, several in asked.items():
         for question in several:
             try:
-                prepare(question, ())
+                prepare(question, (), vocabulary)
             except InputError as error:
                 raise InputError(f"{path}, {name}, question {question.question_id}: {error}") from error
     return {name: several for name, several in asked.items() if several}
@@ -241,6 +245,7 @@ def _facts(folder: Path, questions: Path, source: str | None, settings: Settings
         sampler=settings.sampler,
         seed=settings.seed,
         draws=settings.draws,
+        words=[word.change for word in settings.words],
     )
 
 

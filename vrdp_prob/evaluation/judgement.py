@@ -1,19 +1,21 @@
 """One answer beside the truth."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from enum import StrEnum
 from typing import Any
 
 from vrdp_prob.errors import InputError
 from vrdp_prob.reasoning import Answer, ask
+from vrdp_prob.reasoning.change_operations import APPLY, COUNTERFACT
 from vrdp_prob.reasoning.facts import Facts
 from vrdp_prob.reasoning.prepared import prepare
+from vrdp_prob.reasoning.vocabulary import ChangeWord, Vocabulary
 from vrdp_prob.scene import Question, QuestionType
+from vrdp_prob.scene.question import RIGHT
 
-RIGHT_CHOICE = "correct"
-"""Judgement of a choice in CLEVRER's files."""
-MASS_TOKENS = {"counterfact_heavier", "counterfact_lighter", "apply_heavier", "apply_lighter"}
+CHANGED = (APPLY, COUNTERFACT)
+"""What tokens begin with that change an object without removing it."""
 
 
 class Kind(StrEnum):
@@ -85,28 +87,21 @@ class Judgement:
         return cls(**{**document, "kind": Kind(document["kind"]), "choices": choices})
 
 
-def is_answered(question: Question) -> bool:
-    """Whether the question file holds the right answer."""
-    if question.choices:
-        return all(choice.answer is not None for choice in question.choices)
-    return question.answer is not None
-
-
-def judge(scene: str, facts: Facts, question: Question) -> Judgement:
+def judge(scene: str, facts: Facts, question: Question, words: Sequence[ChangeWord] = ()) -> Judgement:
     """Ask a question and compare the answer with the truth."""
     try:
-        answer = ask(facts, question)
+        answer = ask(facts, question, words=words)
     except InputError as error:
-        return unanswered(scene, question, str(error))
+        return unanswered(scene, question, str(error), words)
     truth = _truth(question)
     given = _key(answer)
     probability = answer.distribution.get(truth, 0.0)
     squares = sum(share**2 for share in answer.distribution.values())
-    rights = [choice.answer == RIGHT_CHOICE for choice in question.choices]
+    rights = [choice.answer == RIGHT for choice in question.choices]
     return Judgement(
         scene=scene,
         question_id=str(question.question_id),
-        kind=kind_of(question),
+        kind=kind_of(question, words),
         question=question.text,
         answer=given,
         truth=truth,
@@ -118,12 +113,12 @@ def judge(scene: str, facts: Facts, question: Question) -> Judgement:
     )
 
 
-def unanswered(scene: str, question: Question, reason: str) -> Judgement:
+def unanswered(scene: str, question: Question, reason: str, words: Sequence[ChangeWord] = ()) -> Judgement:
     """The judgement of a question that got no answer: wrong, every choice judged as likely as not."""
     return Judgement(
         scene=scene,
         question_id=str(question.question_id),
-        kind=kind_of(question),
+        kind=kind_of(question, words),
         question=question.text,
         answer="",
         truth=_truth(question),
@@ -131,12 +126,12 @@ def unanswered(scene: str, question: Question, reason: str) -> Judgement:
         confidence=0.0,
         probability=0.0,
         squared_error=1.0,
-        choices=tuple((0.5, choice.answer == RIGHT_CHOICE) for choice in question.choices),
+        choices=tuple((0.5, choice.answer == RIGHT) for choice in question.choices),
         refused=reason,
     )
 
 
-def kind_of(question: Question) -> Kind:
+def kind_of(question: Question, words: Sequence[ChangeWord] = ()) -> Kind:
     """Kind of a question of a question file.
 
     Raises
@@ -144,19 +139,19 @@ def kind_of(question: Question) -> Kind:
     InputError
         If it is not understood.
     """
-    asked = prepare(question, ())
+    asked = prepare(question, (), Vocabulary.of(words))
     if asked.kind is not QuestionType.COUNTERFACTUAL:
         return Kind(asked.kind.value)
     programs = [program for _, program in asked.options]
     programs += [] if asked.program is None else [asked.program]
     tokens = {token for program in programs for token in program.tokens}
-    return Kind.MASS if tokens & MASS_TOKENS else Kind.REMOVAL
+    return Kind.MASS if any(token.startswith(CHANGED) for token in tokens) else Kind.REMOVAL
 
 
 def _truth(question: Question) -> str:
     if not question.choices:
         return str(question.answer)
-    return ",".join(str(choice.choice_id) for choice in question.choices if choice.answer == RIGHT_CHOICE)
+    return ",".join(str(choice.choice_id) for choice in question.choices if choice.answer == RIGHT)
 
 
 def _key(answer: Answer) -> str:

@@ -15,6 +15,7 @@ from vrdp_prob.inference import infer
 from vrdp_prob.models.physics import PhysicsModel
 from vrdp_prob.reasoning import PosteriorWorlds
 from vrdp_prob.reasoning.plug_in import plug_in_worlds
+from vrdp_prob.reasoning.vocabulary import ChangeWord
 from vrdp_prob.scene import Camera, Question, Tracks
 
 POSTERIOR, PRIOR_DEFAULTS, BEST_FIT = "posterior", "posterior_prior_defaults", "map"
@@ -31,6 +32,7 @@ class Settings:
     sampler: str
     seed: int
     draws: int
+    words: tuple[ChangeWord, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -115,7 +117,7 @@ def evaluate_scene(task: Task) -> SceneResult:
         reason = str(error)
     except Exception as error:  # one video must not take the others with it; the reason stands in the result
         reason = f"internal error, please report it: {type(error).__name__}: {error}"
-    nothing = tuple(unanswered(task.scene, question, reason) for question in task.questions)
+    nothing = tuple(unanswered(task.scene, question, reason, task.settings.words) for question in task.questions)
     return SceneResult(task.scene, dict.fromkeys(VARIANTS, nothing), time.monotonic() - begin, failed=reason)
 
 
@@ -130,7 +132,8 @@ def _evaluated(task: Task, begin: float) -> SceneResult:
         BEST_FIT: plug_in_worlds(posterior),
     }
     judgements = {
-        name: tuple(judge(task.scene, facts, question) for question in task.questions) for name, facts in worlds.items()
+        name: tuple(judge(task.scene, facts, question, settings.words) for question in task.questions)
+        for name, facts in worlds.items()
     }
     return SceneResult(
         task.scene, judgements, time.monotonic() - begin, posterior.convergence.sentence, posterior.warnings

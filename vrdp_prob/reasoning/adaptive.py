@@ -7,6 +7,7 @@ from vrdp_prob.errors import InputError
 from vrdp_prob.reasoning.answer import Answer
 from vrdp_prob.reasoning.executor import answer_question
 from vrdp_prob.reasoning.prepared import ChoiceInput
+from vrdp_prob.reasoning.vocabulary import PLAIN, Vocabulary
 from vrdp_prob.reasoning.worlds import PosteriorWorlds
 from vrdp_prob.scene import Question
 
@@ -17,6 +18,7 @@ def answer_within(
     *,
     choices: Sequence[ChoiceInput] = (),
     mc_error: float,
+    vocabulary: Vocabulary = PLAIN,
 ) -> Answer:
     """Answer a question from as many draws as its Monte Carlo error asks for.
 
@@ -28,7 +30,7 @@ def answer_within(
     ----------
     worlds
         The worlds to begin with; batches are as large as their first one.
-    question, choices
+    question, choices, vocabulary
         See `answer_question`.
     mc_error
         Monte Carlo standard error to reach, of every probability. A probability p needs about p (1 - p) / mc_error^2
@@ -40,13 +42,13 @@ def answer_within(
         If `mc_error` is not between 0 and 1, or see `answer_question`.
     """
     check_mc_error(mc_error)
-    answer = answer_question(worlds, question, choices=choices)
+    answer = answer_question(worlds, question, choices=choices, vocabulary=vocabulary)
     while largest_error(answer) > mc_error:
         if worlds.more is None:
             reached = f"The Monte Carlo error is {largest_error(answer):.2g}, above the {mc_error:g} asked for"
             return replace(answer, notes=(*answer.notes, f"{reached}: {worlds.exhausted}."))
         worlds = worlds.more
-        answer = answer_question(worlds, question, choices=choices)
+        answer = answer_question(worlds, question, choices=choices, vocabulary=vocabulary)
     return answer
 
 

@@ -16,6 +16,7 @@ from vrdp_prob.reasoning.executor import answer_question
 from vrdp_prob.reasoning.facts import Facts
 from vrdp_prob.reasoning.posterior_like import PosteriorLike
 from vrdp_prob.reasoning.prepared import ChoiceInput
+from vrdp_prob.reasoning.vocabulary import ChangeWord, Vocabulary
 from vrdp_prob.reasoning.worlds import DRAWS, PosteriorWorlds
 from vrdp_prob.scene import Question
 
@@ -30,6 +31,7 @@ def ask(
     draws: int = DRAWS,
     mc_error: float | None = None,
     defaults: Defaults = "fixed",
+    words: Sequence[ChangeWord] = (),
     progress: ProgressDisplay | None = None,
 ) -> Answer:
     """Answer a question about a video with probabilities.
@@ -50,6 +52,8 @@ def ask(
     defaults
         Whether objects that never collided have default mass and restitution (`fixed`) or values drawn from the prior
         (`prior`), where `known` is a posterior.
+    words
+        Learned words that the question may use; a built-in word among them has its learned meaning.
     progress
         Who follows the simulation, where `known` is a posterior.
 
@@ -65,17 +69,22 @@ def ask(
         facts = PosteriorWorlds(known, draws=draws, defaults=defaults, progress=progress)
     else:
         facts = known
-    return _answer(facts, question, choices, mc_error)
+    return _answer(facts, question, choices, mc_error, words)
 
 
 def _answer(
-    facts: Facts, question: str | Sequence[str] | Question, choices: Sequence[ChoiceInput], mc_error: float | None
+    facts: Facts,
+    question: str | Sequence[str] | Question,
+    choices: Sequence[ChoiceInput],
+    mc_error: float | None,
+    words: Sequence[ChangeWord],
 ) -> Answer:
+    vocabulary = Vocabulary.of(words)
     if mc_error is None:
-        return answer_question(facts, question, choices=choices)
+        return answer_question(facts, question, choices=choices, vocabulary=vocabulary)
     if not isinstance(facts, PosteriorWorlds):
         raise InputError("mc_error needs a posterior, which draws can be taken from; leave it out.")
-    return answer_within(facts, question, choices=choices, mc_error=mc_error)
+    return answer_within(facts, question, choices=choices, mc_error=mc_error, vocabulary=vocabulary)
 
 
 @dataclass(frozen=True)
@@ -98,9 +107,10 @@ class AskablePosterior(Posterior):
         *,
         choices: Sequence[ChoiceInput] = (),
         mc_error: float | None = None,
+        words: Sequence[ChangeWord] = (),
     ) -> Answer:
         """Answer a question; see `vrdp_prob.reasoning.ask`."""
-        return _answer(self.all_worlds, question, choices, mc_error)
+        return _answer(self.all_worlds, question, choices, mc_error, words)
 
 
 def _askable(infer: Callable[Options, Posterior]) -> Callable[Options, AskablePosterior]:

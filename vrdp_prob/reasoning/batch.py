@@ -11,10 +11,12 @@ from vrdp_prob.models.physics import PhysicsModel
 from vrdp_prob.models.simulator.rollout import Rollout, simulate
 from vrdp_prob.models.simulator.worlds import Worlds
 from vrdp_prob.reasoning.chance import Chance, Purpose
+from vrdp_prob.reasoning.changes import Change
 from vrdp_prob.reasoning.counterfactual import Counterfactual
 from vrdp_prob.reasoning.deviations import Deviation, DeviationModel, seen_deviations, turns
 from vrdp_prob.reasoning.facts import draw_attributes
 from vrdp_prob.reasoning.friction import OwnFriction, ToldFriction, apply_friction, told_friction, with_friction_ratio
+from vrdp_prob.reasoning.intervention import Intervention
 from vrdp_prob.reasoning.refit import state_at_end
 from vrdp_prob.reasoning.scales import Examples
 from vrdp_prob.reasoning.scattering import INSTANTS, Scattering, advance_scattered
@@ -22,7 +24,7 @@ from vrdp_prob.reasoning.seen import SeenVideo
 from vrdp_prob.reasoning.sight import Sight
 from vrdp_prob.reasoning.stretch import State
 from vrdp_prob.reasoning.timeline import Timeline, WorldDraws
-from vrdp_prob.reasoning.values import Change, Label
+from vrdp_prob.reasoning.values import Label
 from vrdp_prob.reasoning.wander import Foretelling
 
 FUTURE_FRAMES = 58
@@ -189,11 +191,15 @@ class Batch:
     def counterfactual(self, change: Change, body: int) -> WorldDraws:
         """What happens when one object (by its place) is changed from the beginning."""
         if (change, body) not in self._changed:
-            counterfactual = Counterfactual(
-                self.seen, self._acting, self._extended[1], self.turning, self.scattering, change=change, body=body
-            )
-            self._changed[change, body] = counterfactual.run()
+            self._changed[change, body] = self.simulated(change, body)
         return self._changed[change, body]
+
+    def simulated(self, change: Change, body: int) -> WorldDraws:
+        """The same, simulated anew and not kept."""
+        intervention = Intervention(change, body, self._acting, self.chance.numbers(Purpose.MEANING))
+        return Counterfactual(
+            self.seen, self._acting, self._extended[1], self.turning, self.scattering, intervention=intervention
+        ).run()
 
     def turning(self, body: int, time: float) -> tuple[Float[np.ndarray, "draw"], Float[np.ndarray, "draw"]]:
         """Angle (rad) and spin (rad/s) of a body in every draw.

@@ -26,6 +26,7 @@ class Purpose(IntEnum):
     DEVIATION_SCALES = 12
     DEVIATIONS = 13
     FORETOLD = 14
+    MEANING = 15
 
 
 @runtime_checkable

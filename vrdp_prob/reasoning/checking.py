@@ -12,6 +12,7 @@ from vrdp_prob.reasoning.prepared import ChoiceInput, prepare
 from vrdp_prob.reasoning.program import Program
 from vrdp_prob.reasoning.run import Run
 from vrdp_prob.reasoning.values import ObjectSet, Value, Word
+from vrdp_prob.reasoning.vocabulary import ChangeWord, Vocabulary
 from vrdp_prob.scene import Body, Question, Tracks
 
 DRAWS = 2000
@@ -28,13 +29,17 @@ STATIC = (
 
 
 def check_question(
-    question: str | Sequence[str] | Question, *, choices: Sequence[ChoiceInput] = (), tracks: Tracks | None = None
+    question: str | Sequence[str] | Question,
+    *,
+    choices: Sequence[ChoiceInput] = (),
+    tracks: Tracks | None = None,
+    words: Sequence[ChangeWord] = (),
 ) -> None:
     """Refuse a question that could not be answered, without any inference.
 
     Parameters
     ----------
-    question, choices
+    question, choices, words
         As for `vrdp_prob.reasoning.ask`.
     tracks
         What was seen; where it is given, the objects that the question names by their attributes are looked up.
@@ -45,7 +50,7 @@ def check_question(
         If the question is not understood, needs choices and has none, or names by color, material and shape an object
         that is not in the tracks or that two objects fit.
     """
-    asked = prepare(question, choices)
+    asked = prepare(question, choices, Vocabulary.of(words))
     if tracks is None:
         return
     programs = [program for _, program in asked.options] or ([] if asked.program is None else [asked.program])

@@ -1,14 +1,15 @@
-"""What if an object were removed, heavier or lighter: only what the change can reach is simulated.
+"""What if an object were removed or changed: only what the change can reach is simulated.
 
-Abduction, action, prediction. Until the changed object first touches another, nothing differs from what was seen. From
-then on a body is *reached* once it touches, or fails to touch, one that is reached (or the changed one); a reached body
-is simulated from its last observed state, every other body keeps its observed course and its observed events. Time is
-cut at the observed contacts and at regular steps; at each cut the bodies that are not reached are put back on their
-observed course, so that no error of the model grows in them.
+Abduction, action, prediction. Until the changed object first touches another, nothing differs from what was seen; where
+its speed or its friction changes, its own course differs from its release on. From then on a body is *reached* once it
+touches, or fails to touch, one that is reached (or the changed one); a reached body is simulated from its last
+observed state, every other body keeps its observed course and its observed events. Time is cut at the observed contacts
+and at regular steps; at each cut the bodies that are not reached are put back on their observed course, so that no
+error of the model grows in them.
 
-At the first contact of an object that became heavier or lighter the geometry is what it was: the observed velocity
-changes are kept and scaled as the reduced mass of the pair scales, which carries over the part of the contact that the
-model does not explain.
+At the first contact of an object that became heavier, lighter or bouncier the geometry is what it was: the observed
+velocity changes are kept and scaled as the impulse of the pair scales, which carries over the part of the contact that
+the model does not explain.
 """
 
 from itertools import pairwise
@@ -18,13 +19,15 @@ from jaxtyping import Bool, Float
 
 from vrdp_prob.models.physics import PhysicsModel
 from vrdp_prob.models.simulator.worlds import Worlds
+from vrdp_prob.reasoning.changes import Change
 from vrdp_prob.reasoning.contacts import Contact
+from vrdp_prob.reasoning.facts import MOVING_SPEED
+from vrdp_prob.reasoning.intervention import Intervention
 from vrdp_prob.reasoning.refit import Turning
 from vrdp_prob.reasoning.scattering import Scattering, advance_scattered
 from vrdp_prob.reasoning.seen import SeenVideo
 from vrdp_prob.reasoning.stretch import State, Stretch
 from vrdp_prob.reasoning.timeline import Timeline, WorldDraws
-from vrdp_prob.reasoning.values import MASS_FACTOR, Change
 from vrdp_prob.scene import Shape
 
 LONGEST_STRETCH = 0.4
@@ -48,8 +51,8 @@ class Counterfactual:
     turning
         Gives angle (rad) and spin (rad/s) of a body at a time (s).
     scattering
-        How simulated contacts deviate from the model; None where they follow it exactly.
-    change, body
+        How simulated motion deviates from the model; None where it does not.
+    intervention
         What is done, to which body.
     """
 
@@ -61,15 +64,13 @@ class Counterfactual:
         turning: Turning,
         scattering: Scattering | None = None,
         *,
-        change: Change,
-        body: int,
+        intervention: Intervention,
     ) -> None:
         self._scattering = scattering
         self._seen, self._model, self._turning = seen, model, turning
-        self._change, self._body = change, body
-        factor = {Change.REMOVED: 1.0, Change.HEAVIER: MASS_FACTOR, Change.LIGHTER: 1 / MASS_FACTOR}[change]
-        self._worlds = worlds.with_mass_factor(body, factor)
-        self._factor = factor
+        self._intervention = intervention
+        self._change, self._body = intervention.change, intervention.body
+        self._worlds = intervention.worlds
         self._mass = worlds.mass.detach().numpy()
         radius = worlds.radius.detach().numpy()[0]
         self._reach = radius * np.where([shape.is_disc for shape in worlds.shapes], 1.0, np.sqrt(2))
@@ -88,6 +89,8 @@ class Counterfactual:
         contacts = list(self._seen.contacts)
         for begin, stop in pairwise(cuts.tolist()):
             state = self._back_on_course(begin, state)
+            if begin == self._release:
+                self._at_release(state)
             while contacts and self._time(contacts[0]) <= begin + 1e-9:
                 self._at_contact(contacts.pop(0), state)
             state = self._stretch(state, begin, stop) if self._reached.any() else None
@@ -111,15 +114,29 @@ class Counterfactual:
             touched[:, self._body] = self._reached[:, self._body]
         return touched
 
+    @property
+    def _release(self) -> float | None:
+        """When the change is felt before any contact, in s; None where that is in no draw."""
+        return float(self._first[self._body]) if self._intervention.felt_at_release.any() else None
+
+    def _at_release(self, state: State) -> None:
+        """Another speed or friction reaches its body as soon as it moves."""
+        velocity = state.velocity[:, self._body]
+        felt = self._intervention.felt_at_release & (np.linalg.norm(velocity, axis=1) > MOVING_SPEED)
+        state.velocity[felt, self._body] = self._intervention.released(velocity)[felt]
+        state.rolling[felt, self._body] = state.velocity[felt, self._body]
+        self._reached[felt, self._body] = True
+
     def _time(self, contact: Contact) -> float:
         return float(np.clip(contact.time, self._seen.tracks.times[0], self._seen.tracks.times[-1]))
 
     def _cuts(self) -> Float[np.ndarray, "cut"]:
-        """Times at which bodies are put back on course, from the first contact of the changed body to the end."""
+        """Times at which bodies are put back on course, from where the change is first felt to the end."""
         end = float(self._seen.tracks.times[-1])
         own = [self._time(c) for c in self._seen.contacts if self._body in (c.first, c.second)]
+        own += [] if self._release is None else [self._release]
         begin = min(own, default=end)
-        marks = sorted({begin, end, *(t for t in map(self._time, self._seen.contacts) if begin < t < end)})
+        marks = sorted({begin, end, *own, *(t for t in map(self._time, self._seen.contacts) if begin < t < end)})
         cuts = [marks[0]]
         for mark in marks[1:]:
             pieces = max(int(np.ceil((mark - cuts[-1]) / LONGEST_STRETCH)), 1)
@@ -189,8 +206,9 @@ class Counterfactual:
             for body in pair
         }
         if involves and self._change is not Change.REMOVED:
-            self._scaled_kicks(state, pair, before, free)
-            self._reached[np.ix_(free, list(pair))] = True
+            felt = free & self._intervention.felt_at_contact
+            self._scaled_kicks(state, pair, before, felt)
+            self._reached[np.ix_(felt, list(pair))] = True
         reached = self._reached.copy()
         if self._change is Change.REMOVED:
             reached[:, self._body] = True
@@ -207,16 +225,15 @@ class Counterfactual:
     def _scaled_kicks(
         self, state: State, pair: tuple[int, int], before: dict[int, list[np.ndarray]], draws: Bool[np.ndarray, "draw"]
     ) -> None:
-        """Velocities after the first contact of the changed body: observed kicks, scaled as the reduced mass scales."""
+        """Velocities after the first contact of the changed body: observed kicks, scaled as the impulse scales."""
         changed, other = self._body, pair[0] if pair[1] == self._body else pair[1]
         mass, partner = self._mass[:, changed, None], self._mass[:, other, None]
         kick = {body: state.velocity[:, body] - before[body][1] for body in pair}
         # both kicks tell the impulse: momentum weighs the surer one more
         ratio = mass / partner
         kick_other = (kick[other] - ratio * kick[changed]) / 2
-        scale = self._factor * (mass + partner) / (self._factor * mass + partner)
-        kick_other = kick_other * scale
-        kick_changed = -kick_other * partner / (self._factor * mass)
+        kick_other = kick_other * self._intervention.impulse_ratio(other)[:, None]
+        kick_changed = -kick_other * partner / self._worlds.mass.detach().numpy()[:, changed, None]
         for body, change in ((changed, kick_changed), (other, kick_other)):
             state.velocity[draws, body] = (before[body][1] + change)[draws]
 

@@ -3,11 +3,12 @@
 import numpy as np
 from jaxtyping import Bool
 
+from vrdp_prob.reasoning.changes import Change
 from vrdp_prob.reasoning.events import EventTable, EventUniverse
 from vrdp_prob.reasoning.operations import operation
 from vrdp_prob.reasoning.run import Run
 from vrdp_prob.reasoning.tokens import ORDERS
-from vrdp_prob.reasoning.values import Change, EventRef, EventSet, Moment, ObjectRef, ObjectSet, Word, noun_phrase
+from vrdp_prob.reasoning.values import EventRef, EventSet, Moment, ObjectRef, ObjectSet, Word, noun_phrase
 
 FUTURE = "future"
 _PLACES = {"first": 0, "second": 1, "third": 2}
@@ -153,37 +154,27 @@ def get_col_partner(run: Run, event: EventRef, who: ObjectRef) -> ObjectRef:
 @operation("get_counterfact", EventSet, ObjectRef, gives=EventSet)
 def get_counterfact(run: Run, chosen: EventSet, who: ObjectRef) -> EventSet:
     """Those of the events that happen with the object removed, or changed as `apply_*` says."""
-    return _changed(run, chosen, who, who.change or Change.REMOVED)
-
-
-@operation("counterfact_heavier", EventSet, ObjectRef, gives=EventSet)
-def counterfact_heavier(run: Run, chosen: EventSet, who: ObjectRef) -> EventSet:
-    """Those of the events that happen with the object five times heavier."""
-    return _changed(run, chosen, who, Change.HEAVIER)
-
-
-@operation("counterfact_lighter", EventSet, ObjectRef, gives=EventSet)
-def counterfact_lighter(run: Run, chosen: EventSet, who: ObjectRef) -> EventSet:
-    """Those of the events that happen with the object five times lighter."""
-    return _changed(run, chosen, who, Change.LIGHTER)
+    return changed_events(run, chosen, who, who.change or Change.REMOVED)
 
 
 @operation("get_counterfact", ObjectRef, gives=EventSet)
 def counterfactual_events(run: Run, who: ObjectRef) -> EventSet:
     """What happens with the object removed, or changed as `apply_*` says."""
-    return _changed(run, None, who, who.change or Change.REMOVED)
+    return changed_events(run, None, who, who.change or Change.REMOVED)
 
 
-@operation("counterfact_heavier", ObjectRef, gives=EventSet)
-def heavier_events(run: Run, who: ObjectRef) -> EventSet:
-    """What happens with the object five times heavier."""
-    return _changed(run, None, who, Change.HEAVIER)
-
-
-@operation("counterfact_lighter", ObjectRef, gives=EventSet)
-def lighter_events(run: Run, who: ObjectRef) -> EventSet:
-    """What happens with the object five times lighter."""
-    return _changed(run, None, who, Change.LIGHTER)
+def changed_events(run: Run, chosen: EventSet | None, who: ObjectRef, change: Change) -> EventSet:
+    """Those of the events (without events: all) that happen with a change of one object."""
+    universe = _universe(run)
+    happens = np.zeros((run.facts.draws, universe.size), dtype=bool)
+    time = np.full(happens.shape, np.nan)
+    for body in np.unique(who.index[run.valid]).tolist():
+        run.looked_at.add((change, body))
+        table: EventTable = run.facts.counterfactual_events(change, body)
+        draws = who.index == body
+        happens[draws], time[draws] = table.happens[draws], table.time[draws]
+    phrase = f"event with {who.phrase} {change}"
+    return EventSet(happens if chosen is None else happens & chosen.mask, time, phrase)
 
 
 def _universe(run: Run) -> EventUniverse:
@@ -221,19 +212,6 @@ def _of_kind(run: Run, chosen: EventSet, who: ObjectSet | ObjectRef, kind: str, 
     else:
         phrase = f"{_PHRASES[kind]} of the {name}"
     return EventSet(mask, chosen.time, phrase)
-
-
-def _changed(run: Run, chosen: EventSet | None, who: ObjectRef, change: Change) -> EventSet:
-    universe = _universe(run)
-    happens = np.zeros((run.facts.draws, universe.size), dtype=bool)
-    time = np.full(happens.shape, np.nan)
-    for body in np.unique(who.index[run.valid]).tolist():
-        run.looked_at.add((change, body))
-        table: EventTable = run.facts.counterfactual_events(change, body)
-        draws = who.index == body
-        happens[draws], time[draws] = table.happens[draws], table.time[draws]
-    phrase = f"event with {who.phrase} {change}"
-    return EventSet(happens if chosen is None else happens & chosen.mask, time, phrase)
 
 
 def _require_present(run: Run, event: EventRef) -> None:

@@ -14,11 +14,16 @@ from vrdp_prob.reasoning.facts import Facts
 from vrdp_prob.reasoning.notes import gap_notes
 from vrdp_prob.reasoning.prepared import ChoiceInput, PreparedQuestion, prepare
 from vrdp_prob.reasoning.verdict import YES, Verdict, verdicts
+from vrdp_prob.reasoning.vocabulary import PLAIN, Vocabulary
 from vrdp_prob.scene import Choice, Question
 
 
 def answer_question(
-    facts: Facts, question: str | Sequence[str] | Question, *, choices: Sequence[ChoiceInput] = ()
+    facts: Facts,
+    question: str | Sequence[str] | Question,
+    *,
+    choices: Sequence[ChoiceInput] = (),
+    vocabulary: Vocabulary = PLAIN,
 ) -> Answer:
     """Answer a question about a video.
 
@@ -30,6 +35,8 @@ def answer_question(
         English, a program (a list of tokens), or a question of a question file.
     choices
         Options of a multiple-choice question, each in English, as a program, or as a choice of a question file.
+    vocabulary
+        The words that they may use.
 
     Raises
     ------
@@ -37,7 +44,7 @@ def answer_question(
         If the question cannot be understood, names an object that is not there or that two objects fit, or needs
         choices and has none.
     """
-    asked = prepare(question, choices)
+    asked = prepare(question, choices, vocabulary)
     return _open_answer(facts, asked) if not asked.options else _choice_answer(facts, asked)
 
 

@@ -8,8 +8,9 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from vrdp_prob.reasoning.chance import Purpose, Random, Seeded
+from vrdp_prob.reasoning.changes import Change
 from vrdp_prob.reasoning.events import EventTable
-from vrdp_prob.reasoning.values import Change, Label
+from vrdp_prob.reasoning.values import Label
 from vrdp_prob.scene import Body
 from vrdp_prob.scene.body import ATTRIBUTES, COLORS, MATERIALS, Shape
 

@@ -7,7 +7,7 @@ from vrdp_prob.reasoning.naming import likely_name, number_word, uncertainties
 from vrdp_prob.reasoning.operations import operation
 from vrdp_prob.reasoning.run import Run
 from vrdp_prob.reasoning.tokens import ANY_FRAME, SHAPES
-from vrdp_prob.reasoning.values import Change, Moment, ObjectRef, ObjectSet, Word, noun_phrase
+from vrdp_prob.reasoning.values import Moment, ObjectRef, ObjectSet, Word, noun_phrase
 from vrdp_prob.scene.body import COLORS, MATERIALS
 
 
@@ -76,20 +76,6 @@ def unique(run: Run, chosen: ObjectSet) -> ObjectRef:
         uncertainties(run.facts, chosen.mask[run.valid], chosen.words),
     )
     return ObjectRef(chosen.mask.argmax(axis=1), chosen.words)
-
-
-@operation("apply_heavier", ObjectRef, gives=ObjectRef)
-def apply_heavier(run: Run, chosen: ObjectRef) -> ObjectRef:
-    """The object, to be made five times heavier in the counterfactual that follows."""
-    del run
-    return ObjectRef(chosen.index, chosen.words, Change.HEAVIER)
-
-
-@operation("apply_lighter", ObjectRef, gives=ObjectRef)
-def apply_lighter(run: Run, chosen: ObjectRef) -> ObjectRef:
-    """The object, to be made five times lighter in the counterfactual that follows."""
-    del run
-    return ObjectRef(chosen.index, chosen.words, Change.LIGHTER)
 
 
 def _with_attribute(run: Run, chosen: ObjectSet, name: str, word: Word) -> ObjectSet:

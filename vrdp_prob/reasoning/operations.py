@@ -2,10 +2,11 @@
 
 An operation is a small function. Its first argument is the run (facts and valid draws), the others are what it takes
 off the stack, in the order in which the program pushed them. A token with several signatures is tried from the longest
-to the shortest. The functions are in `object_operations`, `event_operations` and `output_operations`.
+to the shortest. The functions are in `object_operations`, `event_operations`, `output_operations` and
+`change_operations`.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
@@ -54,18 +55,35 @@ class Operation:
 REGISTRY: dict[str, list[Operation]] = {}
 
 
+def register(signature: Operation) -> None:
+    """Add a signature to the registry."""
+    signatures = REGISTRY.setdefault(signature.token, [])
+    signatures.append(signature)
+    signatures.sort(key=_longest_first)
+
+
+def by_token(operations: Sequence[Operation]) -> dict[str, list[Operation]]:
+    """Signatures by their token, from the longest to the shortest."""
+    return {
+        token: sorted((one for one in operations if one.token == token), key=_longest_first)
+        for token in dict.fromkeys(one.token for one in operations)
+    }
+
+
 def operation(
     token: str, *takes: type | tuple[type, ...], gives: type, words: tuple[str, ...] = ()
 ) -> Callable[[Function], Function]:
     """Register a function as a signature of a token."""
 
-    def register(function: Function) -> Function:
+    def registered(function: Function) -> Function:
         allowed = tuple(kind if isinstance(kind, tuple) else (kind,) for kind in takes)
         if any(Word in kinds for kinds in allowed) != bool(words):
             raise TypeError(f"{token}: a word argument needs its list of words, and only that does")
-        signatures = REGISTRY.setdefault(token, [])
-        signatures.append(Operation(token, allowed, gives, function, words))
-        signatures.sort(key=lambda candidate: -len(candidate.takes))
+        register(Operation(token, allowed, gives, function, words))
         return function
 
-    return register
+    return registered
+
+
+def _longest_first(signature: Operation) -> int:
+    return -len(signature.takes)

@@ -7,6 +7,7 @@ from vrdp_prob.errors import InputError
 from vrdp_prob.reasoning.language import Reading, read_choice, read_question
 from vrdp_prob.reasoning.program import ENTRIES, Program, check, needs_choices, question_type
 from vrdp_prob.reasoning.values import Truth
+from vrdp_prob.reasoning.vocabulary import PLAIN, Vocabulary
 from vrdp_prob.scene import Choice, Question, QuestionType
 
 ChoiceInput = str | Sequence[str] | Choice
@@ -35,24 +36,29 @@ class PreparedQuestion:
     notes: tuple[str, ...] = ()
 
 
-def prepare(question: str | Sequence[str] | Question, choices: Sequence[ChoiceInput]) -> PreparedQuestion:
+def prepare(
+    question: str | Sequence[str] | Question, choices: Sequence[ChoiceInput], vocabulary: Vocabulary = PLAIN
+) -> PreparedQuestion:
     """Understand a question and its choices; raises `InputError` as `answer_question` does."""
     stated = _as_question(question)
-    reading = Reading(stated.program) if stated.program is not None else read_question(stated.text)
+    reading = (
+        Reading(stated.program) if stated.program is not None else read_question(stated.text, vocabulary.comparatives)
+    )
     program = reading.program
     kind = stated.question_type or question_type(program)
     given = [_as_choice(number, choice) for number, choice in enumerate(choices)] or list(stated.choices)
-    if not needs_choices(program):
+    if not needs_choices(program, vocabulary):
         if given:
             raise InputError(f"'{stated.text}' is answered without choices; leave them out.")
-        return PreparedQuestion(stated, kind, check(program), (), _how_read(reading))
+        return PreparedQuestion(stated, kind, check(program, vocabulary=vocabulary), (), _how_read(reading))
     if not given:
         raise InputError(f"'{stated.text}' needs choices to judge; give at least one (--choice TEXT).")
     readings = [
         Reading(choice.program) if choice.program is not None else read_choice(choice.text, kind) for choice in given
     ]
     options = tuple(
-        (choice, _judged(choice, option.program, program)) for choice, option in zip(given, readings, strict=True)
+        (choice, _judged(choice, option.program, program, vocabulary))
+        for choice, option in zip(given, readings, strict=True)
     )
     return PreparedQuestion(stated, kind, None, options, _how_read(reading, *readings))
 
@@ -61,11 +67,11 @@ def _how_read(*readings: Reading) -> tuple[str, ...]:
     return tuple(dict.fromkeys(reading.note for reading in readings if reading.note is not None))
 
 
-def _judged(choice: Choice, program: Sequence[str], question_program: Sequence[str]) -> Program:
+def _judged(choice: Choice, program: Sequence[str], question_program: Sequence[str], vocabulary: Vocabulary) -> Program:
     """The program of a choice followed by that of its question."""
     try:
         check(program, ends_in=ENTRIES)
-        return check((*program, *question_program), ends_in=(Truth,))
+        return check((*program, *question_program), ends_in=(Truth,), vocabulary=vocabulary)
     except InputError as error:
         raise InputError(f"choice '{choice.text}': {error}") from error
 

@@ -8,8 +8,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from vrdp_prob.errors import InputError
-from vrdp_prob.reasoning import event_operations, object_operations, output_operations
-from vrdp_prob.reasoning.operations import REGISTRY, Operation
+from vrdp_prob.reasoning import change_operations, event_operations, object_operations, output_operations
+from vrdp_prob.reasoning.change_operations import COUNTERFACT
+from vrdp_prob.reasoning.operations import Operation
 from vrdp_prob.reasoning.run import Run
 from vrdp_prob.reasoning.tokens import ANY_FRAME, CONCEPTS, OTHER_SPELLINGS, meaningful
 from vrdp_prob.reasoning.values import (
@@ -22,9 +23,10 @@ from vrdp_prob.reasoning.values import (
     Value,
     Word,
 )
+from vrdp_prob.reasoning.vocabulary import PLAIN, Vocabulary
 from vrdp_prob.scene import QuestionType
 
-OPERATION_MODULES = (event_operations, object_operations, output_operations)
+OPERATION_MODULES = (change_operations, event_operations, object_operations, output_operations)
 """Modules whose import fills the registry."""
 
 ANSWERS = (Truth, Count, Label)
@@ -66,7 +68,13 @@ class Program:
         return stack[-1]
 
 
-def check(program: Sequence[str], *, ends_in: tuple[type, ...] = ANSWERS, given: type | None = None) -> Program:
+def check(
+    program: Sequence[str],
+    *,
+    ends_in: tuple[type, ...] = ANSWERS,
+    given: type | None = None,
+    vocabulary: Vocabulary = PLAIN,
+) -> Program:
     """Type-check a program.
 
     Parameters
@@ -77,6 +85,8 @@ def check(program: Sequence[str], *, ends_in: tuple[type, ...] = ANSWERS, given:
         Types that its result may have.
     given
         Type of a value that lies on the stack before it begins, as a choice leaves one for its question.
+    vocabulary
+        The words it may use.
 
     Raises
     ------
@@ -91,8 +101,8 @@ def check(program: Sequence[str], *, ends_in: tuple[type, ...] = ANSWERS, given:
     words: list[str | None] = [None] * len(stack)
     steps: list[Operation | Word] = []
     for place, token in enumerate(tokens, start=1):
-        if token in REGISTRY:
-            chosen = _signature(place, token, stack)
+        if token in vocabulary.operations:
+            chosen = _signature(place, token, stack, vocabulary)
             count = len(chosen.takes)
             _check_word(place, token, chosen, words[len(words) - count :])
             del stack[len(stack) - count :]
@@ -105,7 +115,7 @@ def check(program: Sequence[str], *, ends_in: tuple[type, ...] = ANSWERS, given:
             words.append(token)
             steps.append(Word(token))
         else:
-            raise InputError(f"program token {place} '{token}' is unknown{_suggestion(token)}.")
+            raise InputError(f"program token {place} '{token}' is unknown{_suggestion(token, vocabulary)}.")
     if len(stack) > 1:
         left = ", ".join(TYPE_NAMES[kind] for kind in stack[:-1])
         raise InputError(
@@ -121,16 +131,16 @@ def check(program: Sequence[str], *, ends_in: tuple[type, ...] = ANSWERS, given:
     return Program(tokens, tuple(steps), stack[-1])
 
 
-def needs_choices(program: Sequence[str]) -> bool:
+def needs_choices(program: Sequence[str], vocabulary: Vocabulary = PLAIN) -> bool:
     """Whether a question's program judges choices: it does not run by itself, but does on an event or an object."""
-    if _fits(program, None):
+    if _fits(program, None, vocabulary):
         return False
-    return "belong_to" in meaningful(tuple(program)) or any(_fits(program, entry) for entry in ENTRIES)
+    return "belong_to" in meaningful(tuple(program)) or any(_fits(program, entry, vocabulary) for entry in ENTRIES)
 
 
-def _fits(program: Sequence[str], given: type | None) -> bool:
+def _fits(program: Sequence[str], given: type | None, vocabulary: Vocabulary) -> bool:
     try:
-        check(program, given=given)
+        check(program, given=given, vocabulary=vocabulary)
     except InputError:
         return False
     return True
@@ -139,15 +149,15 @@ def _fits(program: Sequence[str], given: type | None) -> bool:
 def question_type(program: Sequence[str]) -> QuestionType:
     """Kind of a question, read off its program."""
     tokens = set(meaningful(tuple(program)))
-    if tokens & {"get_counterfact", "counterfact_heavier", "counterfact_lighter"}:
+    if any(token == "get_counterfact" or token.startswith(COUNTERFACT) for token in tokens):
         return QuestionType.COUNTERFACTUAL
     if "unseen_events" in tokens:
         return QuestionType.PREDICTIVE
     return QuestionType.EXPLANATORY if "filter_ancestor" in tokens else QuestionType.DESCRIPTIVE
 
 
-def _signature(place: int, token: str, stack: list[type]) -> Operation:
-    signatures = REGISTRY[token]
+def _signature(place: int, token: str, stack: list[type], vocabulary: Vocabulary) -> Operation:
+    signatures = vocabulary.operations[token]
     for candidate in signatures:
         if candidate.fits(stack):
             return candidate
@@ -167,7 +177,7 @@ def _check_word(place: int, token: str, chosen: Operation, given: list[str | Non
             raise InputError(f"program token {place} '{token}' takes one of {', '.join(chosen.words)}, not '{word}'.")
 
 
-def _suggestion(token: str) -> str:
-    known = [*REGISTRY, *OTHER_SPELLINGS, *(CONCEPTS - {ANY_FRAME})]
+def _suggestion(token: str, vocabulary: Vocabulary) -> str:
+    known = [*vocabulary.operations, *OTHER_SPELLINGS, *(CONCEPTS - {ANY_FRAME})]
     close = difflib.get_close_matches(token, known, n=1)
     return f"; did you mean '{close[0]}'?" if close else "; see docs/questions.md for the tokens"

@@ -7,8 +7,8 @@ import numpy as np
 from jaxtyping import Bool
 
 from vrdp_prob.errors import InputError
+from vrdp_prob.reasoning.changes import Change
 from vrdp_prob.reasoning.facts import Facts
-from vrdp_prob.reasoning.values import Change
 
 SMALLEST_VALID_SHARE = 0.01
 """A question that makes sense in fewer draws than this share is refused instead of answered from a handful."""

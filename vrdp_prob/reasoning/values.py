@@ -2,22 +2,11 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from enum import StrEnum
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-
-class Change(StrEnum):
-    """What an intervention does to one object."""
-
-    REMOVED = "removed"
-    HEAVIER = "heavier"
-    LIGHTER = "lighter"
-
-
-MASS_FACTOR = 5.0
-"""Heavier is five times the mass, lighter a fifth (Ding et al., NeurIPS 2021)."""
+from vrdp_prob.reasoning.changes import Change
 
 
 @dataclass(frozen=True)

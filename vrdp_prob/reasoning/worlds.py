@@ -13,6 +13,7 @@ from vrdp_prob.models.simulator.rollout import Rollout
 from vrdp_prob.progress import ProgressDisplay, SilentProgress
 from vrdp_prob.reasoning.batch import Batch, Horizon
 from vrdp_prob.reasoning.chance import Chance, Purpose, Seeded
+from vrdp_prob.reasoning.changes import Change
 from vrdp_prob.reasoning.coupled import Coupled
 from vrdp_prob.reasoning.defaults import DEFAULT, Defaults
 from vrdp_prob.reasoning.deviations import DeviationModel
@@ -23,7 +24,7 @@ from vrdp_prob.reasoning.posterior_like import PosteriorLike
 from vrdp_prob.reasoning.seen import SeenVideo
 from vrdp_prob.reasoning.stock import Stock
 from vrdp_prob.reasoning.timeline import WorldDraws
-from vrdp_prob.reasoning.values import Change, Label
+from vrdp_prob.reasoning.values import Label
 from vrdp_prob.scene import Body
 
 DRAWS = 400

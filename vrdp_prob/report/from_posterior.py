@@ -10,6 +10,7 @@ from vrdp_prob.inference.posterior import Posterior
 from vrdp_prob.inference.prior_sensitivity import prior_sensitivity
 from vrdp_prob.progress import ProgressDisplay
 from vrdp_prob.reasoning.answer import Answer
+from vrdp_prob.reasoning.vocabulary import ChangeWord
 from vrdp_prob.reasoning.worlds import PosteriorWorlds
 from vrdp_prob.report.asked import world_of
 from vrdp_prob.report.content import AnswerContent, ReportContent
@@ -27,6 +28,7 @@ def build(
     worlds: PosteriorWorlds | None = None,
     frames: UInt8[np.ndarray, "frame height width 3"] | None = None,
     draws: int = PLAYER_DRAWS,
+    words: Sequence[ChangeWord] = (),
     progress: ProgressDisplay | None = None,
 ) -> ReportContent:
     """Collect what a report says.
@@ -43,11 +45,14 @@ def build(
         Pictures of the video (red, green, blue) at the tracks' frame rate from time 0, where there is a video.
     draws
         Number of posterior draws that the player shows, evenly spaced over the posterior.
+    words
+        Learned words; the player shows what a built-in word among them means now.
     progress
         Told how far the work is.
     """
     tracks = posterior.tracks
     asked = tuple(AnswerContent.of(answer, world_of(answer, tracks.bodies)) for answer in answers)
+    led_to = {item.world for item in asked if item.world is not None}
     few = PosteriorWorlds(posterior, draws=draws, progress=progress)
     return ReportContent(
         tracks=tracks,
@@ -57,7 +62,7 @@ def build(
         convergence=posterior.convergence,
         warnings=posterior.warnings,
         answers=asked,
-        worlds=player_worlds(few, asked={item.world for item in asked if item.world is not None}, many=worlds),
+        worlds=player_worlds(few, asked=led_to, many=worlds, words=words),
         model=posterior.model.name,
         effects=tuple(effect.name for effect in posterior.model.effects),
         seed=posterior.seed,

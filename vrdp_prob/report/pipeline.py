@@ -13,6 +13,7 @@ from vrdp_prob.perception.video import read_frames
 from vrdp_prob.progress import ProgressDisplay, SilentProgress
 from vrdp_prob.reasoning import Answer, PosteriorWorlds, ask
 from vrdp_prob.reasoning.checking import check_question
+from vrdp_prob.reasoning.vocabulary import ChangeWord
 from vrdp_prob.report.content import ReportContent
 from vrdp_prob.report.from_posterior import build
 from vrdp_prob.report.summary import summary
@@ -57,6 +58,7 @@ def report(
     model: PhysicsModel | None = None,
     noise: str = "auto",
     defaults: str = "fixed",
+    words: Sequence[ChangeWord] = (),
     checkpoint: Path | str | None = None,
     seed: int = 0,
     progress: ProgressDisplay | None = None,
@@ -75,6 +77,8 @@ def report(
         The video itself, for the pictures in the page.
     sampler, model, noise, defaults, checkpoint, seed
         How the posterior is drawn, where `source` is not one yet; see `vrdp_prob.infer`.
+    words
+        Learned words that the questions may use.
     progress
         Who follows the work.
 
@@ -88,7 +92,7 @@ def report(
     check_writable(directory)
     if video_file is not None and not Path(video_file).is_file():
         raise InputError(f"{video_file}: there is no such video file; check the path.")
-    check_questions(questions, tracks=source if isinstance(source, Tracks) else source.tracks)
+    check_questions(questions, tracks=source if isinstance(source, Tracks) else source.tracks, words=words)
     if isinstance(source, Posterior):
         posterior = source
     else:
@@ -106,11 +110,11 @@ def report(
     answers = []
     with progress.stage("Questions", total=len(questions)) as advance:
         for question in questions:
-            answers.append(ask(worlds, question))
+            answers.append(ask(worlds, question, words=words))
             advance(1)
     with progress.stage("Report") as advance:
         frames = None if video_file is None else read_frames(Path(video_file)).frames
-        content = build(posterior, answers, worlds=worlds, frames=frames)
+        content = build(posterior, answers, worlds=worlds, frames=frames, words=words)
         saved = directory / "posterior.nc"
         with write_atomically(saved) as new_posterior:
             fill_file(posterior, new_posterior)
@@ -118,7 +122,9 @@ def report(
     return Report(posterior, tuple(answers), content, (written.page, written.document, saved))
 
 
-def check_questions(questions: Sequence[Question | str], *, tracks: Tracks | None = None) -> None:
+def check_questions(
+    questions: Sequence[Question | str], *, tracks: Tracks | None = None, words: Sequence[ChangeWord] = ()
+) -> None:
     """Refuse questions that could not be answered, before any work on the video.
 
     Parameters
@@ -127,6 +133,8 @@ def check_questions(questions: Sequence[Question | str], *, tracks: Tracks | Non
         Questions to answer.
     tracks
         What was seen, where it is known already; see `vrdp_prob.reasoning.checking.check_question`.
+    words
+        Learned words that the questions may use.
 
     Raises
     ------
@@ -136,6 +144,6 @@ def check_questions(questions: Sequence[Question | str], *, tracks: Tracks | Non
     for number, question in enumerate(questions, start=1):
         name = question.question_id if isinstance(question, Question) else None
         try:
-            check_question(question, tracks=tracks)
+            check_question(question, tracks=tracks, words=words)
         except InputError as error:
             raise InputError(f"question {number if name is None else name}: {error}") from error

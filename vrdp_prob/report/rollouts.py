@@ -1,14 +1,15 @@
 """From the worlds that answers come from to what the player shows of them."""
 
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 
 import numpy as np
 from jaxtyping import Float
 
 from vrdp_prob.reasoning.answer import monte_carlo_error
+from vrdp_prob.reasoning.changes import Change
 from vrdp_prob.reasoning.events import EventTable
 from vrdp_prob.reasoning.timeline import WorldDraws
-from vrdp_prob.reasoning.values import Change
+from vrdp_prob.reasoning.vocabulary import ChangeWord
 from vrdp_prob.reasoning.worlds import PosteriorWorlds
 from vrdp_prob.report.content import Collisions, PairShare, WorldContent, WorldKind
 from vrdp_prob.scene import Tracks
@@ -24,7 +25,11 @@ _KINDS = {
 
 
 def player_worlds(
-    few: PosteriorWorlds, *, asked: Collection[str] = (), many: PosteriorWorlds | None = None
+    few: PosteriorWorlds,
+    *,
+    asked: Collection[str] = (),
+    many: PosteriorWorlds | None = None,
+    words: Sequence[ChangeWord] = (),
 ) -> tuple[WorldContent, ...]:
     """The video, what happens next, and the video with each body removed, heavier and lighter.
 
@@ -35,6 +40,8 @@ def player_worlds(
     asked, many
         Keys of the worlds that answers come from, and the draws that these were counted in: such a world is shown by an
         even choice of those, and its probabilities are theirs.
+    words
+        Learned words, in place of the built-in ones that they redefine.
     """
     count = few.draws
     first = _factual(many or few, count)
@@ -42,7 +49,9 @@ def player_worlds(
     key = str(WorldKind.FUTURE)
     source = _source(key, few, asked, many)
     shown.append(_simulated(source.future, source.effective_draws, count, WorldKind.FUTURE))
-    for change, kind in _KINDS.items():
+    learned = {word.change.word: word.change for word in words}
+    for built_in, kind in _KINDS.items():
+        change = learned.get(built_in.word, built_in)
         for place, body in enumerate(few.bodies):
             source = _source(f"{kind}:{body.id}", few, asked, many)
             world = source.counterfactual(change, place)

@@ -4,6 +4,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import StrEnum
 
+RIGHT, WRONG = "correct", "wrong"
+"""Judgements of a choice in CLEVRER's files."""
+
 
 class QuestionType(StrEnum):
     """The four kinds of questions of CLEVRER."""
@@ -65,3 +68,10 @@ class Question:
     question_id: int | str | None = None
     answer: str | None = None
     labels: Mapping[str, str] | None = None
+
+    @property
+    def is_answered(self) -> bool:
+        """Whether its right answer is known: that of every choice where it has some."""
+        if self.choices:
+            return all(choice.answer is not None for choice in self.choices)
+        return self.answer is not None

@@ -106,7 +106,7 @@ class Worlds:
         present[:, body] = False
         return replace(self, present=present)
 
-    def with_mass_factor(self, body: int, factor: float) -> "Worlds":
+    def with_mass_factor(self, body: int, factor: float | Float[Tensor, "world"]) -> "Worlds":
         """The same worlds with the mass (and the moment of inertia) of a body multiplied."""
         scale = torch.ones_like(self.mass)
         scale[:, body] = factor

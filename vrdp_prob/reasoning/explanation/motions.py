@@ -5,10 +5,10 @@ from collections.abc import Mapping
 import numpy as np
 from jaxtyping import Float
 
+from vrdp_prob.reasoning.changes import Change
 from vrdp_prob.reasoning.explanation.parameters import relevant_bodies
 from vrdp_prob.reasoning.explanation.quantities import Kind, Measurement, Quantity
 from vrdp_prob.reasoning.run import World
-from vrdp_prob.reasoning.values import Change
 from vrdp_prob.reasoning.worlds import PosteriorWorlds
 from vrdp_prob.scene import Shape
 

@@ -12,7 +12,11 @@ from vrdp_prob.reasoning.prepared import PreparedQuestion
 from vrdp_prob.reasoning.verdict import Verdict, verdicts
 from vrdp_prob.reasoning.worlds import PosteriorWorlds
 
-_PARAMETERS: Mapping[Purpose, float] = {Purpose.FRICTION: 1.0, Purpose.LAST_FRICTION: 1.0}
+_PARAMETERS: Mapping[Purpose, float] = {
+    Purpose.FRICTION: 1.0,
+    Purpose.LAST_FRICTION: 1.0,
+    Purpose.MEANING: 1.0,
+}
 _EVENTS: Mapping[Purpose, float] = {
     **_PARAMETERS,
     Purpose.CONTACTS: 1.0,

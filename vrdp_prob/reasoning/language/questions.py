@@ -1,5 +1,7 @@
 """Rules for whole questions."""
 
+from collections.abc import Mapping
+
 from vrdp_prob.reasoning.language.phrases import (
     COLLIDE,
     NounPhrase,
@@ -15,18 +17,20 @@ from vrdp_prob.reasoning.language.phrases import (
     the_object,
 )
 from vrdp_prob.reasoning.language.reader import NoReadingError, Reader
-from vrdp_prob.reasoning.language.words import ATTRIBUTE_WORDS, STATES
+from vrdp_prob.reasoning.language.words import ATTRIBUTE_WORDS, COMPARATIVES, STATES
 
 WHICH = ("what", "which event", "which events", "which of the following", "which of these")
 
 
-def question_by_grammar(text: str) -> Tokens:
+def question_by_grammar(text: str, comparatives: Mapping[str, str] = COMPARATIVES) -> Tokens:
     """Program of a question in English.
 
     Parameters
     ----------
     text
         A question in CLEVRER's wording; case and punctuation do not matter.
+    comparatives
+        Words that say how an object would be changed, and their tokens.
 
     Raises
     ------
@@ -35,7 +39,7 @@ def question_by_grammar(text: str) -> Tokens:
     NotUnderstoodError
         If it is not understood; the message names the word.
     """
-    reader = Reader(text)
+    reader = Reader(text, comparatives=comparatives)
     rules = (_counting, _existing, _doing, _attribute, _responsible, _next, _changed, _yes_no_prediction)
     return reader.whole(*(lambda rule=rule: rule(reader) for rule in rules))
 
@@ -265,7 +269,7 @@ def _happening(reader: Reader) -> bool:
 
 
 def _change(reader: Reader) -> Tokens:
-    """'without the X', 'if the X were five times heavier'."""
+    """'without the X', 'if the X were five times heavier', 'if the X were' another word for a change."""
     if reader.accept("without"):
         return (*the_object(reader), "get_counterfact")
     reader.expect("if")
@@ -273,8 +277,10 @@ def _change(reader: Reader) -> Tokens:
     reader.expect("is", "are", "was", "were", "had been")
     if reader.accept("removed", "taken away", "gone", "not there", "absent"):
         return (*changed, "get_counterfact")
-    reader.accept("five times", "5 times", "much", "times")
-    return (*changed, reader.one_of({"heavier": "counterfact_heavier", "lighter": "counterfact_lighter"}))
+    if reader.accept("five times", "5 times", "times"):
+        return (*changed, reader.one_of(COMPARATIVES))
+    reader.accept("much")
+    return (*changed, reader.one_of(reader.comparatives))
 
 
 def _yes_no_prediction(reader: Reader) -> Tokens:

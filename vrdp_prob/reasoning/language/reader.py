@@ -1,10 +1,10 @@
 """A reader of words that can go back, and remembers how far any reading got."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import TypeVar
 
 from vrdp_prob.errors import InputError
-from vrdp_prob.reasoning.language.words import split
+from vrdp_prob.reasoning.language.words import COMPARATIVES, split
 
 Result = TypeVar("Result")
 
@@ -33,11 +33,14 @@ class Reader:
         A question or a choice.
     kind
         What it is, for messages.
+    comparatives
+        Words that say how an object would be changed, and their tokens.
     """
 
-    def __init__(self, text: str, kind: str = "question") -> None:
+    def __init__(self, text: str, kind: str = "question", comparatives: Mapping[str, str] = COMPARATIVES) -> None:
         self.text = text
         self.kind = kind
+        self.comparatives = comparatives
         self.words = split(text)
         self.place = 0
         self._furthest = 0
@@ -64,7 +67,7 @@ class Reader:
         if not self.accept(*phrases):
             raise NoReadingError
 
-    def one_of(self, table: dict[str, Result]) -> Result:
+    def one_of(self, table: Mapping[str, Result]) -> Result:
         """Read a word of a table and give what it stands for, or give up this reading."""
         if self.next in table:
             self.place += 1

@@ -1,12 +1,13 @@
 """English to programs: by the grammar, and by the learned parser where the grammar does not know the wording."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from vrdp_prob.reasoning.language.choices import choice_by_grammar, choice_for
 from vrdp_prob.reasoning.language.meaning import Tokens
 from vrdp_prob.reasoning.language.questions import question_by_grammar
 from vrdp_prob.reasoning.language.reader import NotUnderstoodError, not_understood
-from vrdp_prob.reasoning.language.words import split
+from vrdp_prob.reasoning.language.words import COMPARATIVES, split
 from vrdp_prob.reasoning.notes import share_words
 from vrdp_prob.scene import QuestionType
 
@@ -27,8 +28,15 @@ class Reading:
     note: str | None = None
 
 
-def read_question(text: str) -> Reading:
+def read_question(text: str, comparatives: Mapping[str, str] = COMPARATIVES) -> Reading:
     """Read a question in English; case and punctuation do not matter.
+
+    Parameters
+    ----------
+    text
+        The question.
+    comparatives
+        Words that say how an object would be changed, and their tokens.
 
     Raises
     ------
@@ -36,7 +44,7 @@ def read_question(text: str) -> Reading:
         If it is empty or not understood; the message names the word.
     """
     try:
-        return Reading(question_by_grammar(text))
+        return Reading(question_by_grammar(text, comparatives))
     except NotUnderstoodError as refusal:
         return _learned("question", text, refusal)
 

@@ -20,6 +20,9 @@ NOUNS = {
 PLURALS = {f"{noun}s": shape for noun, shape in NOUNS.items()}
 ORDER_WORDS = {"first": "first", "second": "second", "third": "third", "last": "last"}
 ATTRIBUTE_WORDS = {"color": "color", "colour": "color", "material": "material", "shape": "shape"}
+COMPARATIVES = {"heavier": "counterfact_heavier", "lighter": "counterfact_lighter"}
+"""Words that say how an object would be changed, and their tokens."""
+
 STATES = {"moving": "filter_moving", "stationary": "filter_stationary"}
 
 _WORD = re.compile(r"[a-z]+|'s|[^\sa-z]+")

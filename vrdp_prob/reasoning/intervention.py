@@ -1,0 +1,96 @@
+"""A change of one object as every draw has it: each draw takes one of the meanings of its word."""
+
+from dataclasses import replace
+from functools import cached_property
+
+import numpy as np
+import torch
+from jaxtyping import Bool, Float, Int
+
+from vrdp_prob.models.effects.body_friction import FRICTION_RATIO
+from vrdp_prob.models.simulator.worlds import Worlds
+from vrdp_prob.reasoning.chance import Random
+from vrdp_prob.reasoning.changes import Change, PhysicalParameter
+
+MASS, RESTITUTION, FRICTION, SPEED = PhysicalParameter
+
+
+class Intervention:
+    """A change of one body, in all draws.
+
+    A changed speed is felt from the release on, a changed mass or restitution from the first contact, and a changed
+    friction from the release of a body that moves, else from the first contact.
+
+    Parameters
+    ----------
+    change, body
+        What is done, to which body.
+    worlds
+        The draws before it.
+    numbers
+        Picks the meaning of each draw where the word may mean several things.
+    """
+
+    def __init__(self, change: Change, body: int, worlds: Worlds, numbers: Random) -> None:
+        self.change, self.body, self._before = change, body, worlds
+        self._taken: Int[np.ndarray, "draw"] = np.zeros(len(worlds), dtype=int)
+        if len(change.meanings) > 1:
+            probabilities = np.array([meaning.probability for meaning in change.meanings])
+            self._taken = numbers.choice(np.arange(len(probabilities)), len(worlds), p=probabilities)
+
+    @cached_property
+    def worlds(self) -> Worlds:
+        """The draws with the changed mass, restitution and friction."""
+        mass, bounce = self._constants(self.body)
+        worlds = self._before.with_mass_factor(self.body, torch.from_numpy(self._shifted(MASS, mass) / mass))
+        restitution = worlds.restitution.clone()
+        restitution[:, self.body] = torch.from_numpy(self._shifted(RESTITUTION, bounce))
+        return replace(worlds, restitution=restitution, parameters=self._parameters())
+
+    @property
+    def felt_at_release(self) -> Bool[np.ndarray, "draw"]:
+        """Draws in which the course of a moving body differs from its release on."""
+        return self._changes(SPEED) | self._changes(FRICTION)
+
+    @property
+    def felt_at_contact(self) -> Bool[np.ndarray, "draw"]:
+        """Draws in which the course of the body differs at the latest from its first contact on."""
+        return self._changes(MASS) | self._changes(RESTITUTION) | self._changes(FRICTION)
+
+    def released(self, velocity: Float[np.ndarray, "draw 2"]) -> Float[np.ndarray, "draw 2"]:
+        """Velocity of the moving body at its release, in m/s, after the change."""
+        speed = np.linalg.norm(velocity, axis=1)
+        return velocity * (self._shifted(SPEED, speed) / np.maximum(speed, np.finfo(float).tiny))[:, None]
+
+    def impulse_ratio(self, partner: int) -> Float[np.ndarray, "draw"]:
+        """Impulse of a contact with another body over what it was: as (1 + e) m1 m2 / (m1 + m2) changes."""
+        (mass, bounce), (other, other_bounce) = self._constants(self.body), self._constants(partner)
+        changed = self._shifted(MASS, mass)
+        reduced = changed * (mass + other) / (mass * (changed + other))
+        return reduced * (1 + self._shifted(RESTITUTION, bounce) * other_bounce) / (1 + bounce * other_bounce)
+
+    def _constants(self, body: int) -> tuple[Float[np.ndarray, "draw"], Float[np.ndarray, "draw"]]:
+        """Mass (kg) and restitution factor of a body before the change."""
+        return self._before.mass[:, body].detach().numpy(), self._before.restitution[:, body].detach().numpy()
+
+    def _parameters(self) -> dict[str, torch.Tensor]:
+        parameters = dict(self._before.parameters)
+        # without dry friction there is none to change
+        if self._changes(FRICTION).any() and FRICTION_RATIO.name in parameters:
+            ratio = parameters[FRICTION_RATIO.name].clone()
+            ratio[:, self.body] = torch.from_numpy(self._shifted(FRICTION, ratio[:, self.body].detach().numpy()))
+            parameters[FRICTION_RATIO.name] = ratio
+        return parameters
+
+    def _changes(self, parameter: PhysicalParameter) -> Bool[np.ndarray, "draw"]:
+        """Draws whose meaning changes a parameter."""
+        of_it = [meaning.shift is not None and meaning.shift.parameter is parameter for meaning in self.change.meanings]
+        return np.array([*of_it, False], dtype=bool)[self._taken if of_it else np.full(len(self._taken), -1)]
+
+    def _shifted(self, parameter: PhysicalParameter, values: Float[np.ndarray, "draw"]) -> Float[np.ndarray, "draw"]:
+        """Values of a parameter of the body after the change."""
+        shifted = values.copy()
+        for place in np.unique(self._taken[self._changes(parameter)]).tolist():
+            shift, own = self.change.meanings[place].shift, self._taken == place
+            shifted[own] = values[own] if shift is None else shift.of(values[own])
+        return shifted

@@ -4,9 +4,7 @@ from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
-import torch
 
-from vrdp_prob.models.simulator.worlds import Worlds
 from vrdp_prob.reasoning.batch import FUTURE_FRAMES
 from vrdp_prob.reasoning.chance import Purpose, Seeded
 from vrdp_prob.reasoning.changes import Change
@@ -96,7 +94,7 @@ class ReleasedWorlds:
         changed = worlds if change is None else Intervention(change, body, worlds, numbers).worlds
         times = self.posterior.tracks.times
         more = times[-1] + np.arange(1, FUTURE_FRAMES + 1) / self.posterior.tracks.frame_rate
-        state = _at_release(worlds)
+        state = State.released(changed)
         if change is not None and change.removes:
             state.present[:, body] = False
         return advance(changed, state, np.concatenate([times, more]), self.posterior.model)
@@ -105,20 +103,13 @@ class ReleasedWorlds:
         """Events up to the end of the video, or after it."""
         end = float(self.posterior.tracks.times[-1])
         timeline = Timeline(self._universe, self.draws, self.posterior.tracks.camera)
+        if not until:
+            met = self._universe.collisions
+            timeline.met[:, met] = self.events().happens[:, met]
         for meeting in stretch.meetings():
             within = meeting.time <= end
-            if not until:
-                timeline.note_earlier(meeting, within)
             timeline.note_meeting(meeting, within if until else ~within)
         chosen = stretch.times <= end if until else stretch.times >= end
         parts = stretch.position[:, chosen], stretch.exists[:, chosen]
         timeline.note_crossings(stretch.times[chosen], *parts, np.ones_like(timeline.collided))
         return timeline
-
-
-def _at_release(worlds: Worlds) -> State:
-    """The bodies as the draws release them."""
-    tensors = worlds.position, worlds.velocity, worlds.angle, worlds.spin, worlds.release_time, worlds.present
-    with torch.no_grad():
-        arrays = [tensor.numpy().copy() for tensor in tensors]
-    return State(*arrays, arrays[1].copy())

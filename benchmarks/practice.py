@@ -1,6 +1,7 @@
 """Answers about all practice scenes, what each part of the reasoning adds to them, and what bounds them.
 
-    python benchmarks/practice.py [--json FILE] [--docs docs] [--scenes 60] [--model FILE.toml] [--extended FILE.toml]
+    python benchmarks/practice.py [--json FILE] [--docs docs] [--scenes 60] [--thinned 60]
+                                  [--model FILE.toml] [--extended FILE.toml]
 
 Tracks of ../shared/data/clevrer_bullet. Two-fold cross-fitting: how much motion deviates from the model is learned on
 the odd scenes for the even ones, and the other way round. Fits (Laplace draws) and judgements are written to
@@ -34,13 +35,12 @@ from vrdp_prob.inference import default_model, infer
 from vrdp_prob.models.physics import PhysicsModel
 from vrdp_prob.models.simulator.rollout import compile_model
 from vrdp_prob.reasoning import AskablePosterior, PosteriorWorlds
-from vrdp_prob.reasoning.batch import FUTURE_FRAMES, Horizon
 from vrdp_prob.reasoning.deviations import DeviationModel, turns
 from vrdp_prob.reasoning.entropy import entropy
 from vrdp_prob.reasoning.facts import Facts
 from vrdp_prob.reasoning.plug_in import plug_in_worlds
 from vrdp_prob.reasoning.scales import ScalePrior
-from vrdp_prob.scene import Question, QuestionType, Tracks
+from vrdp_prob.scene import Question, Tracks
 
 DATA = Path(__file__).parents[2] / "shared" / "data" / "clevrer_bullet"
 RESULTS = Path("out") / "practice"
@@ -90,7 +90,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(f"learned on {('even', 'odd')[half]} scenes: {learned}")
     tasks = {k: Task(k, model, extended, options.results, halves[1 - k % 2]) for k in tasks}
     judged = _measured(judgements, tasks, options, "judgements", "Answers")
-    fewer = _measured(with_fewer_frames, tasks, options, "fewer", "With fewer frames")
+    few = {scene: task for scene, task in tasks.items() if scene < options.thinned}
+    fewer = _measured(with_fewer_frames, few, options, "fewer", "With fewer frames")
     rows = _rows(list(judged.values()))
     text = "\n".join([*_tables(rows), "", *_fewer_table(list(fewer.values()))])
     print(text)
@@ -107,6 +108,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--json", type=Path, help="file for the checks")
     parser.add_argument("--docs", type=Path, help="folder of the documentation, whose page is written anew")
     parser.add_argument("--scenes", type=int, default=60, help="how many of the scenes, from the first")
+    parser.add_argument("--thinned", type=int, default=60, help="how many of them are seen with fewer frames, too")
     parser.add_argument("--model", type=Path, help="model file of all rows but one; the default model where not given")
     parser.add_argument("--extended", type=Path, help="model file of the row 'extended model'")
     parser.add_argument("--results", type=Path, default=RESULTS, help="folder of the results, which are gone on with")
@@ -176,6 +178,7 @@ def _worlds(task: Task, tracks: Tracks) -> dict[str, Facts]:
         "seen deviations not reused": PosteriorWorlds(
             posterior, draws=DRAWS, deviating=DeviationModel(deviating.impulse, deviating.acceleration, reused=False)
         ),
+        "no draw on its own course": PosteriorWorlds(posterior, draws=DRAWS, deviating=deviating, own_courses=False),
         "nothing kept: all simulated from the release": ReleasedWorlds(posterior, DRAWS),
         TRUE: PosteriorWorlds(TruePosterior(tracks, DATA / "truth"), draws=DRAWS, deviating=deviating),
     }
@@ -186,19 +189,25 @@ def _worlds(task: Task, tracks: Tracks) -> dict[str, Facts]:
 
 
 def with_fewer_frames(task: Task) -> Result:
-    """Judgements of the predictive questions where only the first frames were seen, by their number."""
+    """Judgements of all answers where some of the frames were seen, evenly spaced, by their number."""
     tracks = load(DATA, video=task.video)
-    every = read_questions(DATA / "questions.json")[task.video]
-    asked = [one for one in every if one.question_type is QuestionType.PREDICTIVE]
-    end, rate = float(tracks.times[-1]), tracks.frame_rate
-    horizon, rows = Horizon(end, end + FUTURE_FRAMES / rate), {}
-    for frames in FEWER_FRAMES if asked else ():
-        shorter = tracks.until((frames - 1) / rate)
+    asked, rows = read_questions(DATA / "questions.json")[task.video], {}
+    for frames in FEWER_FRAMES:
+        thinner = thinned(tracks, frames)
         name = "base" if frames >= len(tracks.times) else f"frames-{frames}"
-        posterior = posterior_of(task, shorter, name, task.model)
-        worlds = PosteriorWorlds(posterior, draws=DRAWS, deviating=task.deviating, horizon=horizon)
+        posterior = posterior_of(task, thinner, name, task.model)
+        worlds = PosteriorWorlds(posterior, draws=DRAWS, deviating=task.deviating)
         rows[str(frames)] = [_judged(task, worlds, one) for one in asked]
     return {"scene": task.scene, "rows": rows}
+
+
+def thinned(tracks: Tracks, frames: int) -> Tracks:
+    """Some of the frames, evenly spaced, the first and the last among them; objects not seen twice are left out."""
+    chosen = np.linspace(0, len(tracks.times) - 1, min(frames, len(tracks.times))).round().astype(int)
+    data = tracks.data.isel(time=chosen)
+    kept = np.isfinite(data["x"].values).sum(axis=0) >= 2
+    bodies = tuple(body for body, there in zip(tracks.bodies, kept, strict=True) if there)
+    return Tracks(tracks.video, bodies, data.isel(body=kept), tracks.walls, tracks.camera)
 
 
 def _rows(results: Sequence[Result]) -> dict[str, list[Judgement]]:
@@ -226,15 +235,24 @@ def _tables(rows: Mapping[str, Sequence[Judgement]]) -> list[str]:
 
 
 def _fewer_table(results: Sequence[Result]) -> list[str]:
-    head = ("frames seen", "questions", "right, per question", "per option", "Brier", "entropy of an option, nats")
+    head = ("frames seen", "questions", "options", "right, per question", "per option", "Brier", "entropy, nats")
     lines = [_row(*head, *CALIBRATION), _row(*["---"] * (len(head) + len(CALIBRATION)))]
-    for frames in map(str, FEWER_FRAMES):
-        made = [Judgement.of_document(one) for result in results for one in result["rows"].get(frames, ())]
-        score = Scores.of(made)
-        doubt = np.mean([entropy(np.array([p, 1 - p])) for one in made for p, _ in one.choices])
-        shares = [_percent(score.accuracy_per_question), _percent(score.accuracy_per_option)]
-        lines.append(_row(frames, str(score.questions), *shares, _number(score.brier), f"{doubt:.3f}", *_ece(score)))
+    for kind in Kind:
+        for frames in map(str, FEWER_FRAMES):
+            made = [Judgement.of_document(one) for result in results for one in result["rows"].get(frames, ())]
+            score = Scores.of([one for one in made if one.kind is kind])
+            doubts = [p for one in made if one.kind is kind for p in _forecasts(one)]
+            doubt = np.mean([entropy(np.array([p, 1 - p])) for p in doubts])
+            shares = [_percent(score.accuracy_per_question), _percent(score.accuracy_per_option)]
+            counts = str(score.questions), str(score.options)
+            cells = (f"{_title(kind)}, {frames}", *counts, *shares, _number(score.brier), f"{doubt:.3f}")
+            lines.append(_row(*cells, *_ece(score)))
     return lines
+
+
+def _forecasts(one: Judgement) -> list[float]:
+    """Probabilities of the options, or of the answer to an open question."""
+    return [p for p, _ in one.choices] or [one.confidence]
 
 
 def _row(*cells: str) -> str:

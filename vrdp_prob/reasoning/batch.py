@@ -17,6 +17,7 @@ from vrdp_prob.reasoning.deviations import Deviation, DeviationModel, seen_devia
 from vrdp_prob.reasoning.facts import draw_attributes
 from vrdp_prob.reasoning.friction import OwnFriction, ToldFriction, apply_friction, told_friction, with_friction_ratio
 from vrdp_prob.reasoning.intervention import Intervention
+from vrdp_prob.reasoning.own_course import OwnCourses, changed_course
 from vrdp_prob.reasoning.refit import state_at_end
 from vrdp_prob.reasoning.scales import Examples
 from vrdp_prob.reasoning.scattering import INSTANTS, Scattering, advance_scattered
@@ -35,20 +36,6 @@ FORETOLD_DRAWS = 60
 
 
 @dataclass(frozen=True)
-class Horizon:
-    """The time that questions about the future ask about.
-
-    Parameters
-    ----------
-    start, stop
-        From when to when, in s; it may begin later than the tracks end.
-    """
-
-    start: float
-    stop: float
-
-
-@dataclass(frozen=True)
 class Common:
     """What all batches of draws of a video share.
 
@@ -62,21 +49,15 @@ class Common:
         One world in the middle of the posterior.
     deviating
         How motion deviates from the model; None where it follows it exactly.
-    asked
-        The time that questions about the future ask about; `FUTURE_FRAMES` after the video where None.
+    own_courses
+        Whether draws that show what was seen may follow their own course.
     """
 
     sight: Sight
     model: PhysicsModel
     middle: Worlds
     deviating: DeviationModel | None = None
-    asked: Horizon | None = None
-
-    @property
-    def horizon(self) -> Horizon:
-        """The time that questions about the future ask about."""
-        end = float(self.sight.tracks.times[-1])
-        return self.asked or Horizon(end, end + FUTURE_FRAMES / self.sight.tracks.frame_rate)
+    own_courses: bool = True
 
     @cached_property
     def friction(self) -> ToldFriction | None:
@@ -125,7 +106,8 @@ class Batch:
 
     def __init__(self, common: Common, released: Released, chance: Chance) -> None:
         self.common, self.released, self.chance = common, released, chance
-        self.seen = SeenVideo(common.sight, len(released.worlds), chance)
+        own = OwnCourses(common.sight, released.rollout) if common.own_courses else None
+        self.seen = SeenVideo(common.sight, len(released.worlds), chance, own)
         self._extended = with_friction_ratio(self.drawn, common.model) or (self.drawn, common.model)
         self._changed: dict[tuple[Change, int], WorldDraws] = {}
 
@@ -159,15 +141,14 @@ class Batch:
 
     @cached_property
     def future(self) -> WorldDraws:
-        """What happens after the video, up to the end of the time that is asked about."""
+        """What happens after the video, at frames after its last one."""
         seen, (worlds, model) = self.seen, self._extended
         state, log_ratio = self.end
         state = state.copy()
         if self.friction is not None:
             worlds = apply_friction(worlds, log_ratio)
         end = float(seen.tracks.times[-1])
-        horizon, rate = self.common.horizon, seen.tracks.frame_rate
-        times = end + np.arange(round((horizon.stop - end) * rate) + 1) / rate
+        times = end + np.arange(FUTURE_FRAMES + 1) / seen.tracks.frame_rate
         # in view of the last frame, bodies are held to start there; those that left are on their way since they did
         here = seen.presence[:, 1] >= len(seen.tracks.times)
         unseen = np.where(here, end - state.release[0], 0.0)
@@ -177,12 +158,8 @@ class Batch:
         timeline = Timeline(seen.universe, seen.draws, seen.tracks.camera)
         timeline.met[:, seen.universe.collisions] = seen.events.happens[:, seen.universe.collisions]
         for meeting in stretch.meetings():
-            timeline.note_earlier(meeting, meeting.time <= horizon.start)
-            timeline.note_meeting(meeting, meeting.time > horizon.start)
-        later = stretch.times >= horizon.start
-        timeline.note_crossings(
-            stretch.times[later], stretch.position[:, later], stretch.exists[:, later], np.ones_like(timeline.collided)
-        )
+            timeline.note_meeting(meeting, meeting.time > end)
+        timeline.note_crossings(stretch.times, stretch.position, stretch.exists, np.ones_like(timeline.collided))
         trajectory = np.concatenate([stretch.position, stretch.angle[..., None]], axis=-1)
         return WorldDraws(
             stretch.times, trajectory, stretch.exists, timeline.table, timeline.collided, stretch.broke_off
@@ -196,10 +173,15 @@ class Batch:
 
     def simulated(self, change: Change, body: int) -> WorldDraws:
         """The same, simulated anew and not kept."""
+        model, own = self._extended[1], self.seen.on_own_course
         intervention = Intervention(change, body, self._acting, self.chance.numbers(Purpose.MEANING))
-        return Counterfactual(
-            self.seen, self._acting, self._extended[1], self.turning, self.scattering, intervention=intervention
+        kept = Counterfactual(
+            self.seen, self._acting, model, self.turning, self.scattering, intervention=intervention
         ).run()
+        if not own.any():
+            return kept
+        intervention = Intervention(change, body, self._extended[0], self.chance.numbers(Purpose.MEANING))
+        return kept.with_draws(own, changed_course(self.common.sight, intervention, model, own))
 
     def turning(self, body: int, time: float) -> tuple[Float[np.ndarray, "draw"], Float[np.ndarray, "draw"]]:
         """Angle (rad) and spin (rad/s) of a body in every draw.

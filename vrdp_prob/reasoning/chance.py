@@ -27,6 +27,7 @@ class Purpose(IntEnum):
     DEVIATIONS = 13
     FORETOLD = 14
     MEANING = 15
+    COURSES = 16
 
 
 @runtime_checkable

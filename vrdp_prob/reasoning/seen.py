@@ -10,6 +10,7 @@ from vrdp_prob.reasoning.chance import Chance, Purpose, Seeded
 from vrdp_prob.reasoning.contacts import Contact, SeenMotion
 from vrdp_prob.reasoning.events import EventTable, EventUniverse
 from vrdp_prob.reasoning.facts import MOVING_SPEED, Motion
+from vrdp_prob.reasoning.own_course import SHARE, SURE, OwnCourses
 from vrdp_prob.reasoning.rest import DrawnMotion
 from vrdp_prob.reasoning.sight import Sight
 from vrdp_prob.scene import Tracks
@@ -30,11 +31,14 @@ class SeenVideo:
         Number of draws of what they leave open.
     chance
         Where the draws come from.
+    own
+        What the rollouts of the draws say of its contacts; None where they are not asked.
     """
 
     sight: Sight
     draws: int
     chance: Chance = field(default_factory=Seeded)
+    own: OwnCourses | None = None
 
     @property
     def tracks(self) -> Tracks:
@@ -63,9 +67,19 @@ class SeenVideo:
 
     @cached_property
     def happened(self) -> Bool[np.ndarray, "draw contact"]:
-        """Which contacts happened in each draw."""
+        """Which contacts happened in each draw: by their probability, or as in the draw that follows its own course."""
         probability = np.array([contact.probability for contact in self.contacts])
-        return self.chance.numbers(Purpose.CONTACTS).random((self.draws, len(probability))) < probability
+        happened = self.chance.numbers(Purpose.CONTACTS).random((self.draws, len(probability))) < probability
+        if self.own is None:
+            return np.asarray(happened)
+        return np.where(self.on_own_course[:, None], self.own.met | (probability > SURE), happened)
+
+    @cached_property
+    def on_own_course(self) -> Bool[np.ndarray, "draw"]:
+        """Draws that follow their own course."""
+        if self.own is None:
+            return np.zeros(self.draws, dtype=bool)
+        return self.own.as_seen & (self.chance.numbers(Purpose.COURSES).random((self.draws,)) < SHARE)
 
     @cached_property
     def contact_times(self) -> Float[np.ndarray, "draw contact"]:

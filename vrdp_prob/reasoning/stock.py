@@ -5,7 +5,7 @@ from jaxtyping import Int
 
 from vrdp_prob.inference.identifiability import BodyStatus
 from vrdp_prob.models.simulator.worlds import Worlds
-from vrdp_prob.reasoning.batch import Batch, Common, Horizon, Released
+from vrdp_prob.reasoning.batch import Batch, Common, Released
 from vrdp_prob.reasoning.chance import Chance, Purpose, Seeded
 from vrdp_prob.reasoning.defaults import Defaults, with_defaults
 from vrdp_prob.reasoning.deviations import DeviationModel
@@ -30,8 +30,8 @@ class Stock:
         Where draws of what the tracks leave open come from.
     deviating
         How motion deviates from the model; None where it follows it exactly.
-    horizon
-        The time that questions about the future ask about; right after the video where None.
+    own_courses
+        Whether draws that show what was seen may follow their own course.
     """
 
     def __init__(
@@ -42,11 +42,13 @@ class Stock:
         defaults: Defaults,
         chance: Chance,
         deviating: DeviationModel | None = None,
-        horizon: Horizon | None = None,
+        own_courses: bool = True,
     ) -> None:
         self.posterior, self._size, self._defaults, self._chance = posterior, size, defaults, chance
         drawn = posterior.worlds(size)
-        common = Common(Sight(posterior.tracks), posterior.model, drawn.select([len(drawn) // 2]), deviating, horizon)
+        common = Common(
+            Sight(posterior.tracks), posterior.model, drawn.select([len(drawn) // 2]), deviating, own_courses
+        )
         self._common = common
         self._batches = [self._batch(drawn, 0)]
         self._left: tuple[Worlds, Int[np.ndarray, "left"]] | None = None

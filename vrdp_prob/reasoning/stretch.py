@@ -35,7 +35,8 @@ class State:
     present
         Whether it takes part.
     rolling
-        Velocity in m/s at which it would roll by its spin, which matters for spheres in models in which they slip.
+        Velocity in m/s at which it would roll by its spin, which matters for spheres in models in which they slip; NaN
+        where the model says it.
     """
 
     position: Float[np.ndarray, "draw body 2"]
@@ -53,6 +54,13 @@ class State:
         present = np.zeros(shape, dtype=bool)
         released = np.full(shape, release)
         return cls(position, velocity, np.zeros(shape), np.zeros(shape), released, present, velocity.copy())
+
+    @classmethod
+    def released(cls, worlds: Worlds) -> "State":
+        """The bodies as worlds release them; whether spheres roll then, the model of the worlds says."""
+        tensors = worlds.position, worlds.velocity, worlds.angle, worlds.spin, worlds.release_time, worlds.present
+        position, velocity, angle, spin, release, present = (tensor.detach().numpy().copy() for tensor in tensors)
+        return cls(position, velocity, angle, spin, release, present, np.full_like(velocity, np.nan))
 
     def copy(self) -> "State":
         """The same state in arrays of its own."""
@@ -256,7 +264,7 @@ def _released(worlds: Worlds, state: State) -> Worlds:
         spin=torch.from_numpy(np.ascontiguousarray(state.spin)),
         release_time=torch.from_numpy(np.ascontiguousarray(state.release)),
         present=torch.from_numpy(np.ascontiguousarray(state.present)),
-        rolling=torch.from_numpy(np.ascontiguousarray(state.rolling)),
+        rolling=None if np.isnan(state.rolling).any() else torch.from_numpy(np.ascontiguousarray(state.rolling)),
     )
 
 

@@ -65,13 +65,6 @@ class Timeline:
         self.collided[draws, second] = True
         self.note(draws, self._places[first, second], meeting.time[keep], in_view=in_view)
 
-    def note_earlier(self, meeting: Meeting, earlier: Bool[np.ndarray, "contact"]) -> None:
-        """Note contacts before the time that is asked about: their pairs have met, and that is all."""
-        draws, first, second = meeting.draws[earlier], meeting.first[earlier], meeting.second[earlier]
-        self.collided[draws, first] = True
-        self.collided[draws, second] = True
-        self.met[draws, self._places[first, second]] = True
-
     def note_crossings(
         self,
         times: Float[np.ndarray, "time"],
@@ -134,3 +127,14 @@ class WorldDraws:
             np.concatenate([part.collided for part in parts]),
             np.concatenate([part.broke_off for part in parts]),
         )
+
+    def with_draws(self, chosen: Bool[np.ndarray, "draw"], others: "WorldDraws") -> "WorldDraws":
+        """The same with some draws taken from elsewhere."""
+        parts = {}
+        for name in ("trajectory", "exists", "collided", "broke_off"):
+            values = getattr(self, name).copy()
+            values[chosen] = getattr(others, name)
+            parts[name] = values
+        happens, time = self.events.happens.copy(), self.events.time.copy()
+        happens[chosen], time[chosen] = others.events.happens, others.events.time
+        return WorldDraws(self.times, events=EventTable(self.events.universe, happens, time), **parts)

@@ -11,7 +11,7 @@ from functools import cached_property
 from vrdp_prob.errors import InputError
 from vrdp_prob.models.simulator.rollout import Rollout
 from vrdp_prob.progress import ProgressDisplay, SilentProgress
-from vrdp_prob.reasoning.batch import Batch, Horizon
+from vrdp_prob.reasoning.batch import Batch
 from vrdp_prob.reasoning.chance import Chance, Purpose, Seeded
 from vrdp_prob.reasoning.changes import Change
 from vrdp_prob.reasoning.coupled import Coupled
@@ -53,8 +53,8 @@ class PosteriorWorlds:
         Where draws of what the tracks leave open come from; the posterior's seed where None.
     deviating
         How simulated motion deviates from the model, but for what the tracks say of it; None where it does not.
-    horizon
-        The time that questions about the future ask about; the 58 frames after the video where None.
+    own_courses
+        Whether draws in which all happens as it was seen may follow their own course (see `own_course`).
     progress
         Who follows the simulation of each world.
 
@@ -72,14 +72,16 @@ class PosteriorWorlds:
         defaults: Defaults = "fixed",
         chance: Chance | None = None,
         deviating: DeviationModel | None = DEVIATING,
-        horizon: Horizon | None = None,
+        own_courses: bool = True,
         progress: ProgressDisplay | None = None,
     ) -> None:
         if draws < 1:
             raise InputError(f"draws is {draws}; ask for at least 1.")
         self.posterior = posterior
         chance = chance or Seeded(posterior.seed)
-        self._stock = Stock(posterior, draws, defaults=defaults, chance=chance, deviating=deviating, horizon=horizon)
+        self._stock = Stock(
+            posterior, draws, defaults=defaults, chance=chance, deviating=deviating, own_courses=own_courses
+        )
         self._progress = progress or SilentProgress()
         first = self._stock.batch(0)
         self._batches: tuple[Batch, ...] = () if first is None else (first,)

@@ -20,6 +20,7 @@ _PARAMETERS: Mapping[Purpose, float] = {
 _EVENTS: Mapping[Purpose, float] = {
     **_PARAMETERS,
     Purpose.CONTACTS: 1.0,
+    Purpose.COURSES: 1.0,
     Purpose.RESTS: 1.0,
     Purpose.ATTRIBUTES: 1.0,
 }

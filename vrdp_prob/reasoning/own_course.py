@@ -1,0 +1,128 @@
+"""Draws that are worlds of their own: simulated from the release on, because what happens in them is what was seen.
+
+There are two ways to what would have happened. What was seen may be kept wherever a change does not reach: then errors
+of the model cannot grow in it, but the states from which the simulation is resumed carry the noise of the tracks. Or a
+draw of the posterior is simulated as it is: then all of it fits together, but a draw in which something else happened
+than was seen tells of another video. Both err, in different ways; so half of those draws whose own course of events is
+the one that was seen follow it, in all that is asked, and the other draws keep what was seen.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from jaxtyping import Bool
+
+from vrdp_prob.models.physics import PhysicsModel
+from vrdp_prob.models.simulator.events import EventTable, RolloutEventKind
+from vrdp_prob.models.simulator.rollout import Rollout
+from vrdp_prob.models.simulator.worlds import Worlds
+from vrdp_prob.reasoning.contacts import EDGE
+from vrdp_prob.reasoning.facts import MOVING_SPEED
+from vrdp_prob.reasoning.intervention import Intervention
+from vrdp_prob.reasoning.sight import Sight
+from vrdp_prob.reasoning.stretch import State, advance
+from vrdp_prob.reasoning.timeline import Timeline, WorldDraws
+
+SHARE = 0.5
+"""Share of the draws that can follow their own course which do."""
+SAME_TIME = 0.2
+"""Time in s by which a simulated contact may differ from the one that was seen."""
+SURE = 0.9
+"""Probability of a seen contact from which a draw must have it."""
+
+
+@dataclass(frozen=True)
+class OwnCourses:
+    """What happens in the rollouts of draws, compared with what was seen.
+
+    Parameters
+    ----------
+    sight
+        What the tracks tell.
+    rollout
+        The draws from the release on, at the frames of the video.
+    """
+
+    sight: Sight
+    rollout: Rollout
+
+    @cached_property
+    def met(self) -> Bool[np.ndarray, "draw contact"]:
+        """Which contacts that were seen, for sure or in doubt, happen in each draw."""
+        met = np.zeros((len(self.rollout.outcome), len(self.sight.contacts)), dtype=bool)
+        for place, contact in enumerate(self.sight.contacts):
+            met[self._collisions.world[self._like(contact.first, contact.second, contact.time)], place] = True
+        return met
+
+    @cached_property
+    def as_seen(self) -> Bool[np.ndarray, "draw"]:
+        """Draws in which all happens that was seen for sure, and nothing that would have been seen."""
+        sure = np.array([contact.probability > SURE for contact in self.sight.contacts], dtype=bool)
+        as_seen = self.rollout.fine & self.met[:, sure].all(axis=1)
+        as_seen[self._collisions.world[self._strange]] = False
+        return np.asarray(as_seen)
+
+    @cached_property
+    def _collisions(self) -> EventTable:
+        """First collisions of each pair in each draw."""
+        events = self.rollout.events.of_kind(RolloutEventKind.COLLISION)
+        pairs = np.stack([events.world, events.first, events.second], axis=1)
+        _, first = np.unique(pairs, axis=0, return_index=True)
+        return events.where(np.sort(first))
+
+    def _like(self, first: int, second: int, time: float) -> Bool[np.ndarray, "collision"]:
+        """Collisions of a pair at about a time (s)."""
+        events = self._collisions
+        return (events.first == first) & (events.second == second) & (np.abs(events.time - time) < SAME_TIME)
+
+    @property
+    def _strange(self) -> Bool[np.ndarray, "collision"]:
+        """Collisions that nobody saw although both bodies were seen before and after them."""
+        events, tracks = self._collisions, self.sight.tracks
+        begin = np.maximum(tracks.first_seen[events.first], tracks.first_seen[events.second]) + EDGE
+        end = np.minimum(tracks.last_seen[events.first], tracks.last_seen[events.second]) - EDGE
+        strange = (events.time > begin) & (events.time < end)
+        for contact in self.sight.contacts:
+            strange &= ~self._like(contact.first, contact.second, contact.time)
+        return np.asarray(strange)
+
+
+def changed_course(
+    sight: Sight, intervention: Intervention, model: PhysicsModel, chosen: Bool[np.ndarray, "draw"]
+) -> WorldDraws:
+    """Some draws with one object changed, simulated from the release on.
+
+    Parameters
+    ----------
+    sight
+        What the tracks tell.
+    intervention
+        What is done, to which body, in all draws.
+    model
+        The physics.
+    chosen
+        Which draws.
+    """
+    tracks, draws = sight.tracks, np.flatnonzero(chosen)
+    worlds = intervention.worlds.select(draws.tolist())
+    stretch = advance(worlds, _at_release(worlds, intervention, draws), tracks.times, model)
+    timeline = Timeline(sight.universe, len(draws), tracks.camera)
+    for meeting in stretch.meetings():
+        timeline.note_meeting(meeting, np.ones(len(meeting.draws), dtype=bool))
+    timeline.note_crossings(stretch.times, stretch.position, stretch.exists, np.ones_like(timeline.collided))
+    trajectory = np.concatenate([stretch.position, stretch.angle[..., None]], axis=-1)
+    return WorldDraws(tracks.times, trajectory, stretch.exists, timeline.table, timeline.collided, stretch.broke_off)
+
+
+def _at_release(worlds: Worlds, intervention: Intervention, draws: np.ndarray) -> State:
+    """The bodies of some draws as they are released, the changed one as the change has it."""
+    state = State.released(worlds)
+    body = intervention.body
+    if intervention.change.removes:
+        state.present[:, body] = False
+    velocity = np.zeros((len(intervention.felt_at_release), 2))
+    velocity[draws] = state.velocity[:, body]
+    felt = intervention.felt_at_release & (np.linalg.norm(velocity, axis=1) > MOVING_SPEED)
+    state.velocity[:, body] = np.where(felt[draws, None], intervention.released(velocity)[draws], velocity[draws])
+    return state

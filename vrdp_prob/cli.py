@@ -1,4 +1,4 @@
-"""The command line: `vrdp-prob report`, `ask`, `evaluate`, `demo`, `calibrate-camera` and `compile`.
+"""The command line: `vrdp-prob report`, `ask`, `learn-concepts`, `evaluate`, `demo` and a few more.
 
 Exit code 0: done; 2: input that cannot be used (one line says what, where, and how to mend it); 1: anything else.
 """
@@ -12,10 +12,19 @@ from typing import Annotated
 import typer
 
 from vrdp_prob import __version__
-from vrdp_prob.command_inputs import model_at, questions_of, scene_range, videos_at
+from vrdp_prob.command_inputs import (
+    RULES,
+    check_concepts,
+    concepts_at,
+    model_at,
+    questions_of,
+    scene_range,
+    videos_at,
+)
 from vrdp_prob.command_options import (
     CameraOption,
     CheckpointFolder,
+    ConceptsOption,
     Defaults,
     Input,
     Model,
@@ -25,6 +34,9 @@ from vrdp_prob.command_options import (
     Seed,
     Video,
 )
+from vrdp_prob.concepts.perceived.folder import taught_videos
+from vrdp_prob.concepts.perceived.learning import learn
+from vrdp_prob.concepts.perceived.storage import write_concepts
 from vrdp_prob.datasets import load, load_all, video_files, video_names
 from vrdp_prob.discovery.checking import check_video_count
 from vrdp_prob.discovery.discover import discover
@@ -89,6 +101,7 @@ def report(
     out: Annotated[Path, typer.Option(metavar="DIR", help="Folder of the report.")] = Path("vrdp-prob-report"),
     video: Video = None,
     camera: CameraOption = None,
+    concepts: ConceptsOption = RULES,
     model: Model = None,
     sampler: Sampler = DEFAULT_SAMPLER,
     noise: Noise = "auto",
@@ -103,10 +116,17 @@ def report(
     check_writable(out)
     if checkpoint is not None:
         check_writable(checkpoint)
-    physics = model_at(model)
+    physics, learned = model_at(model), concepts_at(concepts)
     names = [name for name in video_names(path) if video in (None, name)]
     asked = {name: [] for name in names} if questions is None else questions_of(questions, names)
-    videos = load_all(path, videos=None if video is None else [video], camera=camera, progress=progress)
+    check_concepts(learned, [question for several in asked.values() for question in several])
+    videos = load_all(
+        path,
+        videos=None if video is None else [video],
+        camera=camera,
+        recognise=None if learned is None else learned.recognise,
+        progress=progress,
+    )
     files = video_files(path)
     for tracks in videos:
         own = Path() if len(videos) == 1 else Path(tracks.video)
@@ -142,6 +162,7 @@ def ask_question(
     as_json: Annotated[bool, typer.Option("--json", help="One JSON document on standard output.")] = False,
     video: Video = None,
     camera: CameraOption = None,
+    concepts: ConceptsOption = RULES,
     model: Model = None,
     sampler: Sampler = DEFAULT_SAMPLER,
     noise: Noise = "auto",
@@ -160,9 +181,11 @@ def ask_question(
         check_mc_error(mc_error)
     if checkpoint is not None:
         check_writable(checkpoint)
-    physics = model_at(model)
+    physics, learned = model_at(model), concepts_at(concepts)
     check_question(asked)
-    tracks = load(path, video=video, camera=camera, progress=progress)
+    check_concepts(learned, [asked])
+    recognise = None if learned is None else learned.recognise
+    tracks = load(path, video=video, camera=camera, recognise=recognise, progress=progress)
     check_question(asked, tracks=tracks)
     posterior = infer(
         tracks,
@@ -242,6 +265,7 @@ def evaluate_answers(
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="One JSON document on standard output.")] = False,
     camera: CameraOption = None,
+    concepts: ConceptsOption = RULES,
     model: Model = None,
     sampler: Sampler = "laplace",
     seed: Seed = 0,
@@ -255,6 +279,7 @@ def evaluate_answers(
         scenes=None if scenes is None else scene_range(scenes),
         source=source,
         camera=camera,
+        concepts=None if concepts == RULES else Path(concepts),
         model=model_at(model),
         sampler=sampler,
         seed=seed,
@@ -268,6 +293,37 @@ def evaluate_answers(
         print(json.dumps(to_document(evaluation), allow_nan=False))
     else:
         print("\n".join([*table(evaluation), *(str(file) for file in files)]))
+
+
+@app.command(name="learn-concepts")
+def learn_concepts(
+    folder: Annotated[Path, typer.Argument(metavar="FOLDER", help="A folder of videos.")],
+    *,
+    questions: Annotated[Path, typer.Option(metavar="FILE", help="CLEVRER question file with the right answers.")],
+    out: Annotated[Path, typer.Option(metavar="FILE", help="File of the concepts.")] = Path("vrdp-prob.concepts"),
+    scenes: Annotated[
+        str | None, typer.Option(metavar="A:B", help="Scenes A to B-1 of the question file; all by default.")
+    ] = None,
+    checkpoint: Annotated[
+        Path | None,
+        typer.Option(metavar="DIR", help="Keeps what is done, to go on from; by default a folder beside the file."),
+    ] = None,
+    camera: CameraOption = None,
+    seed: Seed = 0,
+    quiet: Quiet = False,
+) -> None:
+    """Learn what colors, materials, shapes, motion and events look like from questions and answers."""
+    progress = progress_display(quiet=quiet)
+    check_writable(out.parent)
+    kept = checkpoint or out.with_name(f"{out.name}-checkpoint")
+    wanted = None if scenes is None else scene_range(scenes)
+    videos = taught_videos(
+        folder, questions, scenes=wanted, camera=camera, checkpoint=kept / "videos", progress=progress
+    )
+    learned = learn(videos, seed=seed, checkpoint=kept / "networks", progress=progress)
+    write_concepts(out, learned.concepts)
+    if not quiet:
+        print("\n".join([*learned.lines, str(out)]))
 
 
 @app.command()

@@ -41,4 +41,12 @@ CameraOption = Annotated[
         help="Camera file; by default camera.json beside the video or in its parent folder, or in the tracks folder.",
     ),
 ]
+ConceptsOption = Annotated[
+    str,
+    typer.Option(
+        "--concepts",
+        metavar="FILE|rules",
+        help="What objects look like: concepts learned by learn-concepts, or the rules of perception.",
+    ),
+]
 Video = Annotated[str | None, typer.Option(metavar="ID", help="Which video of a folder of several.")]

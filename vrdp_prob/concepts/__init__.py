@@ -1,0 +1,1 @@
+"""Concepts: what words mean, learned."""

@@ -12,7 +12,7 @@ from jaxtyping import Float
 from torch import Tensor
 from torch.nn import functional
 
-_HUES, _HUE_WIDTH = 24, math.radians(12.0)
+_HUES = 24
 _QUANTILES = (0.02, 0.1, 0.25, 0.5, 0.75, 0.9, 0.98, 0.995)
 _GRID = 8
 _INSIDE = 0.5
@@ -26,31 +26,32 @@ Mask = Float[Tensor, "crop row column"]
 Statistics = Float[Tensor, "crop statistic"]
 
 
-def crop_statistics(picture: Picture, mask: Mask) -> Float[Tensor, "crop statistic"]:
+def crop_statistics(crops: Float[Tensor, "crop 4 row column"]) -> Float[Tensor, "crop statistic"]:
     """Statistics of crops, each group of them scaled so that no group outweighs the others.
 
     Parameters
     ----------
-    picture
-        Red, green and blue, 0 to 1.
-    mask
-        Probability that a pixel shows the object.
+    crops
+        Red, green, blue, and the probability that a pixel shows the object; all 0 to 1.
     """
+    picture, mask = crops[:, :3], crops[:, 3]
     inner = _eroded(mask)
     groups = [part(picture, mask, inner) for part in _PARTS]
     return torch.cat([group / math.sqrt(group.shape[1]) for group in groups], dim=1)
 
 
 def _hues(picture: Picture, mask: Mask, inner: Mask) -> Statistics:
-    """Histogram of hues, each pixel by its colourfulness; gray objects hardly have one."""
+    """Histogram of hues, each pixel by its colourfulness, shared between two bins; gray objects hardly have one."""
     del mask
     red, green, blue = picture.unbind(dim=1)
-    across, along = math.sqrt(3) * (green - blue), 2 * red - green - blue
-    hue = torch.atan2(across, along)
-    colourful = inner * _saturation(picture)
-    places = torch.arange(_HUES, dtype=hue.dtype, device=hue.device) * (2 * math.pi / _HUES)
-    near = torch.exp((torch.cos(hue[:, None] - places[None, :, None, None]) - 1) / _HUE_WIDTH**2)
-    return 10 * (near * colourful[:, None]).sum(dim=(2, 3)) / inner.sum(dim=(1, 2))[:, None].clamp_min(1)
+    hue = torch.atan2(math.sqrt(3) * (green - blue), 2 * red - green - blue)
+    place = (hue % (2 * math.pi)).flatten(start_dim=1) * (_HUES / (2 * math.pi))
+    colourful = (inner * _saturation(picture)).flatten(start_dim=1)
+    lower, above = place.floor().long() % _HUES, place % 1
+    histogram = colourful.new_zeros((len(picture), _HUES))
+    histogram = histogram.scatter_add(1, lower, colourful * (1 - above))
+    histogram = histogram.scatter_add(1, (lower + 1) % _HUES, colourful * above)
+    return 10 * histogram / inner.sum(dim=(1, 2))[:, None].clamp_min(1)
 
 
 def _saturations(picture: Picture, mask: Mask, inner: Mask) -> Statistics:

@@ -20,10 +20,8 @@ from vrdp_prob.errors import InputError
 from vrdp_prob.inference.checkpoint import Checkpoint
 from vrdp_prob.progress import ProgressDisplay, SilentProgress
 
-NETWORKS = 3
-"""Networks that learn the same words, each with other videos held out."""
-_HELD_OUT = 5
-"""One video of so many is held out."""
+NETWORKS = 5
+"""Networks that learn the same words; each holds out another part of the videos, and together they hold out all."""
 _HARDLY = 0.05
 """Answers that are right by so little more than by guessing may as well contradict the videos."""
 
@@ -108,8 +106,8 @@ def _trained(
     kept: Checkpoint | None,
     progress: ProgressDisplay,
 ) -> tuple[ConceptNetwork, list[Standing]]:
-    """One network, with every fifth video held out, another one for each place."""
-    held_out = taught[place::_HELD_OUT] if len(taught) > 1 else []
+    """One network, that holds out every fifth video, another fifth for each place."""
+    held_out = taught[place::NETWORKS] if len(taught) > 1 else []
     rest = [one for one in taught if not any(one is other for other in held_out)] or list(taught)
     own_seed = seed * NETWORKS + place
     with torch.random.fork_rng(devices=[]):

@@ -7,8 +7,9 @@ from jaxtyping import Float
 from torch import Tensor
 
 from vrdp_prob.concepts.perceived.examples import Example
-from vrdp_prob.concepts.perceived.soft_execution import SoftRun, run_softly
+from vrdp_prob.concepts.perceived.soft_execution import run_softly
 from vrdp_prob.concepts.perceived.soft_facts import SoftFacts
+from vrdp_prob.concepts.perceived.soft_forms import SoftRun
 from vrdp_prob.concepts.perceived.soft_values import SoftCount, SoftLabel, SoftTruth, SoftValue
 
 _MISTAKES = 0.02

@@ -6,7 +6,7 @@ import torch
 from jaxtyping import Float
 from torch import Tensor, nn
 
-from vrdp_prob.concepts.perceived.crop_statistics import STATISTICS, crop_statistics
+from vrdp_prob.concepts.perceived.crop_statistics import STATISTICS
 from vrdp_prob.concepts.perceived.embeddings import ConceptSpace
 from vrdp_prob.concepts.perceived.encoder import APPEARANCE, AppearanceEncoder, WindowEncoder
 from vrdp_prob.concepts.perceived.observation import Observation
@@ -46,8 +46,7 @@ class ConceptNetwork(nn.Module):
 
     def measure(self, observations: Sequence[Observation]) -> None:
         """Take means and scales of what the encoders see from the videos to learn from."""
-        statistics = [_statistics(_picture(one)[one.there]) for one in observations]
-        self.appearance.mean.copy_(torch.cat(statistics).mean(dim=0))
+        self.appearance.mean.copy_(torch.cat([one.statistics for one in observations]).mean(dim=0))
         self.motion_encoder.measure(torch.cat([one.windows[windows_in_sight(one.sight)] for one in observations]))
         self.crossing_encoder.measure(torch.cat([one.windows.flatten(end_dim=1) for one in observations]))
         self.pair_encoder.measure(
@@ -55,9 +54,7 @@ class ConceptNetwork(nn.Module):
         )
 
     def attributes_of(
-        self,
-        observations: Sequence[Observation],
-        pictures: Sequence[Float[Tensor, "object view 4 row column"]] | None = None,
+        self, observations: Sequence[Observation], statistics: Sequence[Float[Tensor, "crop statistic"]] | None = None
     ) -> list[Attributes]:
         """Probability of each value of each attribute, for the objects of several videos.
 
@@ -65,16 +62,15 @@ class ConceptNetwork(nn.Module):
         ----------
         observations
             The videos.
-        pictures
-            Crops to look at instead of theirs: the same, but lit otherwise.
+        statistics
+            Statistics of their crops instead of the observed ones: of the same crops in another light.
         """
-        shown = [_picture(one) for one in observations] if pictures is None else pictures
-        crops = torch.cat([picture[one.there] for picture, one in zip(shown, observations, strict=True)])
+        shown = [one.statistics for one in observations] if statistics is None else statistics
         most = max(one.there.shape[1] for one in observations)
         there = torch.cat([nn.functional.pad(one.there, (0, most - one.there.shape[1])) for one in observations])
         slides = torch.cat([one.slides for one in observations])
         device = self.appearance.mean.device
-        features = self.appearance(_statistics(crops.to(device)), there.to(device), slides.to(device))
+        features = self.appearance(torch.cat(list(shown)).to(device), there.to(device), slides.to(device))
         owner = torch.cat([torch.full((len(one.there),), place) for place, one in enumerate(observations)])
         table = {name: self._space(name).exclusive(features).cpu() for name in self.attributes}
         return [{name: values[owner == place] for name, values in table.items()} for place in range(len(observations))]
@@ -112,11 +108,3 @@ class ConceptNetwork(nn.Module):
 
     def _windows(self, windows: Tensor) -> Tensor:
         return windows.to(self.appearance.mean.device)
-
-
-def _picture(observation: Observation) -> Float[Tensor, "object view 4 row column"]:
-    return observation.crops.float() / 255
-
-
-def _statistics(crops: Float[Tensor, "crop 4 row column"]) -> Float[Tensor, "crop statistic"]:
-    return crop_statistics(crops[:, :3], crops[:, 3])

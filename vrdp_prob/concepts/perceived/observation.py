@@ -9,6 +9,7 @@ import torch
 from jaxtyping import Bool, Float, UInt8
 from torch import Tensor
 
+from vrdp_prob.concepts.perceived.crop_statistics import crop_statistics
 from vrdp_prob.concepts.perceived.slides import slide_statistics
 from vrdp_prob.concepts.perceived.soft_facts import SoftEvents, SoftMotion
 from vrdp_prob.concepts.perceived.trajectories import (
@@ -105,6 +106,16 @@ class Observation:
     def universe(self) -> EventUniverse:
         """The possible events."""
         return EventUniverse(tuple(str(place) for place in range(len(self.there))))
+
+    @cached_property
+    def statistics(self) -> Float[Tensor, "crop statistic"]:
+        """Statistics of the crops that there are, object by object."""
+        return crop_statistics(self.pictures[self.there])
+
+    @property
+    def pictures(self) -> Float[Tensor, "object view 4 row column"]:
+        """The crops, 0 to 1."""
+        return self.crops.float() / 255
 
     @cached_property
     def windows(self) -> Float[Tensor, "window object feature"]:

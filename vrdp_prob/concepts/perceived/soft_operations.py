@@ -7,7 +7,7 @@ import torch
 from jaxtyping import Float
 from torch import Tensor
 
-from vrdp_prob.concepts.perceived.soft_execution import SoftRun, either, normalised, only, soft_form_of
+from vrdp_prob.concepts.perceived.soft_forms import SoftRun, either, normalised, only, soft_form_of
 from vrdp_prob.concepts.perceived.soft_values import (
     SoftCount,
     SoftEventRef,

@@ -4,11 +4,11 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import torch
-from torch import Tensor
 
 from vrdp_prob.concepts.perceived.lessons import Taught
 from vrdp_prob.concepts.perceived.losses import judge_softly
-from vrdp_prob.concepts.perceived.network import ConceptNetwork
+from vrdp_prob.concepts.perceived.network import Attributes, ConceptNetwork
+from vrdp_prob.concepts.perceived.observation import Observation
 from vrdp_prob.concepts.perceived.soft_facts import SoftFacts
 
 
@@ -28,11 +28,15 @@ class Standing:
     right: float
 
 
-def standing(network: ConceptNetwork, videos: Sequence[Taught], *, learned_events: bool) -> Standing:
-    """How well a network answers what is asked about some videos."""
+See = Callable[[Sequence[Observation]], list[Attributes]]
+"""Attributes of the objects of some videos."""
+
+
+def standing(network: ConceptNetwork, videos: Sequence[Taught], see: See, *, learned_events: bool) -> Standing:
+    """How well a network answers what is asked about some videos, with their attributes as `see` gives them."""
     network.eval()
     with torch.no_grad():
-        facts = facts_of(network, videos, learned_events=learned_events)
+        facts = facts_of(network, videos, see, learned_events=learned_events)
         judged = [
             judge_softly(example, seen) for one, seen in zip(videos, facts, strict=True) for example in one.examples
         ]
@@ -40,18 +44,10 @@ def standing(network: ConceptNetwork, videos: Sequence[Taught], *, learned_event
     return Standing(sum(losses) / len(losses), sum(one.right for one in judged) / len(judged))
 
 
-def facts_of(
-    network: ConceptNetwork,
-    videos: Sequence[Taught],
-    *,
-    learned_events: bool,
-    look: Callable[[Tensor], Tensor] | None = None,
-) -> list[SoftFacts]:
-    """Videos as a network sees them, their crops as `look` shows them."""
+def facts_of(network: ConceptNetwork, videos: Sequence[Taught], see: See, *, learned_events: bool) -> list[SoftFacts]:
+    """Videos as a network sees them, with their attributes as `see` gives them."""
     observations = [one.observation for one in videos]
-    pictures = None if look is None else [look(one.crops.float() / 255) for one in observations]
-    attributes = network.attributes_of(observations, pictures)
     return [
         network.facts(one, own, learned_events=learned_events)
-        for one, own in zip(observations, attributes, strict=True)
+        for one, own in zip(observations, see(observations), strict=True)
     ]

@@ -18,7 +18,8 @@ _REACH = 1.7
 """Half the side of what a crop shows, in apparent radii: a cube's corners lie within."""
 
 
-Picture = UInt8[np.ndarray, "row column 3"] | Float32[np.ndarray, "row column"]
+Picture = UInt8[np.ndarray, "height width 3"] | Float32[np.ndarray, "height width"]
+Square = UInt8[np.ndarray, "size size 3"] | Float32[np.ndarray, "size size"]
 
 
 @dataclass(frozen=True)
@@ -71,7 +72,7 @@ def _shown(tracker: Tracker, track: Track, view: View) -> Float32[np.ndarray, "h
     return np.where(view.hidden > 0, 0, 1 / (1 + np.exp(-odds))).astype(np.float32)
 
 
-def _square(picture: Picture, corner: Int[np.ndarray, "2"], size: int, border: int) -> Picture:
+def _square(picture: Picture, corner: Int[np.ndarray, "2"], size: int, border: int) -> Square:
     """A square of a picture from a corner (column, row) on; outside the picture the border is made up."""
     height, width = picture.shape[:2]
     left, top = (int(value) for value in corner)

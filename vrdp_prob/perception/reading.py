@@ -52,6 +52,15 @@ class SeenObjects:
     crops: tuple[Crops, ...]
 
 
+@dataclass(frozen=True)
+class _Measured:
+    """Tracks, and where each of their objects shows best."""
+
+    tracks: Tracks
+    tracker: Tracker
+    views: tuple[tuple[Track, list[View]], ...]
+
+
 def read_video(
     path: Path,
     camera: Camera,
@@ -60,19 +69,7 @@ def read_video(
     radius: float = REST_HEIGHT,
     progress: ProgressDisplay | None = None,
 ) -> Tracks:
-    """Measure the objects of a video; parameters, result and refusals are those of `see_video`, without pictures."""
-    return see_video(path, camera, frames=frames, radius=radius, progress=progress).tracks
-
-
-def see_video(
-    path: Path,
-    camera: Camera,
-    *,
-    frames: int | None = None,
-    radius: float = REST_HEIGHT,
-    progress: ProgressDisplay | None = None,
-) -> SeenObjects:
-    """Measure the objects of a video and cut out their pictures.
+    """Measure the objects of a video.
 
     Parameters
     ----------
@@ -89,15 +86,35 @@ def see_video(
 
     Returns
     -------
-    SeenObjects
+    Tracks
         Position of every object in the frames that show it with its centre in the picture, covariance of each position,
-        yaw of cubes, the attributes with probabilities where they are not certain, and crops of each object.
+        yaw of cubes, and the attributes with probabilities where they are not certain.
 
     Raises
     ------
     InputError
         If the file is no usable video, its pictures have another size than the camera's, or no object moves in it.
     """
+    return _measured(path, camera, frames, radius, progress).tracks
+
+
+def see_video(
+    path: Path,
+    camera: Camera,
+    *,
+    frames: int | None = None,
+    radius: float = REST_HEIGHT,
+    progress: ProgressDisplay | None = None,
+) -> SeenObjects:
+    """Measure the objects of a video and cut out their pictures; parameters and refusals are those of `read_video`."""
+    measured = _measured(path, camera, frames, radius, progress)
+    crops = tuple(cut_crops(measured.tracker, track, views) for track, views in measured.views)
+    return SeenObjects(measured.tracks, crops)
+
+
+def _measured(
+    path: Path, camera: Camera, frames: int | None, radius: float, progress: ProgressDisplay | None
+) -> _Measured:
     video = read_frames(path, frames=frames, progress=progress)
     check_size(path, video, camera)
     tracker = Tracker(video.frames, camera, radius)
@@ -113,10 +130,9 @@ def see_video(
     table = np.stack([arrays[index] for index in kept], axis=1)
     if not _moves(table[..., :2]):
         raise InputError(f"{path}: no object moves in the video; give one in which objects move.")
-    views = {index: best_views(tracker, found, found[index]) for index in kept}
+    views = tuple((found[index], best_views(tracker, found, found[index])) for index in kept)
     bodies = tuple(
-        _body(str(number), found[index], _looks(tracker, found[index], views[index]), radius)
-        for number, index in enumerate(kept)
+        _body(str(number), track, _looks(tracker, track, own), radius) for number, (track, own) in enumerate(views)
     )
     cubes = np.array([body.shape is Shape.CUBE for body in bodies])
     tracks = Tracks.from_arrays(
@@ -128,7 +144,7 @@ def see_video(
         position_covariance=table[..., 3:].reshape(*table.shape[:2], 2, 2),
         camera=camera,
     )
-    return SeenObjects(tracks, tuple(cut_crops(tracker, found[index], views[index]) for index in kept))
+    return _Measured(tracks, tracker, views)
 
 
 def check_size(path: Path, video: Video, camera: Camera) -> None:

@@ -59,10 +59,10 @@ def test_learned_in_one_command_and_used_in_another(
     shared_data: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     data, out = shared_data / "clevrer_bullet", tmp_path / "x.concepts"
-    learn = ["learn-concepts", data / "videos", "--questions", data / "questions.json", "--scenes", "5:8", "--out", out]
+    learn = ["learn-concepts", data / "videos", "--questions", data / "questions.json", "--scenes", "5:7", "--out", out]
     assert cli.run([str(word) for word in learn]) == 0
     said = capsys.readouterr().out
-    assert "Learned from 3 videos" in said
+    assert "Learned from 2 videos" in said
     assert str(out) in said
     assert len(read_concepts(out).networks) == 5
     for name in ("videos/video_00005.mp4", "camera.json"):

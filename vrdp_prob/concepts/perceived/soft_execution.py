@@ -8,14 +8,14 @@ the exact form leaves the question.
 from collections.abc import Sequence
 from typing import Any
 
-from vrdp_prob.concepts.perceived import soft_operations
+from vrdp_prob.concepts.perceived import soft_event_operations, soft_object_operations, soft_output_operations
 from vrdp_prob.concepts.perceived.soft_forms import SOFT_FORMS, SoftRun
 from vrdp_prob.concepts.perceived.soft_values import SoftValue
 from vrdp_prob.errors import InputError
 from vrdp_prob.reasoning.operations import Operation
 from vrdp_prob.reasoning.program import Program
 
-SOFT_OPERATION_MODULES = (soft_operations,)
+SOFT_OPERATION_MODULES = (soft_event_operations, soft_object_operations, soft_output_operations)
 """Modules whose import fills the registry of soft forms."""
 
 

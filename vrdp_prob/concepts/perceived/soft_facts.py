@@ -42,6 +42,11 @@ class SoftEvents:
         return cls(table.universe, torch.from_numpy(share), torch.from_numpy(mean))
 
     @cached_property
+    def takes_part(self) -> Float[Tensor, "event body"]:
+        """1 where a body takes part in an event."""
+        return torch.from_numpy(self.universe.takes_part.astype(np.float64))
+
+    @cached_property
     def ancestors(self) -> Float[Tensor, "event event_other"]:
         """Probability that `event_other` is reached from `event`; see `EventTable.ancestors`."""
         size = self.universe.size

@@ -1,89 +1,24 @@
-"""The soft forms of the operations of descriptive and explanatory questions."""
+"""Soft forms of the operations on events."""
 
 from collections.abc import Mapping
 
-import numpy as np
 import torch
 from jaxtyping import Float
 from torch import Tensor
 
 from vrdp_prob.concepts.perceived.soft_forms import SoftRun, either, normalised, only, soft_form_of
 from vrdp_prob.concepts.perceived.soft_values import (
-    SoftCount,
     SoftEventRef,
     SoftEventSet,
-    SoftLabel,
     SoftMoment,
     SoftObjectRef,
     SoftObjectSet,
-    SoftTruth,
 )
-from vrdp_prob.reasoning import event_operations, object_operations, output_operations
+from vrdp_prob.reasoning import event_operations
 from vrdp_prob.reasoning.events import EventUniverse
-from vrdp_prob.reasoning.facts import NOT_STATED
 from vrdp_prob.reasoning.values import Word
 
 _PLACES: Mapping[str, int] = {"first": 0, "second": 1, "third": 2}
-
-
-@soft_form_of(object_operations.objects)
-def objects(run: SoftRun) -> SoftObjectSet:
-    """All objects of the video."""
-    return SoftObjectSet(torch.ones(run.facts.bodies, dtype=torch.double))
-
-
-@soft_form_of(object_operations.filter_color)
-def filter_color(run: SoftRun, chosen: SoftObjectSet, color: Word) -> SoftObjectSet:
-    """Product with the probability of the colour."""
-    return _with_attribute(run, chosen, "color", color)
-
-
-@soft_form_of(object_operations.filter_material)
-def filter_material(run: SoftRun, chosen: SoftObjectSet, material: Word) -> SoftObjectSet:
-    """Product with the probability of the material."""
-    return _with_attribute(run, chosen, "material", material)
-
-
-@soft_form_of(object_operations.filter_shape)
-def filter_shape(run: SoftRun, chosen: SoftObjectSet, shape: Word) -> SoftObjectSet:
-    """Product with the probability of the shape."""
-    return _with_attribute(run, chosen, "shape", shape)
-
-
-@soft_form_of(object_operations.filter_moving)
-def filter_moving(run: SoftRun, chosen: SoftObjectSet, moment: SoftMoment) -> SoftObjectSet:
-    """Product with the probability to move at that moment."""
-    return SoftObjectSet(chosen.probability * _at(run, moment, run.facts.motion.moving))
-
-
-@soft_form_of(object_operations.filter_stationary)
-def filter_stationary(run: SoftRun, chosen: SoftObjectSet, moment: SoftMoment) -> SoftObjectSet:
-    """Product with the probability to be in view and not to move at that moment."""
-    motion = run.facts.motion
-    return SoftObjectSet(chosen.probability * _at(run, moment, motion.in_view - motion.moving))
-
-
-@soft_form_of(object_operations.filter_ever_moving)
-def filter_ever_moving(run: SoftRun, chosen: SoftObjectSet, any_frame: Word) -> SoftObjectSet:
-    """Product with the highest probability to move in any frame: neighbouring frames are no independent looks."""
-    del any_frame
-    return SoftObjectSet(chosen.probability * run.facts.motion.moving.amax(dim=0))
-
-
-@soft_form_of(object_operations.filter_never_moving)
-def filter_never_moving(run: SoftRun, chosen: SoftObjectSet, any_frame: Word) -> SoftObjectSet:
-    """Product with the probability to be in view at some time and to move at none."""
-    del any_frame
-    motion = run.facts.motion
-    return SoftObjectSet(chosen.probability * motion.in_view.amax(dim=0) * (1 - motion.moving.amax(dim=0)))
-
-
-@soft_form_of(object_operations.unique)
-def unique_object(run: SoftRun, chosen: SoftObjectSet) -> SoftObjectRef:
-    """The only object, given that there is exactly one: a softmax over the log odds to be in the set."""
-    alone = only(chosen.probability)
-    run.require(alone.sum())
-    return SoftObjectRef(normalised(alone))
 
 
 @soft_form_of(event_operations.events)
@@ -201,7 +136,7 @@ def get_frame(run: SoftRun, event: SoftEventRef) -> SoftMoment:
 def get_object(run: SoftRun, event: SoftEventRef) -> SoftObjectRef:
     """The object that enters or leaves."""
     run.require(event.present)
-    takes_part = _takes_part(run)
+    takes_part = run.facts.events.takes_part
     single = takes_part * (takes_part.sum(dim=1, keepdim=True) == 1)
     weight = event.probability @ single
     run.require(weight.sum())
@@ -212,82 +147,13 @@ def get_object(run: SoftRun, event: SoftEventRef) -> SoftObjectRef:
 def get_col_partner(run: SoftRun, event: SoftEventRef, who: SoftObjectRef) -> SoftObjectRef:
     """The other object of a collision."""
     run.require(event.present)
-    takes_part = _takes_part(run)
+    takes_part = run.facts.events.takes_part
     both = takes_part * (takes_part.sum(dim=1, keepdim=True) == 2)
     own = both * who.probability
     others = own.sum(dim=1, keepdim=True) * both - own
     weight = event.probability @ others
     run.require(weight.sum())
     return SoftObjectRef(normalised(weight))
-
-
-@soft_form_of(output_operations.count)
-def count(run: SoftRun, chosen: SoftObjectSet | SoftEventSet) -> SoftCount:
-    """How many there are, on average."""
-    del run
-    return SoftCount(chosen.probability.sum())
-
-
-@soft_form_of(output_operations.exist)
-def exist(run: SoftRun, chosen: SoftObjectSet | SoftEventSet) -> SoftTruth:
-    """Whether there is any."""
-    del run
-    return SoftTruth(either(chosen.probability))
-
-
-@soft_form_of(output_operations.negate)
-def negate(run: SoftRun, statement: SoftTruth) -> SoftTruth:
-    """The opposite."""
-    del run
-    return SoftTruth(1 - statement.probability)
-
-
-@soft_form_of(output_operations.event_belongs)
-def event_belongs(run: SoftRun, event: SoftEventRef, chosen: SoftEventSet) -> SoftTruth:
-    """Whether an event is among others; one that does not happen is not."""
-    ordinary = (_takes_part(run).sum(dim=1) > 0).double()
-    return SoftTruth(event.present * (event.probability * ordinary) @ chosen.probability)
-
-
-@soft_form_of(output_operations.object_belongs)
-def object_belongs(run: SoftRun, who: SoftObjectRef, chosen: SoftEventSet) -> SoftTruth:
-    """Whether an object takes part in any of the events."""
-    return SoftTruth(who.probability @ either((chosen.probability[:, None] * _takes_part(run)).T))
-
-
-@soft_form_of(output_operations.query_color)
-def query_color(run: SoftRun, who: SoftObjectRef) -> SoftLabel:
-    """Its colour."""
-    return _attribute(run, who, "color")
-
-
-@soft_form_of(output_operations.query_material)
-def query_material(run: SoftRun, who: SoftObjectRef) -> SoftLabel:
-    """Its material."""
-    return _attribute(run, who, "material")
-
-
-@soft_form_of(output_operations.query_shape)
-def query_shape(run: SoftRun, who: SoftObjectRef) -> SoftLabel:
-    """Its shape."""
-    return _attribute(run, who, "shape")
-
-
-def _universe(run: SoftRun) -> EventUniverse:
-    return run.facts.events.universe
-
-
-def _takes_part(run: SoftRun) -> Float[Tensor, "event body"]:
-    return torch.from_numpy(_universe(run).takes_part.astype(np.float64))
-
-
-def _with_attribute(run: SoftRun, chosen: SoftObjectSet, name: str, word: Word) -> SoftObjectSet:
-    return SoftObjectSet(chosen.probability * run.facts.attribute(name, word.text))
-
-
-def _at(run: SoftRun, moment: SoftMoment, table: Float[Tensor, "frame body"]) -> Float[Tensor, "body"]:
-    """What a table says at a moment that is not known for sure."""
-    return moment.probability @ table[run.facts.motion.frames(moment.time)]
 
 
 def _certain(run: SoftRun, place: int) -> SoftEventRef:
@@ -297,7 +163,7 @@ def _certain(run: SoftRun, place: int) -> SoftEventRef:
 
 
 def _of_kind(run: SoftRun, chosen: SoftEventSet, who: SoftObjectSet | SoftObjectRef, part: slice) -> SoftEventSet:
-    members = who.probability * _takes_part(run)
+    members = who.probability * run.facts.events.takes_part
     involved = either(members) if isinstance(who, SoftObjectSet) else members.sum(dim=1)
     kind = torch.from_numpy(_universe(run).mask(part)).double()
     return SoftEventSet(chosen.probability * kind * involved, chosen.time)
@@ -314,9 +180,5 @@ def _so_many_before(probability: Float[Tensor, "event"], number: int) -> Float[T
     return torch.stack(weights)
 
 
-def _attribute(run: SoftRun, who: SoftObjectRef, name: str) -> SoftLabel:
-    names = run.facts.values[name]
-    shares = who.probability @ run.facts.attributes[name]
-    stated = torch.tensor([float(value != NOT_STATED) for value in names], dtype=shares.dtype)
-    run.require((shares * stated).sum())
-    return SoftLabel(normalised(shares * stated), names)
+def _universe(run: SoftRun) -> EventUniverse:
+    return run.facts.events.universe

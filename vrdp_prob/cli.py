@@ -1,4 +1,4 @@
-"""The command line: `vrdp-prob report`, `ask`, `evaluate`, `learn-word`, `demo`, `calibrate-camera` and `compile`.
+"""The command line: `vrdp-prob report`, `ask`, `learn-concepts`, `learn-word`, `evaluate`, `discover`, `demo` and more.
 
 Exit code 0: done; 2: input that cannot be used (one line says what, where, and how to mend it); 1: anything else.
 """
@@ -12,10 +12,20 @@ from typing import Annotated
 import typer
 
 from vrdp_prob import __version__
-from vrdp_prob.command_inputs import model_at, questions_of, scene_range, videos_at, words_at
+from vrdp_prob.command_inputs import (
+    RULES,
+    check_concepts,
+    concepts_at,
+    model_at,
+    questions_of,
+    scene_range,
+    videos_at,
+    words_at,
+)
 from vrdp_prob.command_options import (
     CameraOption,
     CheckpointFolder,
+    ConceptsOption,
     Defaults,
     Input,
     Model,
@@ -28,6 +38,9 @@ from vrdp_prob.command_options import (
     Video,
     Words,
 )
+from vrdp_prob.concepts.perceived.folder import taught_videos
+from vrdp_prob.concepts.perceived.learning import learn
+from vrdp_prob.concepts.perceived.storage import write_concepts
 from vrdp_prob.concepts.physical.from_files import learn_from_files
 from vrdp_prob.datasets import load, load_all, video_files, video_names
 from vrdp_prob.discovery.checking import check_video_count
@@ -93,6 +106,7 @@ def report(
     out: Annotated[Path, typer.Option(metavar="DIR", help="Folder of the report.")] = Path("vrdp-prob-report"),
     video: Video = None,
     camera: CameraOption = None,
+    concepts: ConceptsOption = RULES,
     model: Model = None,
     sampler: Sampler = DEFAULT_SAMPLER,
     noise: Noise = "auto",
@@ -108,10 +122,17 @@ def report(
     check_writable(out)
     if checkpoint is not None:
         check_writable(checkpoint)
-    physics, words = model_at(model), words_at(word)
+    physics, learned, words = model_at(model), concepts_at(concepts), words_at(word)
     names = [name for name in video_names(path) if video in (None, name)]
     asked = {name: [] for name in names} if questions is None else questions_of(questions, names, words)
-    videos = load_all(path, videos=None if video is None else [video], camera=camera, progress=progress)
+    check_concepts(learned, [question for several in asked.values() for question in several])
+    videos = load_all(
+        path,
+        videos=None if video is None else [video],
+        camera=camera,
+        recognise=None if learned is None else learned.recognise,
+        progress=progress,
+    )
     files = video_files(path)
     for tracks in videos:
         own = Path() if len(videos) == 1 else Path(tracks.video)
@@ -148,6 +169,7 @@ def ask_question(
     as_json: Annotated[bool, typer.Option("--json", help="One JSON document on standard output.")] = False,
     video: Video = None,
     camera: CameraOption = None,
+    concepts: ConceptsOption = RULES,
     model: Model = None,
     sampler: Sampler = DEFAULT_SAMPLER,
     noise: Noise = "auto",
@@ -167,9 +189,11 @@ def ask_question(
         check_mc_error(mc_error)
     if checkpoint is not None:
         check_writable(checkpoint)
-    physics, words = model_at(model), words_at(word)
+    physics, learned, words = model_at(model), concepts_at(concepts), words_at(word)
     check_question(asked, words=words)
-    tracks = load(path, video=video, camera=camera, progress=progress)
+    check_concepts(learned, [asked])
+    recognise = None if learned is None else learned.recognise
+    tracks = load(path, video=video, camera=camera, recognise=recognise, progress=progress)
     check_question(asked, tracks=tracks, words=words)
     posterior = infer(
         tracks,
@@ -245,6 +269,7 @@ def evaluate_answers(
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="One JSON document on standard output.")] = False,
     camera: CameraOption = None,
+    concepts: ConceptsOption = RULES,
     model: Model = None,
     sampler: Sampler = "laplace",
     word: Words = None,
@@ -259,6 +284,7 @@ def evaluate_answers(
         scenes=None if scenes is None else scene_range(scenes),
         source=source,
         camera=camera,
+        concepts=None if concepts == RULES else Path(concepts),
         model=model_at(model),
         sampler=sampler,
         seed=seed,
@@ -309,6 +335,35 @@ def learn_word(
     )
     learned.write(file)
     print("\n".join([*learned.summary, str(file)]))
+
+
+@app.command(name="learn-concepts")
+def learn_concepts(
+    folder: Annotated[Path, typer.Argument(metavar="FOLDER", help="A folder of videos.")],
+    *,
+    questions: Annotated[Path, typer.Option(metavar="FILE", help="CLEVRER question file with the right answers.")],
+    out: Annotated[Path, typer.Option(metavar="FILE", help="File of the concepts.")] = Path("vrdp-prob.concepts"),
+    scenes: Scenes = None,
+    checkpoint: Annotated[
+        Path | None,
+        typer.Option(metavar="DIR", help="Keeps what is done, to go on from; by default a folder beside the file."),
+    ] = None,
+    camera: CameraOption = None,
+    seed: Seed = 0,
+    quiet: Quiet = False,
+) -> None:
+    """Learn what colors, materials, shapes, motion and events look like from questions and answers."""
+    progress = progress_display(quiet=quiet)
+    check_writable(out.parent)
+    kept = checkpoint or out.with_name(f"{out.name}-checkpoint")
+    wanted = None if scenes is None else scene_range(scenes)
+    videos = taught_videos(
+        folder, questions, scenes=wanted, camera=camera, checkpoint=kept / "videos", progress=progress
+    )
+    learned = learn(videos, seed=seed, checkpoint=kept / "networks", progress=progress)
+    write_concepts(out, learned.concepts)
+    if not quiet:
+        print("\n".join([*learned.lines, str(out)]))
 
 
 @app.command()

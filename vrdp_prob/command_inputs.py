@@ -1,8 +1,10 @@
 """What commands read before their work, and the refusals that come with it."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
+from vrdp_prob.concepts.perceived.concepts import Concepts
+from vrdp_prob.concepts.perceived.storage import read_concepts
 from vrdp_prob.concepts.physical import LearnedWord
 from vrdp_prob.datasets import read_questions, video_files, video_names
 from vrdp_prob.errors import InputError
@@ -18,6 +20,22 @@ def scene_range(text: str) -> tuple[int, int]:
     if not colon or not first.isdecimal() or not end.isdecimal() or int(first) >= int(end):
         raise InputError(f"--scenes is '{text}'; give A:B with A below B, for example 0:30.")
     return int(first), int(end)
+
+
+RULES = "rules"
+"""Name of perception's own rules, where concepts can be chosen."""
+
+
+def concepts_at(choice: str) -> Concepts | None:
+    """The concepts of a file, None for the rules of perception."""
+    return None if choice == RULES else read_concepts(Path(choice))
+
+
+def check_concepts(concepts: Concepts | None, questions: Iterable[Question]) -> None:
+    """Refuse questions with a word that the concepts never learned."""
+    if concepts is not None:
+        for question in questions:
+            concepts.check_question(question)
 
 
 def model_at(path: Path | None) -> PhysicsModel | None:

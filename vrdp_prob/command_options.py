@@ -49,4 +49,12 @@ Scenes = Annotated[
     str | None, typer.Option(metavar="A:B", help="Scenes A to B-1 of the question file; all by default.")
 ]
 Processes = Annotated[int | None, typer.Option(metavar="N", min=1, help="Videos at a time; by default one per core.")]
+ConceptsOption = Annotated[
+    str,
+    typer.Option(
+        "--concepts",
+        metavar="FILE|rules",
+        help="What objects look like: concepts learned by learn-concepts, or the rules of perception.",
+    ),
+]
 Video = Annotated[str | None, typer.Option(metavar="ID", help="Which video of a folder of several.")]

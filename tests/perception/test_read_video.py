@@ -2,10 +2,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from drawing import FRAME_RATE, RADIUS, Stage, Thing, line, resting
+from drawing import COLORS, FRAME_RATE, RADIUS, Stage, Thing, line, resting
 
 from vrdp_prob.errors import InputError
-from vrdp_prob.perception import read_video
+from vrdp_prob.perception import SeenObjects, read_video, see_video
 from vrdp_prob.scene import Body, Camera, Shape, Tracks
 
 FRAMES = 45
@@ -40,8 +40,13 @@ def drawn(stage: Stage, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def tracks(stage: Stage, drawn: Path) -> Tracks:
-    return read_video(drawn, camera_of(stage))
+def seen(stage: Stage, drawn: Path) -> SeenObjects:
+    return see_video(drawn, camera_of(stage))
+
+
+@pytest.fixture(scope="module")
+def tracks(seen: SeenObjects) -> Tracks:
+    return seen.tracks
 
 
 def find(tracks: Tracks, color: str, shape: str) -> tuple[int, Body]:
@@ -127,6 +132,28 @@ def test_every_row_has_a_covariance_that_covers_the_error(tracks: Tracks, stage:
         error = tracks.positions[seen, index] - thing.path[seen]
         squared += np.einsum("ni,nij,nj->n", error, np.linalg.inv(covariance[seen, index]), error).tolist()
     assert np.mean(np.array(squared) < 13.8) > 0.9
+
+
+def test_crops_show_each_object_in_its_color_and_shape(seen: SeenObjects) -> None:
+    inside = {"cube": 0.0, "sphere": 0.0}
+    for body, crops in zip(seen.tracks.bodies, seen.crops, strict=True):
+        assert 1 <= len(crops) <= 16
+        shows = crops.masks > 200
+        chroma = crops.pictures[shows].mean(axis=0) / crops.pictures[shows].mean()
+        true = np.array(COLORS[str(body.color)]) / np.mean(COLORS[str(body.color)])
+        assert np.abs(chroma - true).max() < 0.35, body
+        assert shows.mean(axis=(1, 2)).min() > 0.05, body
+        # an object is in the middle, and what is around it is not the object
+        assert crops.masks[:, 12:20, 12:20].mean() > 200, body
+        assert crops.masks[:, 0].mean() < 60, body
+        inside[str(body.shape)] = float(shows.mean())
+    assert inside["cube"] > 1.15 * inside["sphere"]
+
+
+def test_pictures_are_cut_without_another_measurement(seen: SeenObjects, stage: Stage, drawn: Path) -> None:
+    again = read_video(drawn, camera_of(stage))
+    np.testing.assert_array_equal(again.positions, seen.tracks.positions)
+    assert again.bodies == seen.tracks.bodies
 
 
 def test_same_video_same_numbers(stage: Stage, drawn: Path) -> None:

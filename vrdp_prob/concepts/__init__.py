@@ -1,1 +1,1 @@
-"""Words that are learned from questions and answers."""
+"""Concepts: what words mean, learned from questions and answers."""

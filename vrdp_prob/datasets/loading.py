@@ -1,7 +1,8 @@
 """One door for every input: a video, a tracks folder, a CLEVRER annotation, or a folder of videos or annotations."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import Any
 
 from vrdp_prob.datasets import folder as folders
 from vrdp_prob.datasets.clevrer import annotated_video, read_annotation
@@ -10,6 +11,8 @@ from vrdp_prob.progress import ProgressDisplay
 from vrdp_prob.scene import Camera, Tracks
 
 CameraChoice = Camera | Path | str | None
+Recogniser = Callable[[Any], Tracks]
+"""Tracks with attributes from what perception saw of a video (`vrdp_prob.perception.SeenObjects`)."""
 CAMERA_FILE = "camera.json"
 TRACKS_FILE = "tracks.csv"
 CLEVRER = "clevrer"
@@ -22,6 +25,7 @@ def load(
     *,
     video: str | None = None,
     camera: CameraChoice = None,
+    recognise: Recogniser | None = None,
     progress: ProgressDisplay | None = None,
 ) -> Tracks:
     """Tracks of one video.
@@ -36,18 +40,22 @@ def load(
     camera
         A camera, the path of a camera file, or `"clevrer"` for the camera of that data set. By default `camera.json`
         beside the file or in its parent folder (of a tracks folder: in it). Only a video needs one.
+    recognise
+        What gives the objects of a video their attributes, learned concepts for example; perception's rules where None.
     progress
         Who follows the work on a video file.
 
     Raises
     ------
     InputError
-        If the input cannot be used, a folder holds several videos and none is named, or a video has no camera.
+        If the input cannot be used, a folder holds several videos and none is named, a video has no camera, or there is
+        no video for `recognise` to look at.
     """
     names = video_names(path)
     if video is None and len(names) > 1:
         raise InputError(f"{path}: the folder holds {len(names)} videos; choose one (--video {names[0]}, say).")
-    return load_all(path, videos=None if video is None else [video], camera=camera, progress=progress)[0]
+    chosen = None if video is None else [video]
+    return load_all(path, videos=chosen, camera=camera, recognise=recognise, progress=progress)[0]
 
 
 def load_all(
@@ -55,10 +63,15 @@ def load_all(
     *,
     videos: Sequence[str] | None = None,
     camera: CameraChoice = None,
+    recognise: Recogniser | None = None,
     progress: ProgressDisplay | None = None,
 ) -> list[Tracks]:
     """Tracks of the named videos (all by default) of an input; parameters as for `load`."""
     source = _existing(path)
+    if recognise is not None and has_tracks(source):
+        raise InputError(
+            f"{path}: learned concepts look at videos, and this holds positions; give videos, or leave --concepts out."
+        )
     if _is_tracks_folder(source):
         folder = source if source.is_dir() else source.parent
         return folders.read_folder(folder, videos=videos, camera=find_camera(folder, camera))
@@ -67,7 +80,7 @@ def load_all(
     for name in names:
         if name not in files:
             raise InputError(f"{path}: there is no video '{name}'; the videos are {folders.some(list(files))}.")
-    return [_load_file(files[name], camera, progress) for name in names]
+    return [_load_file(files[name], camera, recognise, progress) for name in names]
 
 
 def video_names(path: Path | str) -> list[str]:
@@ -137,7 +150,9 @@ def _annotation_paths(path: Path) -> list[Path]:
     return [path] if path.suffix.lower() == ".json" else []
 
 
-def _load_file(path: Path, camera: CameraChoice, progress: ProgressDisplay | None) -> Tracks:
+def _load_file(
+    path: Path, camera: CameraChoice, recognise: Recogniser | None, progress: ProgressDisplay | None
+) -> Tracks:
     found = find_camera(path, camera)
     if path.suffix.lower() == ".json":
         return read_annotation(path, camera=found)
@@ -146,6 +161,8 @@ def _load_file(path: Path, camera: CameraChoice, progress: ProgressDisplay | Non
             f"{path}: no camera; put {CAMERA_FILE} beside the video or in its parent folder, or give --camera FILE "
             "(or --camera clevrer)."
         )
-    from vrdp_prob.perception import read_video  # noqa: PLC0415 - OpenCV is loaded only where there is a video
+    from vrdp_prob.perception import read_video, see_video  # noqa: PLC0415 - OpenCV is loaded only for a video
 
-    return read_video(path, found, progress=progress)
+    if recognise is None:
+        return read_video(path, found, progress=progress)
+    return recognise(see_video(path, found, progress=progress))

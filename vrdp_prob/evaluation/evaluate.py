@@ -9,6 +9,7 @@ from functools import cached_property
 from hashlib import sha256
 from pathlib import Path
 
+from vrdp_prob.concepts.perceived.storage import read_concepts
 from vrdp_prob.datasets import (
     find_camera,
     has_tracks,
@@ -106,6 +107,7 @@ def evaluate(
     scenes: tuple[int, int] | None = None,
     source: str | None = None,
     camera: CameraChoice = None,
+    concepts: Path | str | None = None,
     model: PhysicsModel | None = None,
     sampler: str = "laplace",
     seed: int = 0,
@@ -130,6 +132,8 @@ def evaluate(
         `tracks` or `videos`; where None, tracks where the folder holds any.
     camera
         Camera of the videos; see `vrdp_prob.load`.
+    concepts
+        File of learned concepts that give the objects of videos their attributes; the rules of perception where None.
     model, sampler, seed
         See `vrdp_prob.infer`. `laplace` does not hand on to another sampler here.
     draws
@@ -157,7 +161,14 @@ def evaluate(
         raise InputError(f"input is '{source}'; use {' or '.join(SOURCES)}.")
     if draws < 1 or (processes is not None and processes < 1):
         raise InputError(f"draws is {draws} and processes is {processes}; both must be at least 1.")
-    settings = Settings(model or default_model(), sampler, seed, draws, tuple(words))
+    if concepts is not None:
+        read_concepts(concepts)
+        if source != "videos" and has_tracks(folder):
+            raise InputError(
+                f"{folder}: learned concepts look at videos, and this holds positions; use --input videos."
+            )
+    file = None if concepts is None else Path(concepts).resolve()
+    settings = Settings(model or default_model(), sampler, seed, draws, tuple(words), file)
     asked = _asked(Path(questions), scenes, Vocabulary.of(words))
     tasks = _tasks(Path(folder), asked, source, camera, settings)
     facts = _facts(Path(folder), Path(questions), source, settings)
@@ -235,6 +246,7 @@ def _some(folder: Path, tasks: list[Task]) -> list[Task]:
 def _facts(folder: Path, questions: Path, source: str | None, settings: Settings) -> dict[str, str]:
     """What the results depend on: another evaluation must not go on from them."""
     table = folder / "tracks.csv"
+    concepts = "rules" if settings.concepts is None else sha256(settings.concepts.read_bytes()).hexdigest()
     tracks = sha256(table.read_bytes()).hexdigest() if table.is_file() and source != "videos" else ""
     return run_facts(
         settings.model,
@@ -242,6 +254,7 @@ def _facts(folder: Path, questions: Path, source: str | None, settings: Settings
         tracks=tracks,
         input=source,
         questions=sha256(questions.read_bytes()).hexdigest(),
+        concepts=concepts,
         sampler=settings.sampler,
         seed=settings.seed,
         draws=settings.draws,

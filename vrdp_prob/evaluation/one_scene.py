@@ -8,6 +8,7 @@ from typing import Any
 
 import torch
 
+from vrdp_prob.concepts.perceived.storage import read_concepts
 from vrdp_prob.datasets import load
 from vrdp_prob.errors import InputError
 from vrdp_prob.evaluation.judgement import Judgement, judge, unanswered
@@ -33,6 +34,7 @@ class Settings:
     seed: int
     draws: int
     words: tuple[ChangeWord, ...] = ()
+    concepts: Path | None = None
 
 
 @dataclass(frozen=True)
@@ -121,9 +123,14 @@ def evaluate_scene(task: Task) -> SceneResult:
     return SceneResult(task.scene, dict.fromkeys(VARIANTS, nothing), time.monotonic() - begin, failed=reason)
 
 
+def _loaded(task: Task, file: Path) -> Tracks:
+    concepts = None if task.settings.concepts is None else read_concepts(task.settings.concepts)
+    return load(file, camera=task.camera, recognise=None if concepts is None else concepts.recognise)
+
+
 def _evaluated(task: Task, begin: float) -> SceneResult:
     settings = task.settings
-    tracks = task.source if isinstance(task.source, Tracks) else load(task.source, camera=task.camera)
+    tracks = task.source if isinstance(task.source, Tracks) else _loaded(task, task.source)
     # the fast way does not hand on here: a batch would take hours, and its sentence says what it is worth
     posterior = infer(tracks, sampler=settings.sampler, model=settings.model, seed=settings.seed, hand_on=False)
     worlds = {

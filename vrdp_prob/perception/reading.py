@@ -1,11 +1,11 @@
 """The whole way from a video file to measured tracks."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
-import cv2
 import numpy as np
-from jaxtyping import Bool, Float, UInt8
+from jaxtyping import Float
 
 from vrdp_prob.errors import InputError
 from vrdp_prob.perception.attributes import (
@@ -15,12 +15,12 @@ from vrdp_prob.perception.attributes import (
     material_probabilities,
     shape_probabilities,
 )
+from vrdp_prob.perception.crops import Crops, cut_crops
 from vrdp_prob.perception.noise import position_covariance
-from vrdp_prob.perception.placing import Sighting, Track
-from vrdp_prob.perception.region import Window, apparent_radius, paint
-from vrdp_prob.perception.solids import Pose
+from vrdp_prob.perception.placing import Track
 from vrdp_prob.perception.tracking import Tracker
 from vrdp_prob.perception.video import DEFAULT_FRAME_RATE, Video, read_frames
+from vrdp_prob.perception.views import View, best_views, inner_pixels
 from vrdp_prob.progress import ProgressDisplay
 from vrdp_prob.scene.body import Body, Shape
 from vrdp_prob.scene.camera import REST_HEIGHT, Camera
@@ -32,11 +32,33 @@ _LARGEST_SD = 0.1
 """Metres of standard deviation from which a position is no measurement but a guess, and the row is left out."""
 _LEAST_MOTION = 0.05
 """Metres that an object must travel to count as moving."""
-_LOOKS = 16
-_LOOK_MARGIN = 0.12
-"""Rim of an object's picture that is not looked at for its attributes, in apparent radii."""
 _FEWEST_PIXELS = 30
 _FEWEST_ROWS = 2
+
+
+@dataclass(frozen=True)
+class SeenObjects:
+    """What was measured in a video, and what its objects look like.
+
+    Parameters
+    ----------
+    tracks
+        Positions and attributes.
+    crops
+        Small pictures of each object, in the order of the tracks' bodies.
+    """
+
+    tracks: Tracks
+    crops: tuple[Crops, ...]
+
+
+@dataclass(frozen=True)
+class _Measured:
+    """Tracks, and where each of their objects shows best."""
+
+    tracks: Tracks
+    tracker: Tracker
+    views: tuple[tuple[Track, list[View]], ...]
 
 
 def read_video(
@@ -73,6 +95,26 @@ def read_video(
     InputError
         If the file is no usable video, its pictures have another size than the camera's, or no object moves in it.
     """
+    return _measured(path, camera, frames, radius, progress).tracks
+
+
+def see_video(
+    path: Path,
+    camera: Camera,
+    *,
+    frames: int | None = None,
+    radius: float = REST_HEIGHT,
+    progress: ProgressDisplay | None = None,
+) -> SeenObjects:
+    """Measure the objects of a video and cut out their pictures; parameters and refusals are those of `read_video`."""
+    measured = _measured(path, camera, frames, radius, progress)
+    crops = tuple(cut_crops(measured.tracker, track, views) for track, views in measured.views)
+    return SeenObjects(measured.tracks, crops)
+
+
+def _measured(
+    path: Path, camera: Camera, frames: int | None, radius: float, progress: ProgressDisplay | None
+) -> _Measured:
     video = read_frames(path, frames=frames, progress=progress)
     check_size(path, video, camera)
     tracker = Tracker(video.frames, camera, radius)
@@ -88,12 +130,12 @@ def read_video(
     table = np.stack([arrays[index] for index in kept], axis=1)
     if not _moves(table[..., :2]):
         raise InputError(f"{path}: no object moves in the video; give one in which objects move.")
-    looks = _looks(tracker, found)
+    views = tuple((found[index], best_views(tracker, found, found[index])) for index in kept)
     bodies = tuple(
-        _body(str(number), found[index], looks[found[index].number], radius) for number, index in enumerate(kept)
+        _body(str(number), track, _looks(tracker, track, own), radius) for number, (track, own) in enumerate(views)
     )
     cubes = np.array([body.shape is Shape.CUBE for body in bodies])
-    return Tracks.from_arrays(
+    tracks = Tracks.from_arrays(
         video.name,
         bodies,
         np.arange(len(video.frames)) / rate,
@@ -102,6 +144,7 @@ def read_video(
         position_covariance=table[..., 3:].reshape(*table.shape[:2], 2, 2),
         camera=camera,
     )
+    return _Measured(tracks, tracker, views)
 
 
 def check_size(path: Path, video: Video, camera: Camera) -> None:
@@ -140,44 +183,9 @@ def _moves(positions: Float[np.ndarray, "frame body 2"]) -> bool:
     return bool((np.linalg.norm(high - low, axis=-1) > _LEAST_MOTION).any())
 
 
-def _looks(tracker: Tracker, tracks: Sequence[Track]) -> dict[int, list[Look]]:
-    """Looks at each track (by number) in the frames that show most of it."""
-    looks: dict[int, list[Look]] = {}
-    for track in tracks:
-        ranked = sorted(track.sightings, key=lambda frame: -round(track.sightings[frame].visible, 2))
-        best = [frame for frame in ranked if track.sightings[frame].visible >= track.sightings[ranked[0]].visible - 0.1]
-        chosen = [best[place] for place in np.linspace(0, len(best) - 1, min(_LOOKS, len(best))).round().astype(int)]
-        pixels = [_inner_pixels(tracker, tracks, track, frame) for frame in chosen]
-        looks[track.number] = [look(*sample) for sample in pixels if len(sample[0]) >= _FEWEST_PIXELS]
-    return looks
-
-
-def _inner_pixels(
-    tracker: Tracker, tracks: Sequence[Track], track: Track, frame: int
-) -> tuple[UInt8[np.ndarray, "pixel 3"], Bool[np.ndarray, "pixel"]]:
-    """Pixels well inside the picture of a track that no nearer track hides, and whether each is on its flat top."""
-    sightings: Mapping[int, Sighting] = {
-        other.number: other.sightings[frame] for other in tracks if frame in other.sightings
-    }
-    live = [other for other in tracks if other.number in sightings]
-    pose = track.sightings[frame].pose
-    window = tracker.placer.window(track.solid, pose)
-    margin = max(1, round(_LOOK_MARGIN * apparent_radius(tracker.camera, track.solid, pose)))
-    free = np.pad(window.mask, 1)
-    free[1:-1, 1:-1] *= tracker.covered(track, live, sightings)[window.place] == 0
-    core = cv2.erode(free, np.ones((2 * margin + 1,) * 2, np.uint8))[1:-1, 1:-1] > 0
-    return tracker.frames[frame][window.place][core], _on_lid(tracker, track, pose, window)[core]
-
-
-def _on_lid(tracker: Tracker, track: Track, pose: Pose, window: Window) -> Bool[np.ndarray, "row column"]:
-    """Where in a window the flat top of a track is in sight."""
-    height, width = tracker.frames.shape[1:3]
-    on_lid = np.zeros((height, width), dtype=bool)
-    lid = track.solid.lid(tracker.camera, pose)
-    if lid is not None:
-        face = paint(lid, height, width)
-        on_lid[face.place] = face.mask > 0
-    return on_lid[window.place]
+def _looks(tracker: Tracker, track: Track, views: Sequence[View]) -> list[Look]:
+    pixels = [inner_pixels(tracker, track, view) for view in views]
+    return [look(*sample) for sample in pixels if len(sample[0]) >= _FEWEST_PIXELS]
 
 
 def _body(name: str, track: Track, looks: Sequence[Look], radius: float) -> Body:

@@ -8,6 +8,7 @@ import numpy as np
 from vrdp_prob.reasoning import object_operations
 from vrdp_prob.reasoning.events import EventTable, EventUniverse
 from vrdp_prob.reasoning.facts import Motion, TableFacts
+from vrdp_prob.reasoning.operations import Operation
 from vrdp_prob.reasoning.prepared import ChoiceInput, prepare
 from vrdp_prob.reasoning.program import Program
 from vrdp_prob.reasoning.run import Run
@@ -66,16 +67,12 @@ class _Unknown:
 
 def _look_up_objects(program: Program, run: Run) -> None:
     """Run the steps of a program whose values follow from attributes alone."""
-    stack: list[Value | _Unknown] = []
-    for step in program.steps:
-        if isinstance(step, Word):
-            stack.append(step)
-            continue
-        begin = len(stack) - len(step.takes)
-        taken = stack[begin:]
-        del stack[begin:]
-        known = [value for value in taken if isinstance(value, Word | ObjectSet)]
-        stack.append(step(run, *known) if step.function in STATIC and len(known) == len(taken) else _Unknown())
+
+    def apply(step: Operation, arguments: Sequence[Value | _Unknown]) -> Value | _Unknown:
+        known = [value for value in arguments if isinstance(value, Word | ObjectSet)]
+        return step(run, *known) if step.function in STATIC and len(known) == len(arguments) else _Unknown()
+
+    program.evaluate(apply)
 
 
 def _attributes_alone(bodies: tuple[Body, ...]) -> TableFacts:

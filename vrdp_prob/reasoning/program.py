@@ -4,8 +4,9 @@ Errors point at the token: its place in the program (counting from 1), the token
 """
 
 import difflib
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any, TypeVar
 
 from vrdp_prob.errors import InputError
 from vrdp_prob.reasoning import change_operations, event_operations, object_operations, output_operations
@@ -25,6 +26,8 @@ from vrdp_prob.reasoning.values import (
 )
 from vrdp_prob.reasoning.vocabulary import PLAIN, Vocabulary
 from vrdp_prob.scene import QuestionType
+
+Result = TypeVar("Result")
 
 OPERATION_MODULES = (change_operations, event_operations, object_operations, output_operations)
 """Modules whose import fills the registry."""
@@ -56,15 +59,26 @@ class Program:
 
     def run(self, run: Run) -> Value:
         """Run it for all draws; `run` learns in which draws it makes sense."""
-        stack: list[Value] = []
+        return self.evaluate(lambda step, arguments: step(run, *arguments))
+
+    def evaluate(self, apply: Callable[[Operation, Sequence[Any]], Result]) -> Result:
+        """Step through it with operations that mean what `apply` makes of them and their arguments.
+
+        Parameters
+        ----------
+        apply
+            Gives the result of an operation from the results (or words) that it takes, in the order in which they were
+            pushed.
+        """
+        stack: list[Any] = []
         for step in self.steps:
             if isinstance(step, Word):
                 stack.append(step)
             else:
-                count = len(step.takes)
-                arguments = stack[len(stack) - count :]
-                del stack[len(stack) - count :]
-                stack.append(step(run, *arguments))
+                begin = len(stack) - len(step.takes)
+                arguments = stack[begin:]
+                del stack[begin:]
+                stack.append(apply(step, arguments))
         return stack[-1]
 
 

@@ -1,0 +1,74 @@
+"""Concepts as a user learns and uses them."""
+
+import json
+import shutil
+from pathlib import Path
+
+import pytest
+from command_line import refused
+
+from vrdp_prob import cli
+from vrdp_prob.concepts.perceived.storage import read_concepts
+
+COUNT = {"question_id": 0, "question": "How many collisions happen?", "answer": "1"}
+
+
+def questions(folder: Path, *asked: dict[str, object], video: str = "clip.mp4") -> Path:
+    file = folder / "questions.json"
+    file.write_text(json.dumps([{"scene_index": 3, "video_filename": video, "questions": list(asked)}]))
+    return file
+
+
+def test_a_file_that_holds_no_concepts(folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "x.concepts").write_bytes(b"something else")
+    ask = ["ask", folder, "How many collisions happen?", "--concepts"]
+    assert "no such file; learn concepts first" in refused(capsys, *ask, tmp_path / "nowhere")
+    assert "holds no learned concepts" in refused(capsys, *ask, tmp_path / "x.concepts")
+    report = ["report", folder, "--out", tmp_path / "out", "--concepts", tmp_path / "x.concepts"]
+    assert "holds no learned concepts" in refused(capsys, *report)
+    assert not (tmp_path / "out").exists()
+    evaluate = ["evaluate", folder, "--questions", questions(tmp_path, COUNT, video="v.mp4"), "--out", tmp_path / "out"]
+    assert "holds no learned concepts" in refused(capsys, *evaluate, "--concepts", tmp_path / "x.concepts")
+
+
+def test_questions_without_their_video(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    learn = ["learn-concepts", tmp_path / "videos", "--out", tmp_path / "x.concepts", "--questions"]
+    assert "there is no such folder" in refused(capsys, *learn, questions(tmp_path, COUNT))
+    (tmp_path / "videos").mkdir()
+    line = refused(capsys, *learn, questions(tmp_path, COUNT))
+    assert "there is no video clip, which" in line
+    assert "leave its scene out" in line
+    assert "no scene from (7, 9) is in the file" in refused(
+        capsys, *learn, questions(tmp_path, COUNT), "--scenes", "7:9"
+    )
+    assert not (tmp_path / "x.concepts").exists()
+
+
+def test_answers_that_cannot_teach(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "clip.mp4").write_bytes(b"")
+    learn = ["learn-concepts", tmp_path, "--out", tmp_path / "x.concepts", "--questions"]
+    other = COUNT | {"question_id": 1, "answer": "2"}
+    assert "ask the same but are answered '1' and '2'" in refused(capsys, *learn, questions(tmp_path, COUNT, other))
+    unanswered = {"question_id": 0, "question": "How many collisions happen?"}
+    assert "no descriptive or explanatory question" in refused(capsys, *learn, questions(tmp_path, unanswered))
+    assert "no camera" in refused(capsys, *learn, questions(tmp_path, COUNT))
+
+
+@pytest.mark.slow
+def test_learned_in_one_command_and_used_in_another(
+    shared_data: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    data, out = shared_data / "clevrer_bullet", tmp_path / "x.concepts"
+    learn = ["learn-concepts", data / "videos", "--questions", data / "questions.json", "--scenes", "5:7", "--out", out]
+    assert cli.run([str(word) for word in learn]) == 0
+    said = capsys.readouterr().out
+    assert "Learned from 2 videos" in said
+    assert str(out) in said
+    assert len(read_concepts(out).networks) == 5
+    for name in ("videos/video_00005.mp4", "camera.json"):
+        shutil.copy(data / name, tmp_path)
+    ask = ["ask", tmp_path / "video_00005.mp4", "How many purple objects are there?", "--sampler", "laplace"]
+    assert cli.run([str(word) for word in [*ask, "--json", "--concepts", out]]) == 0
+    assert json.loads(capsys.readouterr().out)["answer"] == 2
+    tracks = ["ask", data, "How many collisions happen?", "--video", "video_00005", "--concepts", out]
+    assert "learned concepts look at videos" in refused(capsys, *tracks)

@@ -1,0 +1,159 @@
+"""Concepts learned from the videos of a folder and a file of questions."""
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from hashlib import sha256
+from pathlib import Path
+
+import numpy as np
+import torch
+
+from vrdp_prob.concepts.perceived.concepts import Concepts, Lessons
+from vrdp_prob.concepts.perceived.examples import Example, words_of
+from vrdp_prob.concepts.perceived.lessons import LESSONS, Taught
+from vrdp_prob.concepts.perceived.network import ConceptNetwork
+from vrdp_prob.concepts.perceived.standing import Standing
+from vrdp_prob.concepts.perceived.training import train
+from vrdp_prob.concepts.perceived.vocabulary import Vocabulary
+from vrdp_prob.errors import InputError
+from vrdp_prob.inference.checkpoint import Checkpoint
+from vrdp_prob.progress import ProgressDisplay, SilentProgress
+
+NETWORKS = 5
+"""Networks that learn the same words; each holds out another part of the videos, and together they hold out all."""
+_HARDLY = 0.05
+"""Answers that are right by so little more than by guessing may as well contradict the videos."""
+
+
+@dataclass(frozen=True)
+class Learned:
+    """Concepts, and what the person who had them learned should know.
+
+    Parameters
+    ----------
+    concepts
+        The concepts.
+    notes
+        Sentences on what was not learned.
+    """
+
+    concepts: Concepts
+    notes: tuple[str, ...]
+
+    @property
+    def lines(self) -> list[str]:
+        """What was learned, and the notes, one sentence a line."""
+        lessons = self.concepts.lessons
+        words = [word for known in self.concepts.vocabulary.values.values() for word in known]
+        return [
+            f"Learned from {lessons.videos} videos and {lessons.examples} answers: {', '.join(words)}.",
+            f"Of the answers about held-out videos {lessons.attributes_right:.0%} are right with the events of the "
+            f"tracks, {lessons.events_right:.0%} with learned events, {lessons.guessed:.0%} by guessing.",
+            *self.notes,
+        ]
+
+
+def learn(
+    videos: Mapping[str, Taught],
+    *,
+    seed: int = 0,
+    checkpoint: Path | None = None,
+    progress: ProgressDisplay | None = None,
+) -> Learned:
+    """Learn concepts.
+
+    Parameters
+    ----------
+    videos
+        Videos with answers about them, by name.
+    seed
+        Seed of everything random in it.
+    checkpoint
+        Folder that keeps the state of the training; the same call, after an interruption, goes on from there and ends
+        with the same numbers.
+    progress
+        Told of each epoch.
+
+    Raises
+    ------
+    InputError
+        If no word of an attribute occurs in the questions, or the folder holds what was learned from others.
+    """
+    examples = [example for one in videos.values() for example in one.examples]
+    vocabulary = Vocabulary.of(words_of(examples))
+    for name, words in vocabulary.values.items():
+        if not words:
+            raise InputError(
+                f"no question has a word for a {name}, so none can be learned; add questions that use some."
+            )
+    kept = None if checkpoint is None else Checkpoint(checkpoint, _facts(videos, seed))
+    taught, display = list(videos.values()), progress or SilentProgress()
+    trained = [_trained(vocabulary, taught, place, seed=seed, kept=kept, progress=display) for place in range(NETWORKS)]
+    standings = np.array([[one.right for one in standing] for _, standing in trained]).mean(axis=0)
+    guessed = _guessed(examples)
+    lessons = Lessons(len(videos), len(examples), seed, guessed, float(standings[0]), float(standings[1]))
+    concepts = Concepts(tuple(network for network, _ in trained), lessons)
+    return Learned(concepts, _notes(concepts))
+
+
+def _trained(
+    vocabulary: Vocabulary,
+    taught: Sequence[Taught],
+    place: int,
+    *,
+    seed: int,
+    kept: Checkpoint | None,
+    progress: ProgressDisplay,
+) -> tuple[ConceptNetwork, list[Standing]]:
+    """One network, that holds out every fifth video, another fifth for each place."""
+    held_out = taught[place::NETWORKS] if len(taught) > 1 else []
+    rest = [one for one in taught if not any(one is other for other in held_out)] or list(taught)
+    own_seed = seed * NETWORKS + place
+    with torch.random.fork_rng(devices=[]):
+        torch.manual_seed(own_seed)
+        network = ConceptNetwork(vocabulary)
+    network.measure([one.observation for one in taught])
+    network.to("cuda" if torch.cuda.is_available() else "cpu")
+    standings = []
+    for lesson in LESSONS:
+        file = None if kept is None else kept.path(f"network-{place}-{lesson.name}.pt")
+        title = f"Learning {lesson.name}, {place + 1} of {NETWORKS}"
+        with progress.stage(title, total=lesson.epochs) as advance:
+            standings.append(train(network, lesson, rest, held_out, seed=own_seed, checkpoint=file, advance=advance))
+    return network.cpu().eval(), standings
+
+
+def _guessed(examples: Sequence[Example]) -> float:
+    """Share of answers that are right when the commonest answer to questions that end alike is given."""
+    answers: dict[str, Counter[str]] = {}
+    for example in examples:
+        answers.setdefault(example.program.tokens[-1], Counter())[example.answer] += 1
+    return sum(max(count.values()) for count in answers.values()) / len(examples)
+
+
+def _notes(concepts: Concepts) -> tuple[str, ...]:
+    missing, lessons = concepts.vocabulary.missing, concepts.lessons
+    notes = []
+    if missing:
+        one = len(missing) == 1
+        notes.append(
+            f"The word{'' if one else 's'} {', '.join(missing)} never occur{'s' if one else ''} in the questions; "
+            f"{'it was' if one else 'they were'} not learned."
+        )
+    if lessons.attributes_right < lessons.guessed + _HARDLY:
+        notes.append(
+            "The answers are hardly better explained than by guessing: there are too few of them, or they contradict "
+            "what the videos show."
+        )
+    return tuple(notes)
+
+
+def _facts(videos: Mapping[str, Taught], seed: int) -> dict[str, str]:
+    """What the result depends on."""
+    asked = sha256()
+    for name, one in videos.items():
+        asked.update(repr((name, [(example.program.tokens, example.answer) for example in one.examples])).encode())
+        for value in one.observation.arrays.values():
+            asked.update(np.ascontiguousarray(value).tobytes())
+    return {"videos and answers": asked.hexdigest(), "seed": str(seed)}

@@ -210,7 +210,7 @@ def advance(worlds: Worlds, state: State, times: Float[np.ndarray, "time"], mode
     """
     released = _released(worlds, state)
     with torch.no_grad():
-        rollout = simulate(released, torch.from_numpy(np.ascontiguousarray(times)), model, event_limit=EVENT_LIMIT)
+        rollout = simulate(released, torch.from_numpy(np.array(times)), model, event_limit=EVENT_LIMIT)
     events = rollout.events.of_kind(RolloutEventKind.COLLISION)
     trajectory, velocity = rollout.trajectory.numpy(), rollout.velocity.numpy()
     return Stretch(

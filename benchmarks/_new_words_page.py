@@ -53,7 +53,7 @@ def _row(word: str, learned: LearnedWord, asked: Sequence[Result]) -> str:
     judged = "| |" if found is None else f"| {found[0]:.3f} | {found[1]:.4f} |"
     return (
         f"| {word} | {learned.evidence.videos} | {learned.evidence.answers} | {shares} | "
-        f"{mass.quantile(0.5):.2f}, {low:.2f} to {high:.2f} | {100 * learned.lapse.mean:.0f} % {judged}"
+        f"{mass.quantile(0.5):.3g}, {low:.3g} to {high:.3g} | {100 * learned.lapse.mean:.0f} % {judged}"
     )
 
 

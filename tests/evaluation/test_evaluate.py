@@ -146,7 +146,7 @@ def test_a_cluster_gives_the_same_numbers(folder: Path, evaluation: Evaluation) 
 def test_bad_calls_are_refused(
     folder: Path, change: dict[str, object], message: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("vrdp_prob.evaluation.workers.PATIENCE", 1)
+    monkeypatch.setattr("vrdp_prob.workers.PATIENCE", 1)
     with pytest.raises(InputError, match=message):
         evaluate(folder, folder / "questions.json", **change)  # type: ignore[arg-type]  # wrong on purpose
 

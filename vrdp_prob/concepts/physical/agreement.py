@@ -67,6 +67,8 @@ def agreements_of(
     """How far every meaning of a word agrees with the answers to questions about one video.
 
     All meanings are tried on the same draws with the same random numbers, so that they differ by what they mean alone.
+    Masses and restitutions that a video does not tell are drawn from their prior: a default would be surer than the
+    video.
 
     Parameters
     ----------
@@ -88,7 +90,7 @@ def agreements_of(
     InputError
         If a question cannot be asked of this video; see `vrdp_prob.reasoning.ask`.
     """
-    worlds = PassingWorlds(posterior, draws=draws, chance=Seeded(seed))
+    worlds = PassingWorlds(posterior, draws=draws, defaults="prior", chance=Seeded(seed))
     counted: list[list[Int[np.ndarray, "group wrong"]]] = [[] for _ in questions]
     for shift in MEANINGS:
         for place, question in enumerate(questions):

@@ -22,6 +22,7 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 import numpy as np
 import torch
+from _answer_goals import GOALS
 from _page import write_between
 from _released_worlds import ReleasedWorlds
 from _resumable import Result, measured
@@ -48,14 +49,6 @@ DRAWS = 100
 FEWER_FRAMES = (40, 80, 128)
 FULL, BEST_FIT, TRUE, EXTENDED = "everything", "best fit (VRDP's way)", "true masses and restitutions", "extended model"
 CALIBRATION = ("ECE", "95 % quantile if calibrated")
-GOALS = {
-    Kind.DESCRIPTIVE: (None, 0.97),
-    Kind.EXPLANATORY: (None, 0.95),
-    Kind.PREDICTIVE: (0.92, 0.90),
-    Kind.REMOVAL: (0.92, 0.84),
-    Kind.MASS: (0.88, 0.76),
-}
-"""Wanted accuracy per option and per question."""
 
 
 @dataclass(frozen=True)

@@ -15,6 +15,7 @@ import time
 from dataclasses import replace
 from pathlib import Path
 
+from _answer_goals import GOALS
 from _clevrer_truth import true_facts
 from _true_posterior import TruePosterior
 
@@ -27,14 +28,6 @@ from vrdp_prob.reasoning.facts import Facts
 from vrdp_prob.scene import Question
 
 DATA = Path(__file__).parents[2] / "shared" / "data" / "clevrer_bullet"
-GOALS = {
-    Kind.DESCRIPTIVE: (None, 0.97),
-    Kind.EXPLANATORY: (None, 0.95),
-    Kind.PREDICTIVE: (0.92, 0.90),
-    Kind.REMOVAL: (0.92, 0.84),
-    Kind.MASS: (0.88, 0.76),
-}
-"""Wanted accuracy per option and per question."""
 
 
 def main() -> None:

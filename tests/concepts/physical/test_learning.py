@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from tests.concepts.physical.word_videos import (
+    Changed,
     bouncier,
     discs_of,
     example_of,
@@ -27,14 +28,13 @@ ROW = (Disc((-1.5, 0.0), (0.85, 0.0)), Disc((0.0, 0.05)), Disc((0.9, 0.15)), Dis
 
 
 def test_one_telling_question() -> None:
-    example = example_of("faster", faster, ROW)
-    learned = learn_concept("faster", [example], draws=10)
+    learned = learn_concept("faster", [example_of("faster", faster, ROW[:3])], draws=10)
     before, after = 0.2, learned.probabilities
     # a disc that stops before another reaches it if it is faster or slides more easily, not if it is heavier
     assert after["nothing"] < before / 2
     assert after["speed"] > before < after["friction"]
     assert after["mass"] < before
-    assert (learned.evidence.videos, learned.evidence.examples, learned.evidence.answers) == (1, 1, 6)
+    assert (learned.evidence.videos, learned.evidence.examples, learned.evidence.answers) == (1, 1, 3)
 
 
 def test_examples_that_cannot_be_used() -> None:
@@ -102,18 +102,18 @@ def test_a_word_from_files_goes_on_where_it_was_broken_off(tmp_path: Path) -> No
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("name", "change", "subject", "amounts"),
+    ("name", "change", "subject", "least", "amounts"),
     [
-        ("heavier", heavier, "mass", {"mass factor": 6.0}),
-        ("slipperier", slipperier, "friction", {"friction factor": 1 / 8}),
-        ("faster", faster, "speed", {"speed factor": 1.7}),
-        ("samer", unchanged, "nothing", {}),
+        ("samer", unchanged, "nothing", 0.4, {}),
+        ("heavier", heavier, "mass", 0.8, {"mass factor": 6.0}),
+        ("slipperier", slipperier, "friction", 0.8, {"friction factor": 1 / 8}),
+        ("faster", faster, "speed", 0.95, {"speed factor": 1.7}),
     ],
 )
-def test_words_are_found(name: str, change, subject: str, amounts: dict[str, float]) -> None:
+def test_words_are_found(name: str, change: Changed, subject: str, least: float, amounts: dict[str, float]) -> None:
     learned = learn_concept(name, examples_of(name, change, 16), draws=30)
     assert learned.subject == subject
-    assert learned.probabilities[subject] > 0.8
+    assert learned.probabilities[subject] > least
     for belief in learned.beliefs:
         if belief.name in amounts:
             low, high = belief.quantile(0.005), belief.quantile(0.995)

@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import pytest
+from hypothesis import settings
 from jaxtyping import install_import_hook
 
 ROOT = Path(__file__).parents[1]
@@ -10,6 +11,10 @@ MODULES = [".".join(path.relative_to(ROOT).with_suffix("").parts) for path in so
 CHECKED = [name for name in MODULES if not name.endswith(("_kernel", "__init__"))]
 
 install_import_hook(CHECKED, "shape_checker.check")
+
+# how long an example takes says nothing on a busy machine, and compiles or builds a grammar the first time
+settings.register_profile("untimed", deadline=None)
+settings.load_profile("untimed")
 
 SHARED_DATA = Path(__file__).parents[2] / "shared" / "data"
 

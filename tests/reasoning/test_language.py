@@ -4,7 +4,7 @@ import re
 from pathlib import Path
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from vrdp_prob.datasets import read_questions
@@ -176,7 +176,6 @@ def occasions(draw: st.DrawFn) -> tuple[str, str]:
     )
 
 
-@settings(deadline=None)  # the first question builds the grammar
 @given(things(plural=True), occasions(), st.sampled_from(("before", "after")), st.sampled_from(("enter", "exit")))
 def test_conditions_round_trip(thing: tuple[str, str], occasion: tuple[str, str], when: str, verb: str) -> None:
     (name, own), (clause, event) = thing, occasion

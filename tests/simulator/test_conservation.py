@@ -31,7 +31,7 @@ def _body(generator: np.random.Generator) -> BodyView:
 
 @pytest.mark.parametrize("kind", ContactKind)
 @given(seed=st.integers(0, 2**32 - 1))
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 def test_a_contact_keeps_momentum_and_angular_momentum(kind: ContactKind, seed: int) -> None:
     generator = np.random.default_rng(seed)
     a, b = _body(generator), _body(generator)

@@ -51,7 +51,7 @@ from vrdp_prob.discovery.summary import lines as finding_lines
 from vrdp_prob.errors import InputError
 from vrdp_prob.evaluation import evaluate
 from vrdp_prob.evaluation.document import table, to_document, write_evaluation
-from vrdp_prob.files import check_writable
+from vrdp_prob.files import check_file, check_writable
 from vrdp_prob.inference import OPTIONS, check_options, default_model
 from vrdp_prob.models.simulator.rollout import compile_model
 from vrdp_prob.progress import progress_display
@@ -125,7 +125,7 @@ def report(
     physics, learned, words = model_at(model), concepts_at(concepts), words_at(word)
     names = [name for name in video_names(path) if video in (None, name)]
     asked = {name: [] for name in names} if questions is None else questions_of(questions, names, words)
-    check_concepts(learned, [question for several in asked.values() for question in several])
+    check_concepts(learned, [question for several in asked.values() for question in several], words)
     videos = load_all(
         path,
         videos=None if video is None else [video],
@@ -191,7 +191,7 @@ def ask_question(
         check_writable(checkpoint)
     physics, learned, words = model_at(model), concepts_at(concepts), words_at(word)
     check_question(asked, words=words)
-    check_concepts(learned, [asked])
+    check_concepts(learned, [asked], words)
     recognise = None if learned is None else learned.recognise
     tracks = load(path, video=video, camera=camera, recognise=recognise, progress=progress)
     check_question(asked, tracks=tracks, words=words)
@@ -319,7 +319,9 @@ def learn_word(
 ) -> None:
     """Learn a word for a change of an object from the questions that use it: what it changes, and by how much."""
     file = Path(f"{word}.json") if out is None else out
-    check_writable(file.parent)
+    check_file(file)
+    if checkpoint is not None:
+        check_writable(checkpoint)
     learned = learn_from_files(
         word,
         folder,
@@ -334,7 +336,8 @@ def learn_word(
         progress=progress_display(quiet=quiet),
     )
     learned.write(file)
-    print("\n".join([*learned.summary, str(file)]))
+    if not quiet:
+        print("\n".join([*learned.summary, str(file)]))
 
 
 @app.command(name="learn-concepts")
@@ -354,7 +357,7 @@ def learn_concepts(
 ) -> None:
     """Learn what colors, materials, shapes, motion and events look like from questions and answers."""
     progress = progress_display(quiet=quiet)
-    check_writable(out.parent)
+    check_file(out)
     kept = checkpoint or out.with_name(f"{out.name}-checkpoint")
     wanted = None if scenes is None else scene_range(scenes)
     videos = taught_videos(

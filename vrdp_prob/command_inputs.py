@@ -9,7 +9,7 @@ from vrdp_prob.concepts.physical import LearnedWord
 from vrdp_prob.datasets import read_questions, video_files, video_names
 from vrdp_prob.errors import InputError
 from vrdp_prob.models.physics import PhysicsModel
-from vrdp_prob.reasoning.vocabulary import ChangeWord
+from vrdp_prob.reasoning.vocabulary import ChangeWord, Vocabulary
 from vrdp_prob.report.pipeline import check_questions
 from vrdp_prob.scene import Question
 
@@ -31,11 +31,11 @@ def concepts_at(choice: str) -> Concepts | None:
     return None if choice == RULES else read_concepts(Path(choice))
 
 
-def check_concepts(concepts: Concepts | None, questions: Iterable[Question]) -> None:
+def check_concepts(concepts: Concepts | None, questions: Iterable[Question], words: Sequence[ChangeWord] = ()) -> None:
     """Refuse questions with a word that the concepts never learned."""
     if concepts is not None:
         for question in questions:
-            concepts.check_question(question)
+            concepts.check_question(question, Vocabulary.of(words))
 
 
 def model_at(path: Path | None) -> PhysicsModel | None:

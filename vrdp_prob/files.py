@@ -24,6 +24,19 @@ def check_writable(folder: Path) -> None:
         raise InputError(f"{folder}: the folder cannot be written ({error.strerror}); choose another one.") from error
 
 
+def check_file(path: Path) -> None:
+    """Refuse a file that could not be written, before the work whose result it shall hold.
+
+    Raises
+    ------
+    InputError
+        If it is a folder, or its folder could not be made or written.
+    """
+    if path.is_dir():
+        raise InputError(f"{path}: this is a folder; name the file to write.")
+    check_writable(path.parent)
+
+
 @contextmanager
 def write_atomically(path: Path | str) -> Iterator[Path]:
     """Give a temporary path beside `path`, which takes the name `path` when the block ends without an exception.

@@ -31,7 +31,12 @@ def collision(draws: int = DRAWS) -> tuple[Worlds, State]:
 
 
 def scattering(
-    scale: float = 0.0, wander: float = 0.0, *, seen: tuple[Deviation, ...] = (), draws: int = DRAWS
+    scale: float = 0.0,
+    wander: float = 0.0,
+    *,
+    seen: tuple[Deviation, ...] = (),
+    draws: int = DRAWS,
+    noise: np.ndarray | None = None,
 ) -> Scattering:
     numbers = np.random.default_rng(0)
     return Scattering.of(
@@ -40,7 +45,7 @@ def scattering(
         np.full(draws, wander),
         fresh=numbers.standard_normal((draws, 2, 2, 2)),
         shaking=numbers.standard_normal((draws, 2, INSTANTS, 2)),
-        noise=np.zeros((len(seen), draws, 2)),
+        noise=np.zeros((len(seen), draws, 2)) if noise is None else noise,
     )
 
 
@@ -106,6 +111,9 @@ def test_a_deviation_that_the_tracks_hardly_tell_is_hardly_reused() -> None:
     one = np.tile([1.0, 0.0], (DRAWS, 1))
     seen = Deviation(0, 1, np.ones(DRAWS, dtype=bool), one, one, noisy)
     assert np.abs(scattering(0.02, seen=(seen,)).shrunk).max() < 0.02
+    chance = scattering(0.02, seen=(seen,), noise=numbers.standard_normal((1, DRAWS, 2)))
+    # what was not learned is as uncertain as a fresh deviation; the standard error of 80 numbers is 8 %
+    assert chance.shrunk.std() == pytest.approx(0.02, rel=0.3)
 
 
 def test_the_scale_of_videos_is_found_again() -> None:

@@ -21,7 +21,8 @@ ROW = (Disc((-1.5, 0.0), (1.6, 0.0)), replace(DEAD, position=(0.0, 0.0)), Disc((
 
 
 def worlds_of(discs: tuple[Disc, ...], frames: int = 128) -> PosteriorWorlds:
-    return PosteriorWorlds(KnownPosterior(tracks_of(discs, frames), discs), draws=DRAWS)
+    """Worlds that keep what was seen wherever a change does not reach."""
+    return PosteriorWorlds(KnownPosterior(tracks_of(discs, frames), discs), draws=DRAWS, own_courses=False)
 
 
 def changed(disc: Disc, shift: Shift) -> Disc:

@@ -76,3 +76,17 @@ def test_a_change_is_simulated_from_the_release_on() -> None:
     np.testing.assert_allclose(
         removed.trajectory[own, -1, 2, :2], np.tile(DISCS[2].position, (own.sum(), 1)), atol=1e-6
     )
+
+
+def test_without_a_camera_who_left_leaves_in_every_draw() -> None:
+    tracks = known().tracks
+    data = tracks.data.copy(deep=True)
+    for name in ("x", "y"):
+        data[name].values[40:, 2] = np.nan
+    gone = replace(known(), tracks=replace(tracks, data=data))
+    worlds = PosteriorWorlds(gone, draws=DRAWS)
+    assert 0 < worlds.batches[0].seen.on_own_course.mean() < 1
+    exits = worlds.events().universe.exits.start + 2
+    assert worlds.events().happens[:, exits].all()
+    assert worlds.counterfactual(Change.HEAVIER, 2).events.happens[worlds.batches[0].seen.on_own_course, exits].all()
+    assert not worlds.counterfactual(Change.REMOVED, 2).events.happens[:, exits].any()

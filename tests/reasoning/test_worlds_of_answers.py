@@ -22,7 +22,7 @@ DRAWS = 30
 
 def worlds_of(discs: tuple[Disc, ...], frames: int = 128, **options: object) -> PosteriorWorlds:
     posterior = KnownPosterior(tracks_of(discs, frames), discs, **options)  # type: ignore[arg-type]
-    return PosteriorWorlds(posterior, draws=DRAWS)
+    return PosteriorWorlds(posterior, draws=DRAWS, own_courses=False)  # see test_own_course for draws that have one
 
 
 def collisions(worlds: PosteriorWorlds, change: Change, place: int) -> dict[tuple[int, int], tuple[float, float]]:
@@ -172,7 +172,9 @@ def test_a_cube_that_no_change_reaches_turns_as_it_was_seen() -> None:
     angles = np.full(tracks.seen.shape, np.nan)
     angles[:, 2] = 0.7 * tracks.times
     turning = Tracks.from_arrays("turning", bodies, tracks.times, tracks.positions, angles=angles)
-    world = PosteriorWorlds(KnownPosterior(turning, discs), draws=DRAWS).counterfactual(Change.REMOVED, 0)
+    world = PosteriorWorlds(KnownPosterior(turning, discs), draws=DRAWS, own_courses=False).counterfactual(
+        Change.REMOVED, 0
+    )
     turned = world.trajectory[:, :, 2, 2] - world.trajectory[:, :1, 2, 2]
     assert turned == pytest.approx(np.broadcast_to(0.7 * tracks.times, turned.shape), abs=1e-9)
 

@@ -7,6 +7,7 @@ from concurrent.futures import as_completed
 from dataclasses import dataclass
 from functools import cached_property
 from hashlib import sha256
+from itertools import chain
 from pathlib import Path
 
 from vrdp_prob.concepts.perceived.storage import read_concepts
@@ -161,15 +162,16 @@ def evaluate(
         raise InputError(f"input is '{source}'; use {' or '.join(SOURCES)}.")
     if draws < 1 or (processes is not None and processes < 1):
         raise InputError(f"draws is {draws} and processes is {processes}; both must be at least 1.")
-    if concepts is not None:
-        read_concepts(concepts)
-        if source != "videos" and has_tracks(folder):
-            raise InputError(
-                f"{folder}: learned concepts look at videos, and this holds positions; use --input videos."
-            )
+    learned = None if concepts is None else read_concepts(concepts)
+    if learned is not None and source != "videos" and has_tracks(folder):
+        raise InputError(f"{folder}: learned concepts look at videos, and this holds positions; use --input videos.")
     file = None if concepts is None else Path(concepts).resolve()
     settings = Settings(model or default_model(), sampler, seed, draws, tuple(words), file)
-    asked = _asked(Path(questions), scenes, Vocabulary.of(words))
+    vocabulary = Vocabulary.of(words)
+    asked = _asked(Path(questions), scenes, vocabulary)
+    if learned is not None:
+        for question in chain.from_iterable(asked.values()):
+            learned.check_question(question, vocabulary)
     tasks = _tasks(Path(folder), asked, source, camera, settings)
     facts = _facts(Path(folder), Path(questions), source, settings)
     kept = None if out is None else Checkpoint(Path(out) / "scenes", facts)

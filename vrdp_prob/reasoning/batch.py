@@ -13,7 +13,7 @@ from vrdp_prob.models.simulator.worlds import Worlds
 from vrdp_prob.reasoning.chance import Chance, Purpose
 from vrdp_prob.reasoning.changes import Change
 from vrdp_prob.reasoning.counterfactual import Counterfactual
-from vrdp_prob.reasoning.deviations import Deviation, DeviationModel, seen_deviations, turns
+from vrdp_prob.reasoning.deviations import FEWEST_DRAWS, Deviation, DeviationModel, seen_deviations, turns
 from vrdp_prob.reasoning.facts import draw_attributes
 from vrdp_prob.reasoning.friction import OwnFriction, ToldFriction, apply_friction, told_friction, with_friction_ratio
 from vrdp_prob.reasoning.intervention import Intervention
@@ -181,7 +181,7 @@ class Batch:
         if not own.any():
             return kept
         intervention = Intervention(change, body, self._extended[0], self.chance.numbers(Purpose.MEANING))
-        return kept.with_draws(own, changed_course(self.common.sight, intervention, model, own))
+        return kept.with_draws(own, changed_course(self.common.sight, intervention, model, own, self.seen.events))
 
     def turning(self, body: int, time: float) -> tuple[Float[np.ndarray, "draw"], Float[np.ndarray, "draw"]]:
         """Angle (rad) and spin (rad/s) of a body in every draw.
@@ -209,7 +209,7 @@ class Batch:
     @cached_property
     def wandering(self) -> Examples:
         """How flights that were seen deviate from the model; nothing for a model without dry friction."""
-        if self.friction is None:
+        if self.friction is None or len(self) < FEWEST_DRAWS:
             return ()
         worlds, model = self._extended
         few = worlds.select(range(min(len(self), FORETOLD_DRAWS)))

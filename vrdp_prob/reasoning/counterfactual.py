@@ -111,7 +111,7 @@ class Counterfactual:
         """The changed body, where its mass decided a contact."""
         touched = np.zeros_like(self._reached)
         if self._change is not Change.REMOVED:
-            touched[:, self._body] = self._reached[:, self._body]
+            touched[:, self._body] = self._reached[:, self._body] & self._intervention.felt_at_contact
         return touched
 
     @property

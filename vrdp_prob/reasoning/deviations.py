@@ -23,6 +23,10 @@ LEAD = 0.1
 """Time in s before a seen contact at which the model's contact sets out, on a straight line."""
 LEAST_SHARE = 0.5
 """Share of the draws that must touch where a contact was seen, for the contact to say anything."""
+FEWEST_DRAWS = 10
+"""Draws below which nobody can say how exactly the tracks tell a deviation."""
+LARGEST_TURN = np.pi / 2
+"""Turn from which an impulse is not that of the model's contact at all: a graze on the other side."""
 LARGEST_SIZE = 0.7
 """Largest change of the logarithm of an impulse taken at face value: a graze has hardly an impulse to compare with."""
 USUAL_IMPULSE, USUAL_ACCELERATION = ScalePrior(0.02, 1.2), ScalePrior(0.02, 1.2)
@@ -137,9 +141,13 @@ def _deviation(
     mass = own.mass.detach().numpy()[:, list(pair)]
     simulated = _impulse(moments.kick[:, list(pair)], mass)
     observed = _impulse((after - before)[met.draws], mass)
-    ratio = (observed[:, 0] + 1j * observed[:, 1]) / (simulated[:, 0] + 1j * simulated[:, 1])
+    # the model's as a divisor is never 0: a contact that gives no impulse is none
+    ratio = (observed[:, 0] + 1j * observed[:, 1]) * (simulated[:, 0] - 1j * simulated[:, 1])
+    ratio /= np.maximum((simulated**2).sum(axis=1), 1e-12)
     touches = np.zeros(seen.draws, dtype=bool)
-    touches[met.draws] = True
+    touches[met.draws] = np.abs(np.angle(ratio)) < LARGEST_TURN
+    if touches.sum() < max(LEAST_SHARE * seen.draws, FEWEST_DRAWS):
+        return None
     normal, approach, log_ratio = (np.zeros((seen.draws, 2)) for _ in range(3))
     normal[met.draws], approach[met.draws] = met.normal, before[met.draws, 1] - before[met.draws, 0]
     size = np.clip(np.log(np.maximum(np.abs(ratio), 1e-9)), -LARGEST_SIZE, LARGEST_SIZE)

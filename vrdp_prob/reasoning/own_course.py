@@ -4,7 +4,7 @@ There are two ways to what would have happened. What was seen may be kept wherev
 of the model cannot grow in it, but the states from which the simulation is resumed carry the noise of the tracks. Or a
 draw of the posterior is simulated as it is: then all of it fits together, but a draw in which something else happened
 than was seen tells of another video. Both err, in different ways; so half of those draws whose own course of events is
-the one that was seen follow it, in all that is asked, and the other draws keep what was seen.
+the one that was seen follow it, in doubtful contacts and in changes, and the other draws keep what was seen.
 """
 
 from dataclasses import dataclass
@@ -14,10 +14,12 @@ import numpy as np
 from jaxtyping import Bool
 
 from vrdp_prob.models.physics import PhysicsModel
-from vrdp_prob.models.simulator.events import EventTable, RolloutEventKind
+from vrdp_prob.models.simulator.events import EventTable as RolloutEvents
+from vrdp_prob.models.simulator.events import RolloutEventKind
 from vrdp_prob.models.simulator.rollout import Rollout
 from vrdp_prob.models.simulator.worlds import Worlds
 from vrdp_prob.reasoning.contacts import EDGE
+from vrdp_prob.reasoning.events import EventTable
 from vrdp_prob.reasoning.facts import MOVING_SPEED
 from vrdp_prob.reasoning.intervention import Intervention
 from vrdp_prob.reasoning.sight import Sight
@@ -64,7 +66,7 @@ class OwnCourses:
         return np.asarray(as_seen)
 
     @cached_property
-    def _collisions(self) -> EventTable:
+    def _collisions(self) -> RolloutEvents:
         """First collisions of each pair in each draw."""
         events = self.rollout.events.of_kind(RolloutEventKind.COLLISION)
         pairs = np.stack([events.world, events.first, events.second], axis=1)
@@ -89,7 +91,11 @@ class OwnCourses:
 
 
 def changed_course(
-    sight: Sight, intervention: Intervention, model: PhysicsModel, chosen: Bool[np.ndarray, "draw"]
+    sight: Sight,
+    intervention: Intervention,
+    model: PhysicsModel,
+    chosen: Bool[np.ndarray, "draw"],
+    seen: EventTable,
 ) -> WorldDraws:
     """Some draws with one object changed, simulated from the release on.
 
@@ -103,6 +109,9 @@ def changed_course(
         The physics.
     chosen
         Which draws.
+    seen
+        What happened in the video: without a camera nobody knows where the picture ends, and who enters or leaves
+        does so as it did.
     """
     tracks, draws = sight.tracks, np.flatnonzero(chosen)
     worlds = intervention.worlds.select(draws.tolist())
@@ -111,6 +120,8 @@ def changed_course(
     for meeting in stretch.meetings():
         timeline.note_meeting(meeting, np.ones(len(meeting.draws), dtype=bool))
     timeline.note_crossings(stretch.times, stretch.position, stretch.exists, np.ones_like(timeline.collided))
+    if tracks.camera is None:
+        _cross_as_seen(timeline, seen.select(draws), intervention)
     trajectory = np.concatenate([stretch.position, stretch.angle[..., None]], axis=-1)
     return WorldDraws(tracks.times, trajectory, stretch.exists, timeline.table, timeline.collided, stretch.broke_off)
 
@@ -126,3 +137,13 @@ def _at_release(worlds: Worlds, intervention: Intervention, draws: np.ndarray) -
     felt = intervention.felt_at_release & (np.linalg.norm(velocity, axis=1) > MOVING_SPEED)
     state.velocity[:, body] = np.where(felt[draws, None], intervention.released(velocity)[draws], velocity[draws])
     return state
+
+
+def _cross_as_seen(timeline: Timeline, seen: EventTable, intervention: Intervention) -> None:
+    """Note the entrances and exits of the video, but for those of a removed body."""
+    universe = timeline.universe
+    for part in (universe.entrances, universe.exits):
+        for body, place in enumerate(range(part.start, part.stop)):
+            if body != intervention.body or not intervention.change.removes:
+                draws = np.flatnonzero(seen.happens[:, place])
+                timeline.note(draws, place, seen.time[draws, place])

@@ -51,4 +51,4 @@ def plug_in_worlds(posterior: Posterior) -> PosteriorWorlds:
     Masses, restitutions and motion are those of the MAP; what the tracks leave open (doubtful contacts and rests,
     attributes) is as is most probable.
     """
-    return PosteriorWorlds(_BestFit(posterior), draws=1, chance=MostProbable())
+    return PosteriorWorlds(_BestFit(posterior), draws=1, chance=MostProbable(), deviating=None)

@@ -82,7 +82,7 @@ class Scattering:
         shrunk = np.zeros((len(seen), len(scale), 2))
         for number, one in enumerate(seen):
             share = scale[:, None] ** 2 / (scale[:, None] ** 2 + one.variance)
-            rest = (1 - share) * scale[:, None] * np.sqrt(np.maximum(share, 0.0))
+            rest = (1 - share) * scale[:, None]
             shrunk[number] = np.where(one.touches[:, None], share * one.log_ratio, 0.0) + rest * noise[number]
         return cls(tuple(seen), scale, shrunk, fresh, wander, shaking)
 
@@ -98,7 +98,9 @@ class Scattering:
         numbers = self.shaking[:, :, int(time / INSTANT) % INSTANTS]
         moves = (state.release <= time) & (np.linalg.norm(state.velocity, axis=-1) > SLOWEST)
         kicked = state.copy()
-        kicked.velocity += np.where(moves[..., None], self.wander[:, None, None] * np.sqrt(duration) * numbers, 0.0)
+        kick = np.where(moves[..., None], self.wander[:, None, None] * np.sqrt(duration) * numbers, 0.0)
+        kicked.velocity += kick
+        kicked.rolling += kick
         return kicked
 
     def log_ratio(self, meeting: Meeting, approach: Float[np.ndarray, "contact 2"]) -> Float[np.ndarray, "contact 2"]:

@@ -22,6 +22,8 @@ from vrdp_prob.perception.reading import CERTAIN, SeenObjects
 from vrdp_prob.reasoning.events import EventTable
 from vrdp_prob.reasoning.facts import Motion, TableFacts
 from vrdp_prob.reasoning.prepared import prepare
+from vrdp_prob.reasoning.vocabulary import PLAIN
+from vrdp_prob.reasoning.vocabulary import Vocabulary as QuestionVocabulary
 from vrdp_prob.scene import Body, Question, Tracks
 
 Attributes = Mapping[str, Float[np.ndarray, "body value"]]
@@ -122,7 +124,7 @@ class Concepts:
         """Attribute words of the question language that the concepts never learned."""
         return frozenset(self.vocabulary.missing)
 
-    def check_question(self, question: Question) -> None:
+    def check_question(self, question: Question, vocabulary: QuestionVocabulary = PLAIN) -> None:
         """Refuse a question about what was never learned.
 
         Raises
@@ -130,7 +132,7 @@ class Concepts:
         InputError
             If a word of its program, or of a choice's, is among it, or the question is not understood.
         """
-        asked = prepare(question, ())
+        asked = prepare(question, (), vocabulary)
         programs = [program for _, program in asked.options] if asked.program is None else [asked.program]
         for word in chain.from_iterable(program.tokens for program in programs):
             if word in self.unlearned:

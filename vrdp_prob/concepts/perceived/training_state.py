@@ -64,7 +64,7 @@ def _read(file: Path | None) -> State | None:
     if file is None or not file.is_file():
         return None
     try:
-        kept: State = torch.load(file, weights_only=True)
+        kept: State = torch.load(file, weights_only=True, map_location="cpu")
     except Exception:  # torch raises many kinds for a broken file, and each means the same
         return None
     return kept

@@ -50,7 +50,7 @@ def read_word(path: Path) -> LearnedWord:
         word = _word(document)
         check_name(word.name)
         _check_sums(word)
-    except (KeyError, TypeError, ValueError) as error:
+    except (AttributeError, KeyError, TypeError, ValueError) as error:
         raise InputError(f"{path}: not a whole word ({error}); learn it anew.") from error
     return word
 
@@ -94,5 +94,9 @@ def _check_sums(word: LearnedWord) -> None:
         if not (np.isfinite(values).all() and min(values) >= 0 and abs(sum(values) - 1) < TOLERANCE):
             raise ValueError(f"the probabilities of {name} do not add up to 1")
     for belief in word.beliefs:
+        if (belief.parameter is None) != (not belief.amounts):
+            raise ValueError(f"{belief.name} has amounts without a parameter, or a parameter without amounts")
+        if not np.isfinite(belief.amounts).all() or (belief.rule is Rule.FACTOR and min(belief.amounts) <= 0):
+            raise ValueError(f"the amounts of {belief.name} are not finite, or a factor is not positive")
         if len(belief.amounts) != len(belief.weights) or (np.diff(belief.amounts) <= 0).any():
             raise ValueError(f"the amounts of {belief.name} are not ascending numbers, one for each weight")

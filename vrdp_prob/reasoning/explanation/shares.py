@@ -16,6 +16,8 @@ _PARAMETERS: Mapping[Purpose, float] = {
     Purpose.FRICTION: 1.0,
     Purpose.LAST_FRICTION: 1.0,
     Purpose.MEANING: 1.0,
+    Purpose.DEVIATION_SCALES: 1.0,
+    Purpose.FORETOLD: 1.0,
 }
 _EVENTS: Mapping[Purpose, float] = {
     **_PARAMETERS,

@@ -38,10 +38,6 @@ from vrdp_prob.command_options import (
     Video,
     Words,
 )
-from vrdp_prob.concepts.perceived.folder import taught_videos
-from vrdp_prob.concepts.perceived.learning import learn
-from vrdp_prob.concepts.perceived.storage import write_concepts
-from vrdp_prob.concepts.physical.from_files import learn_from_files
 from vrdp_prob.datasets import load, load_all, video_files, video_names
 from vrdp_prob.discovery.checking import check_video_count
 from vrdp_prob.discovery.discover import discover
@@ -51,8 +47,9 @@ from vrdp_prob.discovery.summary import lines as finding_lines
 from vrdp_prob.errors import InputError
 from vrdp_prob.evaluation import evaluate
 from vrdp_prob.evaluation.document import table, to_document, write_evaluation
-from vrdp_prob.files import check_file, check_writable
+from vrdp_prob.files import check_writable
 from vrdp_prob.inference import OPTIONS, check_options, default_model
+from vrdp_prob.learning_commands import learn_concepts, learn_word
 from vrdp_prob.models.simulator.rollout import compile_model
 from vrdp_prob.progress import progress_display
 from vrdp_prob.reasoning import ask, infer
@@ -301,72 +298,8 @@ def evaluate_answers(
         print("\n".join([*table(evaluation), *(str(file) for file in files)]))
 
 
-@app.command(name="learn-word")
-def learn_word(
-    word: Annotated[str, typer.Argument(metavar="WORD", help="As in 'if the cube were WORD'.")],
-    folder: Annotated[Path, typer.Argument(metavar="FOLDER", help="A tracks folder, or a folder of videos.")],
-    *,
-    questions: Annotated[Path, typer.Option(metavar="FILE", help="CLEVRER question file with the right answers.")],
-    scenes: Scenes = None,
-    out: Annotated[Path | None, typer.Option(metavar="FILE", help="File of the word; by default WORD.json.")] = None,
-    processes: Processes = None,
-    camera: CameraOption = None,
-    model: Model = None,
-    sampler: Sampler = "laplace",
-    checkpoint: CheckpointFolder = None,
-    seed: Seed = 0,
-    quiet: Quiet = False,
-) -> None:
-    """Learn a word for a change of an object from the questions that use it: what it changes, and by how much."""
-    file = Path(f"{word}.json") if out is None else out
-    check_file(file)
-    if checkpoint is not None:
-        check_writable(checkpoint)
-    learned = learn_from_files(
-        word,
-        folder,
-        questions,
-        scenes=None if scenes is None else scene_range(scenes),
-        camera=camera,
-        model=model_at(model),
-        sampler=sampler,
-        checkpoint=checkpoint,
-        seed=seed,
-        processes=processes,
-        progress=progress_display(quiet=quiet),
-    )
-    learned.write(file)
-    if not quiet:
-        print("\n".join([*learned.summary, str(file)]))
-
-
-@app.command(name="learn-concepts")
-def learn_concepts(
-    folder: Annotated[Path, typer.Argument(metavar="FOLDER", help="A folder of videos.")],
-    *,
-    questions: Annotated[Path, typer.Option(metavar="FILE", help="CLEVRER question file with the right answers.")],
-    out: Annotated[Path, typer.Option(metavar="FILE", help="File of the concepts.")] = Path("vrdp-prob.concepts"),
-    scenes: Scenes = None,
-    checkpoint: Annotated[
-        Path | None,
-        typer.Option(metavar="DIR", help="Keeps what is done, to go on from; by default a folder beside the file."),
-    ] = None,
-    camera: CameraOption = None,
-    seed: Seed = 0,
-    quiet: Quiet = False,
-) -> None:
-    """Learn what colors, materials, shapes, motion and events look like from questions and answers."""
-    progress = progress_display(quiet=quiet)
-    check_file(out)
-    kept = checkpoint or out.with_name(f"{out.name}-checkpoint")
-    wanted = None if scenes is None else scene_range(scenes)
-    videos = taught_videos(
-        folder, questions, scenes=wanted, camera=camera, checkpoint=kept / "videos", progress=progress
-    )
-    learned = learn(videos, seed=seed, checkpoint=kept / "networks", progress=progress)
-    write_concepts(out, learned.concepts)
-    if not quiet:
-        print("\n".join([*learned.lines, str(out)]))
+app.command(name="learn-word")(learn_word)
+app.command(name="learn-concepts")(learn_concepts)
 
 
 @app.command()

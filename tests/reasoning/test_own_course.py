@@ -24,7 +24,7 @@ def known(discs: tuple[Disc, ...] = DISCS) -> KnownPosterior:
 
 def courses(posterior: KnownPosterior, sight: Sight | None = None) -> OwnCourses:
     batch = PosteriorWorlds(posterior, draws=DRAWS).batches[0]
-    return OwnCourses(sight or batch.common.sight, batch.released.rollout)
+    return OwnCourses(sight or batch.common.sight, batch.released)
 
 
 def test_half_of_the_draws_in_which_all_happens_follow_their_own_course() -> None:

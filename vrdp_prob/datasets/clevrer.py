@@ -5,7 +5,7 @@ positions out of view stay for scoring.
 """
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping, Sequence, Sized
 from pathlib import Path
 from typing import Any
 
@@ -129,6 +129,40 @@ def scene_indices(path: Path | str) -> dict[str, int]:
             raise InputError(f"{path}, {name}: 'scene_index' is {index!r}; it must be a whole number.")
         indices.setdefault(name, index)
     return indices
+
+
+def questions_about(path: Path | str, scenes: tuple[int, int] | None) -> dict[str, list[Question]]:
+    """Questions of a CLEVRER question file about some of its scenes, by the names of the videos.
+
+    Parameters
+    ----------
+    path
+        The file.
+    scenes
+        First `scene_index` and the one after the last; all where None.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read; see `read_questions` and `scene_indices`.
+    """
+    index = scene_indices(path)
+    wanted = range(*scenes) if scenes is not None else index.values()
+    return {name: several for name, several in read_questions(path).items() if index[name] in wanted}
+
+
+def check_scenes(path: Path | str, scenes: tuple[int, int] | None, found: Sized) -> None:
+    """Refuse scenes of which a question file has none, telling which it has.
+
+    Raises
+    ------
+    InputError
+        If nothing was found of them.
+    """
+    if not found:
+        index = scene_indices(path)
+        first, last = min(index.values()), max(index.values())
+        raise InputError(f"{path}: no scene from {scenes} is in the file, which holds {first} to {last}.")
 
 
 def _scenes(path: Path | str) -> list[tuple[str, Document]]:

@@ -12,11 +12,11 @@ from pathlib import Path
 
 from vrdp_prob.concepts.perceived.storage import read_concepts
 from vrdp_prob.datasets import (
+    check_scenes,
     find_camera,
     has_tracks,
     load_all,
-    read_questions,
-    scene_indices,
+    questions_about,
     video_files,
     video_names,
 )
@@ -194,15 +194,11 @@ def evaluate(
 
 def _asked(path: Path, scenes: tuple[int, int] | None, vocabulary: Vocabulary) -> dict[str, list[Question]]:
     """Questions with answers of the scenes that are wanted, understood before any work."""
-    index = scene_indices(path)
     asked = {
         name: [question for question in several if question.is_answered]
-        for name, several in read_questions(path).items()
-        if scenes is None or scenes[0] <= index[name] < scenes[1]
+        for name, several in questions_about(path, scenes).items()
     }
-    if not asked:
-        first, last = min(index.values()), max(index.values())
-        raise InputError(f"{path}: no scene from {scenes} is in the file, which holds {first} to {last}.")
+    check_scenes(path, scenes, asked)
     if not any(asked.values()):
         raise InputError(f"{path}: no question has its right answer beside it, so there is nothing to score.")
     for name, several in asked.items():

@@ -4,11 +4,9 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-import torch
 from jaxtyping import Float
 
 from vrdp_prob.models.physics import PhysicsModel
-from vrdp_prob.models.simulator.rollout import Rollout, simulate
 from vrdp_prob.models.simulator.worlds import Worlds
 from vrdp_prob.reasoning.chance import Chance, Purpose
 from vrdp_prob.reasoning.changes import Change
@@ -19,6 +17,7 @@ from vrdp_prob.reasoning.friction import OwnFriction, ToldFriction, apply_fricti
 from vrdp_prob.reasoning.intervention import Intervention
 from vrdp_prob.reasoning.own_course import OwnCourses, changed_course
 from vrdp_prob.reasoning.refit import state_at_end
+from vrdp_prob.reasoning.released import Released
 from vrdp_prob.reasoning.scales import Examples
 from vrdp_prob.reasoning.scattering import INSTANTS, Scattering, advance_scattered
 from vrdp_prob.reasoning.seen import SeenVideo
@@ -66,31 +65,6 @@ class Common:
         return None if extended is None else told_friction(self.sight.seen.smoothers, *extended)
 
 
-@dataclass(frozen=True)
-class Released:
-    """Posterior draws and their rollouts from the release on.
-
-    Parameters
-    ----------
-    worlds
-        The posterior draws.
-    times
-        Times in s of the frames of the video.
-    model
-        The physics.
-    """
-
-    worlds: Worlds
-    times: Float[np.ndarray, "frame"]
-    model: PhysicsModel
-
-    @cached_property
-    def rollout(self) -> Rollout:
-        """What happened in the video if nothing but the draws is asked."""
-        with torch.no_grad():
-            return simulate(self.worlds, torch.from_numpy(self.times.copy()), self.model)
-
-
 class Batch:
     """Posterior draws, what the tracks leave open drawn to each of them, and the worlds that follow.
 
@@ -106,7 +80,7 @@ class Batch:
 
     def __init__(self, common: Common, released: Released, chance: Chance) -> None:
         self.common, self.released, self.chance = common, released, chance
-        own = OwnCourses(common.sight, released.rollout) if common.own_courses else None
+        own = OwnCourses(common.sight, released) if common.own_courses else None
         self.seen = SeenVideo(common.sight, len(released.worlds), chance, own)
         self._extended = with_friction_ratio(self.drawn, common.model) or (self.drawn, common.model)
         self._changed: dict[tuple[Change, int], WorldDraws] = {}
@@ -160,10 +134,7 @@ class Batch:
         for meeting in stretch.meetings():
             timeline.note_meeting(meeting, meeting.time > end)
         timeline.note_crossings(stretch.times, stretch.position, stretch.exists, np.ones_like(timeline.collided))
-        trajectory = np.concatenate([stretch.position, stretch.angle[..., None]], axis=-1)
-        return WorldDraws(
-            stretch.times, trajectory, stretch.exists, timeline.table, timeline.collided, stretch.broke_off
-        )
+        return timeline.of(stretch)
 
     def counterfactual(self, change: Change, body: int) -> WorldDraws:
         """What happens when one object (by its place) is changed from the beginning."""

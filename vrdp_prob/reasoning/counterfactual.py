@@ -19,9 +19,7 @@ from jaxtyping import Bool, Float
 
 from vrdp_prob.models.physics import PhysicsModel
 from vrdp_prob.models.simulator.worlds import Worlds
-from vrdp_prob.reasoning.changes import Change
 from vrdp_prob.reasoning.contacts import Contact
-from vrdp_prob.reasoning.facts import MOVING_SPEED
 from vrdp_prob.reasoning.intervention import Intervention
 from vrdp_prob.reasoning.refit import Turning
 from vrdp_prob.reasoning.scattering import Scattering, advance_scattered
@@ -110,7 +108,7 @@ class Counterfactual:
     def _touched(self) -> Bool[np.ndarray, "draw body"]:
         """The changed body, where its mass decided a contact."""
         touched = np.zeros_like(self._reached)
-        if self._change is not Change.REMOVED:
+        if not self._change.removes:
             touched[:, self._body] = self._reached[:, self._body] & self._intervention.felt_at_contact
         return touched
 
@@ -121,9 +119,8 @@ class Counterfactual:
 
     def _at_release(self, state: State) -> None:
         """Another speed or friction reaches its body as soon as it moves."""
-        velocity = state.velocity[:, self._body]
-        felt = self._intervention.felt_at_release & (np.linalg.norm(velocity, axis=1) > MOVING_SPEED)
-        state.velocity[felt, self._body] = self._intervention.released(velocity)[felt]
+        velocity, felt = self._intervention.released(state.velocity[:, self._body])
+        state.velocity[:, self._body] = velocity
         state.rolling[felt, self._body] = state.velocity[felt, self._body]
         self._reached[felt, self._body] = True
 
@@ -155,7 +152,7 @@ class Counterfactual:
                 held = np.clip(times, self._first[body], self._last[body])
                 trajectory[:, :, body, 2] = np.stack([self._turning(body, float(time))[0] for time in held], axis=1)
             first, after = self._seen.presence[body]
-            exists[:, first:after, body] = body != self._body or self._change is not Change.REMOVED
+            exists[:, first:after, body] = body != self._body or not self._change.removes
         return trajectory, exists
 
     def _back_on_course(self, time: float, carried: State | None) -> State:
@@ -179,7 +176,7 @@ class Counterfactual:
     def _nowhere(self, time: float) -> State:
         state = State.nowhere((self._seen.draws, len(self._seen.drawn)), time)
         state.present[:] = True
-        if self._change is Change.REMOVED:
+        if self._change.removes:
             state.present[:, self._body] = False
         return state
 
@@ -195,7 +192,7 @@ class Counterfactual:
         pair = (contact.first, contact.second)
         involves = self._body in pair
         free = happened & ~self._reached[:, pair[0]] & ~self._reached[:, pair[1]]
-        kept = free if not involves or self._change is not Change.REMOVED else np.zeros_like(free)
+        kept = free if not involves or not self._change.removes else np.zeros_like(free)
         draws = np.flatnonzero(kept)
         place = self._seen.universe.collision(*pair)
         self._timeline.note(draws, place, self._seen.contact_times[draws, number])
@@ -205,15 +202,15 @@ class Counterfactual:
             body: [array[:, 0] for array in self._seen.drawn[body].state(np.array([self._time(contact)]), before=True)]
             for body in pair
         }
-        if involves and self._change is not Change.REMOVED:
+        if involves and not self._change.removes:
             felt = free & self._intervention.felt_at_contact
             self._scaled_kicks(state, pair, before, felt)
             self._reached[np.ix_(felt, list(pair))] = True
         reached = self._reached.copy()
-        if self._change is Change.REMOVED:
+        if self._change.removes:
             reached[:, self._body] = True
         for body, other in (pair, pair[::-1]):
-            if body == self._body and self._change is Change.REMOVED:
+            if body == self._body and self._change.removes:
                 continue
             # a contact that does not take place as it did: from here on the body is on its own
             missed = happened & ~self._reached[:, body] & reached[:, other] & ~kept
@@ -279,14 +276,6 @@ class Counterfactual:
 
     def _crossings(self) -> None:
         """Entrances and exits: as seen for bodies that were not reached, as simulated for the others."""
-        table, universe = self._seen.events, self._seen.universe
-        for body in range(self._reached.shape[1]):
-            if body == self._body and self._change is Change.REMOVED:
-                continue
-            for place in (universe.entrances.start + body, universe.exits.start + body):
-                kept = table.happens[:, place]
-                if place == universe.exits.start + body:
-                    kept = kept & ~self._reached[:, body]
-                draws = np.flatnonzero(kept)
-                self._timeline.note(draws, place, table.time[draws, place])
+        there = self._intervention.leaves_there
+        self._timeline.note_as_seen(self._seen.events, entering=there, leaving=there & ~self._reached)
         self._timeline.note_crossings(self._seen.tracks.times, self._trajectory[..., :2], self._exists, self._reached)

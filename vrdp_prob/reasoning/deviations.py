@@ -134,7 +134,7 @@ def _deviation(
     before, after = (_velocities(seen, pair, time, before=flag) for flag in (True, False))
     state = _approach(seen, pair, time, turning)
     met = _first_meeting(advance(worlds, state, np.array([time + LEAD]), model), pair)
-    if len(met.draws) < LEAST_SHARE * seen.draws:
+    if not len(met.draws):
         return None
     own = worlds.select(met.draws.tolist())
     moments = around(own, state.select(met.draws), met.time, model)

@@ -11,6 +11,7 @@ from vrdp_prob.models.effects.body_friction import FRICTION_RATIO
 from vrdp_prob.models.simulator.worlds import Worlds
 from vrdp_prob.reasoning.chance import Random
 from vrdp_prob.reasoning.changes import Change, PhysicalParameter
+from vrdp_prob.reasoning.facts import MOVING_SPEED
 
 MASS, RESTITUTION, FRICTION, SPEED = PhysicalParameter
 
@@ -48,6 +49,13 @@ class Intervention:
         return replace(worlds, restitution=restitution, parameters=self._parameters())
 
     @property
+    def leaves_there(self) -> Bool[np.ndarray, "draw body"]:
+        """Which bodies are there after it."""
+        there = np.ones(self._before.mass.shape, dtype=bool)
+        there[:, self.body] = not self.change.removes
+        return there
+
+    @property
     def felt_at_release(self) -> Bool[np.ndarray, "draw"]:
         """Draws in which the course of a moving body differs from its release on."""
         return self._changes(SPEED) | self._changes(FRICTION)
@@ -57,10 +65,17 @@ class Intervention:
         """Draws in which the course of the body differs at the latest from its first contact on."""
         return self._changes(MASS) | self._changes(RESTITUTION) | self._changes(FRICTION)
 
-    def released(self, velocity: Float[np.ndarray, "draw 2"]) -> Float[np.ndarray, "draw 2"]:
-        """Velocity of the moving body at its release, in m/s, after the change."""
+    def released(
+        self, velocity: Float[np.ndarray, "draw 2"]
+    ) -> tuple[Float[np.ndarray, "draw 2"], Bool[np.ndarray, "draw"]]:
+        """Velocity of the body at its release, in m/s, after the change, and draws in which it feels the change there.
+
+        A body at rest feels nothing until it is hit, and keeps its velocity.
+        """
         speed = np.linalg.norm(velocity, axis=1)
-        return velocity * (self._shifted(SPEED, speed) / np.maximum(speed, np.finfo(float).tiny))[:, None]
+        felt = self.felt_at_release & (speed > MOVING_SPEED)
+        after = velocity * (self._shifted(SPEED, speed) / np.maximum(speed, np.finfo(float).tiny))[:, None]
+        return np.where(felt[:, None], after, velocity), felt
 
     def impulse_ratio(self, partner: int) -> Float[np.ndarray, "draw"]:
         """Impulse of a contact with another body over what it was: as (1 + e) m1 m2 / (m1 + m2) changes."""

@@ -16,12 +16,11 @@ from jaxtyping import Bool
 from vrdp_prob.models.physics import PhysicsModel
 from vrdp_prob.models.simulator.events import EventTable as RolloutEvents
 from vrdp_prob.models.simulator.events import RolloutEventKind
-from vrdp_prob.models.simulator.rollout import Rollout
 from vrdp_prob.models.simulator.worlds import Worlds
 from vrdp_prob.reasoning.contacts import EDGE
 from vrdp_prob.reasoning.events import EventTable
-from vrdp_prob.reasoning.facts import MOVING_SPEED
 from vrdp_prob.reasoning.intervention import Intervention
+from vrdp_prob.reasoning.released import Released
 from vrdp_prob.reasoning.sight import Sight
 from vrdp_prob.reasoning.stretch import State, advance
 from vrdp_prob.reasoning.timeline import Timeline, WorldDraws
@@ -42,17 +41,17 @@ class OwnCourses:
     ----------
     sight
         What the tracks tell.
-    rollout
-        The draws from the release on, at the frames of the video.
+    released
+        The draws from the release on, simulated when somebody asks.
     """
 
     sight: Sight
-    rollout: Rollout
+    released: Released
 
     @cached_property
     def met(self) -> Bool[np.ndarray, "draw contact"]:
         """Which contacts that were seen, for sure or in doubt, happen in each draw."""
-        met = np.zeros((len(self.rollout.outcome), len(self.sight.contacts)), dtype=bool)
+        met = np.zeros((len(self.released.worlds), len(self.sight.contacts)), dtype=bool)
         for place, contact in enumerate(self.sight.contacts):
             met[self._collisions.world[self._like(contact.first, contact.second, contact.time)], place] = True
         return met
@@ -61,14 +60,14 @@ class OwnCourses:
     def as_seen(self) -> Bool[np.ndarray, "draw"]:
         """Draws in which all happens that was seen for sure, and nothing that would have been seen."""
         sure = np.array([contact.probability > SURE for contact in self.sight.contacts], dtype=bool)
-        as_seen = self.rollout.fine & self.met[:, sure].all(axis=1)
+        as_seen = self.released.rollout.fine & self.met[:, sure].all(axis=1)
         as_seen[self._collisions.world[self._strange]] = False
         return np.asarray(as_seen)
 
     @cached_property
     def _collisions(self) -> RolloutEvents:
         """First collisions of each pair in each draw."""
-        events = self.rollout.events.of_kind(RolloutEventKind.COLLISION)
+        events = self.released.rollout.events.of_kind(RolloutEventKind.COLLISION)
         pairs = np.stack([events.world, events.first, events.second], axis=1)
         _, first = np.unique(pairs, axis=0, return_index=True)
         return events.where(np.sort(first))
@@ -121,29 +120,16 @@ def changed_course(
         timeline.note_meeting(meeting, np.ones(len(meeting.draws), dtype=bool))
     timeline.note_crossings(stretch.times, stretch.position, stretch.exists, np.ones_like(timeline.collided))
     if tracks.camera is None:
-        _cross_as_seen(timeline, seen.select(draws), intervention)
-    trajectory = np.concatenate([stretch.position, stretch.angle[..., None]], axis=-1)
-    return WorldDraws(tracks.times, trajectory, stretch.exists, timeline.table, timeline.collided, stretch.broke_off)
+        there = intervention.leaves_there[draws]
+        timeline.note_as_seen(seen.select(draws), entering=there, leaving=there)
+    return timeline.of(stretch)
 
 
 def _at_release(worlds: Worlds, intervention: Intervention, draws: np.ndarray) -> State:
     """The bodies of some draws as they are released, the changed one as the change has it."""
-    state = State.released(worlds)
-    body = intervention.body
+    state, body = State.released(worlds), intervention.body
     if intervention.change.removes:
         state.present[:, body] = False
-    velocity = np.zeros((len(intervention.felt_at_release), 2))
-    velocity[draws] = state.velocity[:, body]
-    felt = intervention.felt_at_release & (np.linalg.norm(velocity, axis=1) > MOVING_SPEED)
-    state.velocity[:, body] = np.where(felt[draws, None], intervention.released(velocity)[draws], velocity[draws])
+    velocity, _ = intervention.released(intervention.worlds.velocity[:, body].detach().numpy())
+    state.velocity[:, body] = velocity[draws]
     return state
-
-
-def _cross_as_seen(timeline: Timeline, seen: EventTable, intervention: Intervention) -> None:
-    """Note the entrances and exits of the video, but for those of a removed body."""
-    universe = timeline.universe
-    for part in (universe.entrances, universe.exits):
-        for body, place in enumerate(range(part.start, part.stop)):
-            if body != intervention.body or not intervention.change.removes:
-                draws = np.flatnonzero(seen.happens[:, place])
-                timeline.note(draws, place, seen.time[draws, place])

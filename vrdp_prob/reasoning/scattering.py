@@ -43,7 +43,7 @@ class Scattering:
     Parameters
     ----------
     seen
-        Deviations of contacts that were seen, of those the last one of each pair counts that is most alike.
+        Deviations of contacts that were seen; of those of a pair the one counts that is most like the contact to come.
     scale
         Scale s of deviations in each draw.
     shrunk

@@ -5,11 +5,12 @@ from jaxtyping import Int
 
 from vrdp_prob.inference.identifiability import BodyStatus
 from vrdp_prob.models.simulator.worlds import Worlds
-from vrdp_prob.reasoning.batch import Batch, Common, Released
+from vrdp_prob.reasoning.batch import Batch, Common
 from vrdp_prob.reasoning.chance import Chance, Purpose, Seeded
 from vrdp_prob.reasoning.defaults import Defaults, with_defaults
 from vrdp_prob.reasoning.deviations import DeviationModel
 from vrdp_prob.reasoning.posterior_like import PosteriorLike
+from vrdp_prob.reasoning.released import Released
 from vrdp_prob.reasoning.sight import Sight
 
 

@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from vrdp_prob.reasoning.events import EventTable, EventUniverse
-from vrdp_prob.reasoning.stretch import Meeting
+from vrdp_prob.reasoning.stretch import Meeting, Stretch
 from vrdp_prob.scene import Camera
 
 
@@ -85,6 +85,20 @@ class Timeline:
                 draws = np.flatnonzero(crossed[:, :, body].any(axis=1))
                 first = crossed[draws, :, body].argmax(axis=1)
                 self.note(draws, part.start + body, times[first + 1])
+
+    def note_as_seen(
+        self, seen: EventTable, *, entering: Bool[np.ndarray, "draw body"], leaving: Bool[np.ndarray, "draw body"]
+    ) -> None:
+        """Note the entrances and exits of the video, of the bodies that enter and leave as they did."""
+        for part, followed in ((self.universe.entrances, entering), (self.universe.exits, leaving)):
+            for body, place in enumerate(range(part.start, part.stop)):
+                draws = np.flatnonzero(seen.happens[:, place] & followed[:, body])
+                self.note(draws, place, seen.time[draws, place])
+
+    def of(self, stretch: Stretch) -> "WorldDraws":
+        """The world of one stretch whose events these are."""
+        trajectory = np.concatenate([stretch.position, stretch.angle[..., None]], axis=-1)
+        return WorldDraws(stretch.times, trajectory, stretch.exists, self.table, self.collided, stretch.broke_off)
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ from pathlib import Path
 from vrdp_prob.concepts.perceived.examples import examples_of
 from vrdp_prob.concepts.perceived.lessons import Taught
 from vrdp_prob.concepts.perceived.observation import Observation
-from vrdp_prob.datasets import find_camera, read_questions, scene_indices, video_files
+from vrdp_prob.datasets import check_scenes, find_camera, questions_about, video_files
 from vrdp_prob.datasets.loading import CameraChoice
 from vrdp_prob.errors import InputError
 from vrdp_prob.inference.checkpoint import Checkpoint
@@ -49,11 +49,8 @@ def taught_videos(
         `checkpoint` belongs to other videos.
     """
     folder, questions = Path(folder), Path(questions)
-    index, asked = scene_indices(questions), read_questions(questions)
-    wanted = {name: own for name, own in asked.items() if scenes is None or scenes[0] <= index[name] < scenes[1]}
-    if not wanted:
-        first, last = min(index.values()), max(index.values())
-        raise InputError(f"{questions}: no scene from {scenes} is in the file, which holds {first} to {last}.")
+    wanted = questions_about(questions, scenes)
+    check_scenes(questions, scenes, wanted)
     examples = examples_of(wanted, source=str(questions))
     files = _files(folder, questions, list(examples))
     cameras = {name: _camera(file, camera) for name, file in files.items()}

@@ -16,7 +16,7 @@ from vrdp_prob.concepts.physical.hypotheses import HYPOTHESES
 from vrdp_prob.concepts.physical.learn import DRAWS, check_draws, word_of
 from vrdp_prob.concepts.physical.learned_word import LearnedWord
 from vrdp_prob.concepts.physical.naming import check_name
-from vrdp_prob.datasets import load_all, read_questions, scene_indices, video_names
+from vrdp_prob.datasets import load_all, questions_about, video_names
 from vrdp_prob.datasets.loading import CameraChoice
 from vrdp_prob.errors import InputError
 from vrdp_prob.inference import check_options, default_model, infer
@@ -135,11 +135,9 @@ def _word(settings: Settings, told: Sequence[tuple[Agreement, ...] | str]) -> Le
 
 def _asked(name: str, path: Path, scenes: tuple[int, int] | None) -> dict[str, tuple[Question, ...]]:
     """The questions that use the word and are answered, understood before any work."""
-    index = scene_indices(path)
     asked = {
         video: tuple(question for question in several if mentions(question, name))
-        for video, several in read_questions(path).items()
-        if scenes is None or scenes[0] <= index[video] < scenes[1]
+        for video, several in questions_about(path, scenes).items()
     }
     if not any(asked.values()):
         where = "" if scenes is None else f" about scenes {scenes[0]} to {scenes[1] - 1}"

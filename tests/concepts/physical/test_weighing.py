@@ -47,6 +47,16 @@ def test_without_examples_the_posterior_is_the_prior() -> None:
     assert found.lapse @ found.lapse_probability == pytest.approx(beta(*LAPSE_PRIOR).mean())
 
 
+def test_a_meaning_under_which_a_question_makes_no_sense_is_neither_favoured_nor_excluded_by_it() -> None:
+    """Its answers can only have been guessed, so its evidence stays that of guessing."""
+    told = agreement_of(np.zeros((len(MEANINGS), DRAWS), dtype=int), 2)
+    told.draws[1] = 0
+    found = weigh([told])
+    assert np.isfinite(found.log_evidence).all()
+    assert found.log_evidence[1] == pytest.approx(0)
+    assert found.log_evidence[0] > 0
+
+
 def test_evidence_by_hand() -> None:
     """Two examples: one answer that 30 % of the draws get wrong, and three answers of which all draws get one wrong."""
     single = np.zeros((len(MEANINGS), DRAWS), dtype=int)

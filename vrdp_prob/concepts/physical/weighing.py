@@ -84,10 +84,12 @@ def _log_likelihood(
     draws, everywhere = agreement.draws[:, groups].sum(axis=1), agreement.draws.sum(axis=1)
     # a question that makes sense in few draws may make sense in one group alone
     draws = np.where(draws.sum(axis=1, keepdims=True) > 0, draws, everywhere)
-    share = draws / draws.sum(axis=1, keepdims=True)
     wrong = np.arange(agreement.answers + 1)[:, None]
     of_draw = (1 - lapse / 2) ** (agreement.answers - wrong) * (lapse / 2) ** wrong
-    return np.log(share @ of_draw)
+    sensible = draws.sum(axis=1, keepdims=True)
+    # where it makes sense in none, its answers can only have been guessed
+    likelihood = np.where(sensible > 0, (draws / np.maximum(sensible, 1)) @ of_draw, 0.5**agreement.answers)
+    return np.log(likelihood)
 
 
 @cache

@@ -18,9 +18,10 @@ from _concepts_page import draw, table, write_page
 from _concepts_scores import Case, Score, add_video, tracks_facts
 
 from vrdp_prob.concepts.perceived.concepts import Concepts
-from vrdp_prob.concepts.perceived.folder import taught_videos
+from vrdp_prob.concepts.perceived.from_files import facts, films, look_at
 from vrdp_prob.concepts.perceived.learning import learn
 from vrdp_prob.datasets import read_questions
+from vrdp_prob.inference.checkpoint import Checkpoint
 from vrdp_prob.perception import see_video
 from vrdp_prob.progress import progress_display
 from vrdp_prob.scene import Camera, QuestionType
@@ -92,14 +93,10 @@ def measured(sizes: list[int], keep: Path) -> dict[str, Score]:
 def learned_from(size: int, keep: Path) -> Concepts:
     """Concepts learned from so many videos."""
     progress = progress_display(quiet=False)
-    videos = taught_videos(
-        DATA / "videos",
-        DATA / "questions.json",
-        scenes=(FIRST, FIRST + size),
-        checkpoint=keep / "videos",
-        progress=progress,
-    )
-    learned = learn(videos, checkpoint=keep / f"networks-{size}", progress=progress)
+    shown = films(DATA / "videos", DATA / "questions.json", scenes=(FIRST, FIRST + size))
+    kept = Checkpoint(keep / f"networks-{size}", facts(shown, seed=0))
+    videos = look_at(shown, checkpoint=keep / "videos", progress=progress)
+    learned = learn(videos, seed=0, checkpoint=kept, progress=progress)
     print("\n".join(learned.lines), file=sys.stderr)
     return learned.concepts
 

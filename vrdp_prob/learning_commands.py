@@ -7,10 +7,9 @@ import typer
 
 from vrdp_prob.command_inputs import model_at, scene_range
 from vrdp_prob.command_options import CameraOption, CheckpointFolder, Model, Processes, Quiet, Sampler, Scenes, Seed
-from vrdp_prob.concepts.perceived.folder import taught_videos
-from vrdp_prob.concepts.perceived.learning import learn
+from vrdp_prob.concepts.perceived import from_files as perceived
 from vrdp_prob.concepts.perceived.storage import write_concepts
-from vrdp_prob.concepts.physical.from_files import learn_from_files
+from vrdp_prob.concepts.physical import from_files as physical
 from vrdp_prob.files import check_file, check_writable
 from vrdp_prob.progress import progress_display
 
@@ -35,7 +34,7 @@ def learn_word(
     check_file(file)
     if checkpoint is not None:
         check_writable(checkpoint)
-    learned = learn_from_files(
+    learned = physical.learn_from_files(
         word,
         folder,
         questions,
@@ -68,14 +67,16 @@ def learn_concepts(
     quiet: Quiet = False,
 ) -> None:
     """Learn what colors, materials, shapes, motion and events look like from questions and answers."""
-    progress = progress_display(quiet=quiet)
     check_file(out)
-    kept = checkpoint or out.with_name(f"{out.name}-checkpoint")
-    wanted = None if scenes is None else scene_range(scenes)
-    videos = taught_videos(
-        folder, questions, scenes=wanted, camera=camera, checkpoint=kept / "videos", progress=progress
+    learned = perceived.learn_from_files(
+        folder,
+        questions,
+        scenes=None if scenes is None else scene_range(scenes),
+        camera=camera,
+        seed=seed,
+        checkpoint=checkpoint or out.with_name(f"{out.name}-checkpoint"),
+        progress=progress_display(quiet=quiet),
     )
-    learned = learn(videos, seed=seed, checkpoint=kept / "networks", progress=progress)
     write_concepts(out, learned.concepts)
     if not quiet:
         print("\n".join([*learned.lines, str(out)]))

@@ -8,7 +8,9 @@ import pytest
 from command_line import refused
 
 from vrdp_prob import cli
+from vrdp_prob.concepts.perceived.from_files import facts, films
 from vrdp_prob.concepts.perceived.storage import read_concepts
+from vrdp_prob.inference.checkpoint import Checkpoint
 
 COUNT = {"question_id": 0, "question": "How many collisions happen?", "answer": "1"}
 
@@ -52,6 +54,22 @@ def test_answers_that_cannot_teach(tmp_path: Path, capsys: pytest.CaptureFixture
     unanswered = {"question_id": 0, "question": "How many collisions happen?"}
     assert "no descriptive or explanatory question" in refused(capsys, *learn, questions(tmp_path, unanswered))
     assert "no camera" in refused(capsys, *learn, questions(tmp_path, COUNT))
+
+
+def test_what_is_wrong_is_told_before_any_video_is_looked_at(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The video is no video, so that looking at it would be refused."""
+    (tmp_path / "clip.mp4").write_bytes(b"")
+    learn = ["learn-concepts", tmp_path, "--camera", "clevrer", "--out", tmp_path / "x.concepts", "--questions"]
+    assert "no question has a word for a color" in refused(capsys, *learn, questions(tmp_path, COUNT))
+    words = COUNT | {"question": "How many red metal cubes are there?"}
+    asked = questions(tmp_path, words)
+    Checkpoint(tmp_path / "x.concepts-checkpoint" / "networks", facts(films(tmp_path, asked, camera="clevrer"), seed=1))
+    assert "belongs to another run (other seed)" in refused(capsys, *learn, asked)
+    assert "belongs to another run (other videos and answers)" in refused(
+        capsys, *learn, questions(tmp_path, words | {"answer": "2"}), "--seed", "1"
+    )
 
 
 @pytest.mark.slow

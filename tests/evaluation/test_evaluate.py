@@ -100,17 +100,17 @@ def test_a_killed_evaluation_goes_on(folder: Path, tmp_path: Path) -> None:
     words = ["evaluate", str(folder), "--questions", str(folder / "questions.json"), "--out", str(out), "--json"]
     command = [sys.executable, str(script), *words, "--processes", "1", "--quiet"]
     with subprocess.Popen(command, start_new_session=True, stdout=subprocess.DEVNULL) as running:
-        first, deadline = out / "scenes" / "video_00000.json", time.monotonic() + 300
+        first, deadline = out / "scenes" / "video_00000" / "result.json", time.monotonic() + 300
         while not first.exists() and time.monotonic() < deadline:
             time.sleep(0.05)
         os.killpg(running.pid, signal.SIGKILL)
-    done = {file.name: file.read_bytes() for file in (out / "scenes").glob("video_*.json")}
+    done = {file: file.read_bytes() for file in (out / "scenes").glob("*/result.json")}
     assert 1 <= len(done) < len(SPEEDS)
     finished = subprocess.run(command, stdout=subprocess.PIPE, check=True)
     again = json.loads(finished.stdout)
     assert again["scenes"] == len(SPEEDS)
-    for name, content in done.items():
-        assert (out / "scenes" / name).read_bytes() == content  # not made again
+    for file, content in done.items():
+        assert file.read_bytes() == content  # not made again
     whole = evaluate(folder, folder / "questions.json", processes=1)
     expected = json.loads(json.dumps(to_document(whole)))
     assert {**expected, "seconds_per_video": 0} == {**again, "seconds_per_video": 0}

@@ -27,18 +27,20 @@ from vrdp_prob.evaluation.one_scene import BEST_FIT, POSTERIOR, VARIANTS, SceneR
 from vrdp_prob.evaluation.scores import Interval, Scores, brier_gain
 from vrdp_prob.files import write_atomically
 from vrdp_prob.inference import check_options, default_model
-from vrdp_prob.inference.checkpoint import Checkpoint, run_facts
+from vrdp_prob.inference.checkpoint import Checkpoint, film_facts, model_facts, program_facts, tracks_facts
 from vrdp_prob.models.physics import PhysicsModel
 from vrdp_prob.models.simulator.rollout import compile_model
 from vrdp_prob.progress import ProgressDisplay, SilentProgress
 from vrdp_prob.reasoning.prepared import prepare
 from vrdp_prob.reasoning.vocabulary import ChangeWord, Vocabulary
 from vrdp_prob.reasoning.worlds import DRAWS
-from vrdp_prob.scene import Question
+from vrdp_prob.scene import Question, Tracks
 from vrdp_prob.workers import cluster, local_workers
 
 SOURCES = ("tracks", "videos")
 """What videos may be read from."""
+RESULT = "result.json"
+"""File of what one video gave, in its folder."""
 GROUPS: Mapping[str, tuple[Kind, ...]] = {
     "descriptive": (Kind.DESCRIPTIVE,),
     "explanatory": (Kind.EXPLANATORY,),
@@ -173,9 +175,8 @@ def evaluate(
         for question in chain.from_iterable(asked.values()):
             learned.check_question(question, vocabulary)
     tasks = _tasks(Path(folder), asked, source, camera, settings)
-    facts = _facts(Path(folder), Path(questions), source, settings)
-    kept = None if out is None else Checkpoint(Path(out) / "scenes", facts)
-    done = {} if kept is None else _done(kept, tasks)
+    kept = {} if out is None else {task.scene: _checkpoint(Path(out), task) for task in tasks}
+    done = {scene: result for scene, one in kept.items() if (result := _done(one)) is not None}
     waiting = [task for task in tasks if task.scene not in done]
     if waiting and dask is None:
         compile_model(settings.model)
@@ -186,8 +187,8 @@ def evaluate(
             for future in as_completed([workers.submit(evaluate_scene, task) for task in waiting]):
                 result = future.result()
                 done[result.scene] = result
-                if kept is not None:
-                    _keep(kept, result)
+                if result.scene in kept:
+                    _keep(kept[result.scene], result)
                 advance(1)
     return Evaluation(tuple(done[task.scene] for task in tasks), len(asked) - len(tasks), seed)
 
@@ -241,39 +242,32 @@ def _some(folder: Path, tasks: list[Task]) -> list[Task]:
     return tasks
 
 
-def _facts(folder: Path, questions: Path, source: str | None, settings: Settings) -> dict[str, str]:
-    """What the results depend on: another evaluation must not go on from them."""
-    table = folder / "tracks.csv"
+def _checkpoint(out: Path, task: Task) -> Checkpoint:
+    """What keeps the result of a video; another evaluation must not go on from it."""
+    settings, source = task.settings, task.source
     concepts = "rules" if settings.concepts is None else sha256(settings.concepts.read_bytes()).hexdigest()
-    tracks = sha256(table.read_bytes()).hexdigest() if table.is_file() and source != "videos" else ""
-    return run_facts(
-        settings.model,
-        folder=folder.resolve(),
-        tracks=tracks,
-        input=source,
-        questions=sha256(questions.read_bytes()).hexdigest(),
+    seen = tracks_facts(source) if isinstance(source, Tracks) else film_facts(source, task.camera)
+    run = program_facts(
+        questions=sha256(repr(task.questions).encode()).hexdigest(),
         concepts=concepts,
         sampler=settings.sampler,
         seed=settings.seed,
         draws=settings.draws,
         words=[word.change for word in settings.words],
     )
+    return Checkpoint(out / "scenes" / task.scene, {**seen, **model_facts(settings.model), **run})
 
 
-def _done(kept: Checkpoint, tasks: Sequence[Task]) -> dict[str, SceneResult]:
-    """Results that are there already; those of videos that failed, and files that cannot be read, are made anew."""
-    found = {}
-    for task in tasks:
-        try:
-            document = json.loads(kept.path(f"{task.scene}.json").read_text(encoding="utf-8"))
-            result = SceneResult.of_document(document)
-        except (OSError, ValueError, KeyError, TypeError):
-            continue
-        if result.failed is None:
-            found[task.scene] = result
-    return found
+def _done(kept: Checkpoint) -> SceneResult | None:
+    """A result that is there already; that of a video that failed, and a file that cannot be read, is made anew."""
+    try:
+        document = json.loads(kept.path(RESULT).read_text(encoding="utf-8"))
+        result = SceneResult.of_document(document)
+    except (OSError, ValueError, KeyError, TypeError):
+        return None
+    return result if result.failed is None else None
 
 
 def _keep(kept: Checkpoint, result: SceneResult) -> None:
-    with write_atomically(kept.path(f"{result.scene}.json")) as temporary:
+    with write_atomically(kept.path(RESULT)) as temporary:
         temporary.write_text(json.dumps(result.to_document(), indent=1, allow_nan=False) + "\n", encoding="utf-8")

@@ -17,30 +17,45 @@ from vrdp_prob.errors import InputError
 from vrdp_prob.files import check_writable, write_atomically
 from vrdp_prob.models import model_file
 from vrdp_prob.models.physics import PhysicsModel
-from vrdp_prob.scene import Tracks
+from vrdp_prob.scene import Camera, Tracks
 
 Arrays = Mapping[str, np.ndarray]
 
 
 def fingerprint(tracks: Tracks, model: PhysicsModel, **settings: object) -> dict[str, str]:
     """What a run depends on, in short texts by name: the tracks, the model, this version, and the settings given."""
+    return {**tracks_facts(tracks), **model_facts(model), **program_facts(**settings)}
+
+
+def tracks_facts(tracks: Tracks) -> dict[str, str]:
+    """Tracks with their camera, in a short text."""
     seen = sha256()
     for name, values in sorted(tracks.data.variables.items()):
         seen.update(str(name).encode())
         array = np.ascontiguousarray(values.values)
         seen.update(repr(array.tolist()).encode() if array.dtype == object else array.tobytes())
-    seen.update(repr((tracks.bodies, tracks.walls)).encode())
-    return {"tracks": seen.hexdigest(), **run_facts(model, **settings)}
+    camera = None if tracks.camera is None else tracks.camera.to_document()
+    seen.update(repr((tracks.bodies, tracks.walls, camera)).encode())
+    return {"tracks": seen.hexdigest()}
 
 
-def run_facts(model: PhysicsModel, **settings: object) -> dict[str, str]:
-    """What a run depends on beside its data, in short texts by name: the model, this version, and the settings."""
-    text = model_file.text(model.name, model.effects, model.parameters)
+def film_facts(file: Path, camera: Camera | None) -> dict[str, str]:
+    """A video file and its camera, in short texts."""
     return {
-        "model": sha256(text.encode()).hexdigest(),
-        "version": version("vrdp-prob"),
-        **{name: str(value) for name, value in settings.items()},
+        "video": sha256(file.read_bytes()).hexdigest(),
+        "camera": "" if camera is None else str(camera.to_document()),
     }
+
+
+def model_facts(model: PhysicsModel) -> dict[str, str]:
+    """A physics model, in a short text."""
+    text = model_file.text(model.name, model.effects, model.parameters)
+    return {"model": sha256(text.encode()).hexdigest()}
+
+
+def program_facts(**settings: object) -> dict[str, str]:
+    """The version of the program, and the settings given, in short texts by name."""
+    return {"version": version("vrdp-prob"), **{name: str(value) for name, value in settings.items()}}
 
 
 class Checkpoint:

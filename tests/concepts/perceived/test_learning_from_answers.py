@@ -19,6 +19,7 @@ from vrdp_prob.concepts.perceived.storage import read_concepts, write_concepts
 from vrdp_prob.concepts.perceived.training import train
 from vrdp_prob.concepts.perceived.vocabulary import Vocabulary
 from vrdp_prob.errors import InputError
+from vrdp_prob.inference.checkpoint import Checkpoint
 from vrdp_prob.reasoning.program import check
 from vrdp_prob.scene import Choice, Question
 
@@ -141,7 +142,8 @@ def test_what_was_learned_is_told(monkeypatch: pytest.MonkeyPatch, tmp_path: Pat
     monkeypatch.setattr(learning, "LESSONS", SHORT)
     monkeypatch.setattr(learning, "NETWORKS", 2)
     named = {str(place): one for place, one in enumerate(TAUGHT[:4])}
-    learned = learn(named, seed=1, checkpoint=tmp_path)
+    kept = Checkpoint(tmp_path, {"seed": "1"})
+    learned = learn(named, seed=1, checkpoint=kept)
     assert learned.concepts.vocabulary.values["color"] == ("gray", "red", "blue")
     examples = sum(len(one.examples) for one in TAUGHT[:4])
     assert (
@@ -149,10 +151,8 @@ def test_what_was_learned_is_told(monkeypatch: pytest.MonkeyPatch, tmp_path: Pat
         == f"Learned from 4 videos and {examples} answers: gray, red, blue, metal, rubber, sphere, cube."
     )
     assert "The words green, brown, cyan, purple, yellow, cylinder never occur in the questions" in learned.notes[0]
-    again = learn(named, seed=1, checkpoint=tmp_path)
+    again = learn(named, seed=1, checkpoint=kept)
     np.testing.assert_array_equal(weights(again.concepts.networks[1]), weights(learned.concepts.networks[1]))
-    with pytest.raises(InputError, match="belongs to another run"):
-        learn(named, seed=2, checkpoint=tmp_path)
 
 
 def test_answers_that_no_concept_explains_are_told(monkeypatch: pytest.MonkeyPatch) -> None:

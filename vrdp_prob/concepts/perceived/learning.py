@@ -1,10 +1,8 @@
 """Concepts learned from the videos of a folder and a file of questions."""
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from hashlib import sha256
-from pathlib import Path
 
 import numpy as np
 import torch
@@ -58,7 +56,7 @@ def learn(
     videos: Mapping[str, Taught],
     *,
     seed: int = 0,
-    checkpoint: Path | None = None,
+    checkpoint: Checkpoint | None = None,
     progress: ProgressDisplay | None = None,
 ) -> Learned:
     """Learn concepts.
@@ -70,31 +68,44 @@ def learn(
     seed
         Seed of everything random in it.
     checkpoint
-        Folder that keeps the state of the training; the same call, after an interruption, goes on from there and ends
-        with the same numbers.
+        Keeps the state of the training; the same call, after an interruption, goes on from there and ends with the
+        same numbers.
     progress
         Told of each epoch.
 
     Raises
     ------
     InputError
-        If no word of an attribute occurs in the questions, or the folder holds what was learned from others.
+        If no word of an attribute occurs in the questions.
     """
     examples = [example for one in videos.values() for example in one.examples]
+    vocabulary = vocabulary_of(examples)
+    taught, display = list(videos.values()), progress or SilentProgress()
+    trained = [
+        _trained(vocabulary, taught, place, seed=seed, kept=checkpoint, progress=display) for place in range(NETWORKS)
+    ]
+    standings = np.array([[one.right for one in standing] for _, standing in trained]).mean(axis=0)
+    guessed = _guessed(examples)
+    lessons = Lessons(len(videos), len(examples), seed, guessed, float(standings[0]), float(standings[1]))
+    concepts = Concepts(tuple(network for network, _ in trained), lessons)
+    return Learned(concepts, _notes(concepts))
+
+
+def vocabulary_of(examples: Iterable[Example]) -> Vocabulary:
+    """The words that questions use.
+
+    Raises
+    ------
+    InputError
+        If there is none for an attribute.
+    """
     vocabulary = Vocabulary.of(words_of(examples))
     for name, words in vocabulary.values.items():
         if not words:
             raise InputError(
                 f"no question has a word for a {name}, so none can be learned; add questions that use some."
             )
-    kept = None if checkpoint is None else Checkpoint(checkpoint, _facts(videos, seed))
-    taught, display = list(videos.values()), progress or SilentProgress()
-    trained = [_trained(vocabulary, taught, place, seed=seed, kept=kept, progress=display) for place in range(NETWORKS)]
-    standings = np.array([[one.right for one in standing] for _, standing in trained]).mean(axis=0)
-    guessed = _guessed(examples)
-    lessons = Lessons(len(videos), len(examples), seed, guessed, float(standings[0]), float(standings[1]))
-    concepts = Concepts(tuple(network for network, _ in trained), lessons)
-    return Learned(concepts, _notes(concepts))
+    return vocabulary
 
 
 def _trained(
@@ -147,13 +158,3 @@ def _notes(concepts: Concepts) -> tuple[str, ...]:
             "what the videos show."
         )
     return tuple(notes)
-
-
-def _facts(videos: Mapping[str, Taught], seed: int) -> dict[str, str]:
-    """What the result depends on."""
-    asked = sha256()
-    for name, one in videos.items():
-        asked.update(repr((name, [(example.program.tokens, example.answer) for example in one.examples])).encode())
-        for value in one.observation.arrays.values():
-            asked.update(np.ascontiguousarray(value).tobytes())
-    return {"videos and answers": asked.hexdigest(), "seed": str(seed)}

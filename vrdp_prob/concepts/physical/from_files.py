@@ -20,13 +20,15 @@ from vrdp_prob.datasets import load_all, questions_about, video_names
 from vrdp_prob.datasets.loading import CameraChoice
 from vrdp_prob.errors import InputError
 from vrdp_prob.inference import check_options, default_model, infer
-from vrdp_prob.inference.checkpoint import Checkpoint, run_facts
+from vrdp_prob.inference.checkpoint import Checkpoint, fingerprint
 from vrdp_prob.models.physics import PhysicsModel
 from vrdp_prob.models.simulator.rollout import compile_model
 from vrdp_prob.progress import ProgressDisplay, SilentProgress
 from vrdp_prob.reasoning.changes import Change, Meaning
 from vrdp_prob.scene import Question, Tracks
 from vrdp_prob.workers import local_workers
+
+AGREEMENTS = "agreements"
 
 
 @dataclass(frozen=True)
@@ -47,6 +49,21 @@ class Lesson:
     tracks: Tracks
     questions: tuple[Question, ...]
     settings: Settings
+
+    def checkpoint(self, folder: Path) -> Checkpoint:
+        """What keeps how far its answers agree, in a folder of its own."""
+        settings = self.settings
+        facts = fingerprint(
+            self.tracks,
+            settings.model,
+            word=settings.word,
+            questions=sha256(repr(self.questions).encode()).hexdigest(),
+            hypotheses=HYPOTHESES,
+            sampler=settings.sampler,
+            draws=settings.draws,
+            seed=settings.seed,
+        )
+        return Checkpoint(folder / self.tracks.video, facts)
 
 
 def learn_from_files(
@@ -99,9 +116,9 @@ def learn_from_files(
     settings = Settings(name, model or default_model(), sampler, draws, seed)
     asked = _asked(name, Path(questions), scenes)
     lessons = _lessons(Path(folder), asked, camera, settings, progress)
-    kept = None if checkpoint is None else Checkpoint(checkpoint, _facts(Path(folder), Path(questions), settings))
+    kept = {} if checkpoint is None else {one.tracks.video: one.checkpoint(Path(checkpoint)) for one in lessons}
     found: dict[str, tuple[Agreement, ...] | str] = {}
-    found |= {lesson.tracks.video: known for lesson in lessons if (known := _kept(kept, lesson)) is not None}
+    found |= {video: known for video, one in kept.items() if (known := _kept(one)) is not None}
     waiting = [lesson for lesson in lessons if lesson.tracks.video not in found]
     if waiting:
         compile_model(settings.model)
@@ -111,8 +128,8 @@ def learn_from_files(
             for future in as_completed([workers.submit(_taught, lesson) for lesson in waiting]):
                 video, told = future.result()
                 found[video] = told
-                if kept is not None and not isinstance(told, str):
-                    kept.keep(video, {str(place): one.draws for place, one in enumerate(told)})
+                if video in kept and not isinstance(told, str):
+                    kept[video].keep(AGREEMENTS, {str(place): one.draws for place, one in enumerate(told)})
                 advance(1)
     return _word(settings, [found[lesson.tracks.video] for lesson in lessons])
 
@@ -188,23 +205,9 @@ def _agreements(lesson: Lesson) -> tuple[Agreement, ...]:
     return agreements_of(settings.word, posterior, lesson.questions, draws=settings.draws, seed=settings.seed)
 
 
-def _facts(folder: Path, questions: Path, settings: Settings) -> dict[str, str]:
-    """What the agreements depend on."""
-    return run_facts(
-        settings.model,
-        word=settings.word,
-        folder=folder.resolve(),
-        questions=sha256(questions.read_bytes()).hexdigest(),
-        hypotheses=HYPOTHESES,
-        sampler=settings.sampler,
-        draws=settings.draws,
-        seed=settings.seed,
-    )
-
-
-def _kept(kept: Checkpoint | None, lesson: Lesson) -> tuple[Agreement, ...] | None:
+def _kept(checkpoint: Checkpoint) -> tuple[Agreement, ...] | None:
     """What a video was found to say in an earlier call; None where it has to be worked on."""
-    arrays = None if kept is None else kept.arrays(lesson.tracks.video)
-    if arrays is None or len(arrays) != len(lesson.questions):
+    arrays = checkpoint.arrays(AGREEMENTS)
+    if arrays is None:
         return None
     return tuple(Agreement(np.asarray(arrays[str(place)])) for place in range(len(arrays)))

@@ -1,0 +1,174 @@
+"""Concepts learned from a folder of videos and a question file; broken off, it can go on."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from hashlib import sha256
+from itertools import chain
+from pathlib import Path
+
+from vrdp_prob.concepts.perceived.examples import Example, examples_of
+from vrdp_prob.concepts.perceived.learning import Learned, learn, vocabulary_of
+from vrdp_prob.concepts.perceived.lessons import Taught
+from vrdp_prob.concepts.perceived.observation import Observation
+from vrdp_prob.datasets import check_scenes, find_camera, questions_about, video_files
+from vrdp_prob.datasets.loading import CameraChoice
+from vrdp_prob.errors import InputError
+from vrdp_prob.inference.checkpoint import Checkpoint, film_facts, program_facts
+from vrdp_prob.perception.reading import see_video
+from vrdp_prob.progress import ProgressDisplay, SilentProgress
+from vrdp_prob.scene import Camera
+
+
+@dataclass(frozen=True)
+class Film:
+    """A video file that nobody has looked at yet, with what is asked about it."""
+
+    file: Path
+    camera: Camera
+    examples: tuple[Example, ...]
+
+    @cached_property
+    def facts(self) -> dict[str, str]:
+        """What an observation of it depends on."""
+        return {**film_facts(self.file, self.camera), **program_facts()}
+
+
+def learn_from_files(
+    folder: Path | str,
+    questions: Path | str,
+    *,
+    scenes: tuple[int, int] | None = None,
+    camera: CameraChoice = None,
+    seed: int = 0,
+    checkpoint: Path | None = None,
+    progress: ProgressDisplay | None = None,
+) -> Learned:
+    """Learn concepts from the descriptive and explanatory questions of a file that have their answers.
+
+    Parameters
+    ----------
+    folder, questions, scenes, camera
+        See `films`.
+    seed
+        Seed of everything random in it.
+    checkpoint
+        Folder that keeps what was seen and learned. The same call again, after an interruption, goes on from there and
+        ends with the same numbers.
+    progress
+        Told of each video and epoch.
+
+    Raises
+    ------
+    InputError
+        If `films` refuses the input, no word of an attribute occurs in the questions, a video is unusable, or
+        `checkpoint` belongs to another call.
+    """
+    shown = films(folder, questions, scenes=scenes, camera=camera)
+    vocabulary_of(chain.from_iterable(film.examples for film in shown.values()))
+    kept = None if checkpoint is None else Checkpoint(checkpoint / "networks", facts(shown, seed))
+    videos = look_at(shown, checkpoint=None if checkpoint is None else checkpoint / "videos", progress=progress)
+    return learn(videos, seed=seed, checkpoint=kept, progress=progress)
+
+
+def films(
+    folder: Path | str,
+    questions: Path | str,
+    *,
+    scenes: tuple[int, int] | None = None,
+    camera: CameraChoice = None,
+) -> dict[str, Film]:
+    """Videos with answers about them, by name.
+
+    Parameters
+    ----------
+    folder
+        Folder of videos.
+    questions
+        CLEVRER question file with answers; only descriptive and explanatory questions are looked at.
+    scenes
+        First `scene_index` of the question file and the one after the last; all where None.
+    camera
+        Camera of the videos; see `vrdp_prob.load`.
+
+    Raises
+    ------
+    InputError
+        If a question is not understood or contradicts another one, or a video is missing or without a camera.
+    """
+    folder, questions = Path(folder), Path(questions)
+    wanted = questions_about(questions, scenes)
+    check_scenes(questions, scenes, wanted)
+    examples = examples_of(wanted, source=str(questions))
+    files = _files(folder, questions, list(examples))
+    return {name: Film(file, _camera(file, camera), examples[name]) for name, file in files.items()}
+
+
+def look_at(
+    shown: Mapping[str, Film], *, checkpoint: Path | None = None, progress: ProgressDisplay | None = None
+) -> dict[str, Taught]:
+    """What is seen of each video, with what is asked about it.
+
+    Parameters
+    ----------
+    shown
+        The videos.
+    checkpoint
+        Folder that keeps what was seen, so that no video is looked at twice.
+    progress
+        Told of each video.
+
+    Raises
+    ------
+    InputError
+        If a video is unusable, or `checkpoint` belongs to other videos.
+    """
+    found = {}
+    with (progress or SilentProgress()).stage("Looking at videos", total=len(shown)) as advance:
+        for name, film in shown.items():
+            found[name] = Taught(_seen(film, checkpoint), film.examples)
+            advance(1)
+    return found
+
+
+def facts(shown: Mapping[str, Film], seed: int) -> dict[str, str]:
+    """What the concepts depend on that videos teach."""
+    taught = sha256()
+    for name, film in shown.items():
+        asked = [(example.program.tokens, example.answer) for example in film.examples]
+        taught.update(repr((name, film.facts, asked)).encode())
+    return {"videos and answers": taught.hexdigest(), "seed": str(seed), **program_facts()}
+
+
+def _files(folder: Path, questions: Path, names: list[str]) -> Mapping[str, Path]:
+    if not folder.is_dir():
+        raise InputError(f"{folder}: there is no such folder; name the folder of the videos.")
+    files = video_files(folder)
+    for name in names:
+        if name not in files:
+            raise InputError(
+                f"{folder}: there is no video {name}, which {questions} asks about; add it, or leave its scene out "
+                "(--scenes A:B)."
+            )
+    return {name: files[name] for name in names}
+
+
+def _camera(file: Path, camera: CameraChoice) -> Camera:
+    found = find_camera(file, camera)
+    if found is None:
+        raise InputError(
+            f"{file}: no camera; put camera.json beside the video or in its parent folder, or give --camera FILE."
+        )
+    return found
+
+
+def _seen(film: Film, folder: Path | None) -> Observation:
+    """What is seen of a video, read where it was kept."""
+    if folder is None:
+        return Observation.of(see_video(film.file, film.camera))
+    kept = Checkpoint(folder / film.file.stem, film.facts)
+    arrays = kept.arrays("observation")
+    if arrays is None:
+        arrays = Observation.of(see_video(film.file, film.camera)).arrays
+        kept.keep("observation", arrays)
+    return Observation.of_arrays(arrays)

@@ -87,7 +87,7 @@ def test_learn_word_then_evaluate_with_it(tmp_path: Path, capsys: pytest.Capture
     assert printed == [*LearnedWord.read(file).summary, str(file)]
     evaluated = ["evaluate", *common, "--word", str(file), "--out", str(tmp_path / "out"), "--json"]
     assert cli.run(evaluated) == 0
-    scores = json.loads(capsys.readouterr().out)["posterior"]["counterfactual_mass"]
+    scores = json.loads(capsys.readouterr().out)["posterior"]["counterfactual_word"]
     assert scores["questions"] == 1
     reported = ["report", str(tmp_path), "--questions", str(questions), "--sampler", "laplace", "--word", str(file)]
     assert cli.run([*reported, "--out", str(tmp_path / "report"), "--quiet"]) == 0

@@ -80,7 +80,7 @@ def test_kinds_of_what_if() -> None:
     heavier = replace(removed, text="If the sphere were heavier, what would happen?")
     assert kind_of(heavier) is Kind.MASS
     floppier = replace(removed, text="If the sphere were floppier, what would happen?")
-    assert kind_of(floppier, [UNSURE]) is Kind.MASS
+    assert kind_of(floppier, [UNSURE]) is Kind.WORD
 
 
 def test_a_judgement_survives_json() -> None:

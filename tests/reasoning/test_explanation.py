@@ -1,7 +1,7 @@
 """Why an answer is uncertain: the quantity it hangs on, where the doubt comes from, what would settle it."""
 
 import json
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -15,14 +15,23 @@ from vrdp_prob.reasoning import PosteriorWorlds, ask
 from vrdp_prob.reasoning.answer import Answer
 from vrdp_prob.reasoning.batch import FUTURE_FRAMES
 from vrdp_prob.reasoning.chance import MostProbable, Purpose, Seeded
+from vrdp_prob.reasoning.changes import Change, Meaning, PhysicalParameter, Rule, Shift
 from vrdp_prob.reasoning.coupled import Coupled
 from vrdp_prob.reasoning.entropy import entropy
 from vrdp_prob.reasoning.explanation.explanation import Part
 from vrdp_prob.reasoning.explanation.motions import FILMED_FRAMES
+from vrdp_prob.reasoning.explanation.quantities import Kind
 from vrdp_prob.scene import QuestionType
 
 ACCURACY = 0.05
 TRUTHS = 32
+
+
+@dataclass(frozen=True)
+class Word:
+    """A learned word, made by hand."""
+
+    change: Change
 
 
 def asked(known: KnownPosterior | PosteriorWorlds, *choices: str) -> Answer:
@@ -146,6 +155,28 @@ def test_the_share_of_the_parameters_is_that_of_a_nested_simulation() -> None:
     between = table.mean(axis=1).var(ddof=1) - within / table.shape[1]
     assert 0.1 < told.shares.parameters < 0.9
     assert told.shares.parameters == pytest.approx(between / (between + within), abs=3 * told.shares.error)
+
+
+def test_what_a_learned_word_means_is_what_an_answer_hangs_on() -> None:
+    """Only if the mass of disc 0 grows enough does the disc that it hits reach the last one."""
+    discs = (Disc((-1.5, 0.0), (1.6, 0.0)), Disc((0.0, 0.0), restitution=0.3), Disc((1.34, 0.0)))
+    factors = np.geomspace(1 / 6, 6, 9)
+    meanings = tuple(Meaning(0.08, Shift(PhysicalParameter.MASS, Rule.FACTOR, float(factor))) for factor in factors)
+    floppier = Word(Change("floppier", (*meanings, Meaning(0.28, None))))
+    worlds = PosteriorWorlds(KnownPosterior(tracks_of(discs, 128), discs), draws=200, deviating=None)
+    question = "If the red object were floppier, what would happen?"
+    (told,) = ask(worlds, question, choices=[OPEN], words=[floppier]).explain().parts
+    best = told.hinges[0]
+    assert (best.kind, best.name) == (Kind.MEANING, "factor of the mass that 'floppier' means")
+    assert best.threshold is not None
+    assert 1 <= best.threshold < 6
+    assert best.inside > 0.9
+    assert best.outside < 0.1
+    assert told.shares is not None
+    assert told.shares.parameters > 0.8
+    assert "and from what 'floppier' means" in told.shares.sentence
+    lighter = Word(Change("floppier", (*floppier.change.meanings[:2], Meaning(0.84, None))))
+    assert not ask(worlds, question, choices=[OPEN], words=[lighter]).explain().parts
 
 
 def test_where_all_that_matters_is_known_the_rest_is_motion_or_chaos() -> None:

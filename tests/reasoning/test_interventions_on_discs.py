@@ -7,7 +7,6 @@ import pytest
 from sliding_discs import Disc, KnownPosterior, path, tracks_of
 
 from vrdp_prob.reasoning import Change, PosteriorWorlds
-from vrdp_prob.reasoning.chance import Purpose, Seeded
 from vrdp_prob.reasoning.changes import Meaning, PhysicalParameter, Rule, Shift
 from vrdp_prob.reasoning.events import EventTable
 from vrdp_prob.reasoning.intervention import Intervention
@@ -99,8 +98,9 @@ def test_every_draw_takes_one_meaning_by_its_probability() -> None:
         Meaning(0.3, Shift(RESTITUTION, Rule.OFFSET, 5.0)),
     )
     worlds = posterior.worlds()
-    numbers = Seeded(0).numbers(Purpose.MEANING)
-    after = Intervention(Change("other", meanings), 1, worlds, numbers).worlds
+    change = Change("other", meanings)
+    (batch,) = PosteriorWorlds(posterior, draws=draws).batches
+    after = Intervention(change, 1, worlds, batch.meanings(change)).worlds
     heavier = (after.mass[:, 1] / worlds.mass[:, 1]).numpy()
     bouncier = (after.restitution[:, 1] != worlds.restitution[:, 1]).numpy()
     # three standard errors of a share of 4000 draws are at most 0.024
@@ -124,5 +124,5 @@ def test_an_impulse_scales_with_the_reduced_mass_and_the_restitution() -> None:
         (Shift(RESTITUTION, Rule.FACTOR, 2.0), impulse(mass[1], 2 * bounce[1])),
         (Shift(SPEED, Rule.FACTOR, 2.0), impulse(mass[1], bounce[1])),
     ):
-        ratio = Intervention(Change("other", (Meaning(1.0, shift),)), 1, worlds, np.random.default_rng(0))
+        ratio = Intervention(Change("other", (Meaning(1.0, shift),)), 1, worlds, np.zeros(1, dtype=int))
         assert ratio.impulse_ratio(0)[0] == pytest.approx(after / impulse(mass[1], bounce[1]))

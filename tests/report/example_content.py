@@ -8,13 +8,15 @@ from vrdp_prob.inference.samples import Convergence
 from vrdp_prob.inference.summaries import ObjectSummary, PairSummary, ParameterSummary, Summary
 from vrdp_prob.reasoning.answer import Answer, ChoiceAnswer, monte_carlo_error
 from vrdp_prob.report.content import (
+    FACTUAL,
+    FUTURE,
+    REMOVED,
     AnswerContent,
     Collisions,
     Footage,
     PairShare,
     ReportContent,
     WorldContent,
-    WorldKind,
 )
 from vrdp_prob.scene import Body, Camera, QuestionType, Shape, Tracks
 
@@ -72,16 +74,16 @@ def make_draws(count: int = DRAWS, seed: int = 0) -> Draws:
     )
 
 
-def roll(draws: Draws, frames: int, kind: WorldKind, body: str | None = None) -> WorldContent:
+def roll(draws: Draws, frames: int, kind: str, body: str | None = None) -> WorldContent:
     """Roll all draws out in fixed steps: discs that brake steadily and bounce."""
     count = len(draws.mass)
     position, velocity, mass = draws.position.copy(), draws.velocity.copy(), draws.mass.copy()
     release = np.tile(RELEASE, (count, 1))
     if body is not None:
         index = IDS.index(body)
-        if kind is WorldKind.REMOVED:
+        if kind == REMOVED:
             release[:, index] = np.inf
-        mass[:, index] *= {WorldKind.HEAVIER: 5.0, WorldKind.LIGHTER: 0.2}.get(kind, 1.0)
+        mass[:, index] *= {"heavier": 5.0, "lighter": 0.2}.get(kind, 1.0)
     angle = np.zeros((count, len(IDS)))
     spin = np.tile(SPIN, (count, 1))
     trajectory, exists, events = [], [], {}
@@ -169,7 +171,7 @@ def _shares(table: Collisions, draws: int) -> tuple[PairShare, ...]:
 
 
 def make_tracks(camera: Camera | None, seed: int = 1) -> Tracks:
-    truth = roll(Draws(POSITION[None], VELOCITY[None], MASS[None], np.full((1, 5), 0.8)), 128, WorldKind.FACTUAL)
+    truth = roll(Draws(POSITION[None], VELOCITY[None], MASS[None], np.full((1, 5), 0.8)), 128, FACTUAL)
     random = np.random.default_rng(seed)
     positions = truth.trajectory[0, :, :, :2] + 0.01 * random.standard_normal((128, 5, 2))
     view = camera.in_view(positions) if camera is not None else np.ones((128, 5), dtype=bool)
@@ -314,8 +316,8 @@ def make_answers() -> tuple[AnswerContent, ...]:
 def make_content(*, camera: Camera | None = None, draws: int = DRAWS) -> ReportContent:
     """Content with all worlds; without a camera there is no still."""
     unknown = make_draws(draws)
-    kinds = (WorldKind.REMOVED, WorldKind.HEAVIER, WorldKind.LIGHTER)
-    worlds = [roll(unknown, 128, WorldKind.FACTUAL), from_frame(roll(unknown, 186, WorldKind.FUTURE), 127)]
+    kinds = (REMOVED, "heavier", "lighter")
+    worlds = [roll(unknown, 128, FACTUAL), from_frame(roll(unknown, 186, FUTURE), 127)]
     worlds += [roll(unknown, 128, kind, body) for kind in kinds for body in IDS]
     mass, bounce = unknown.mass, unknown.bounce
     return ReportContent(

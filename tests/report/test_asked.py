@@ -3,7 +3,9 @@
 import pytest
 from example_content import BODIES
 
+from tests.concepts.physical.words import UNSURE
 from vrdp_prob.reasoning.answer import Answer
+from vrdp_prob.reasoning.vocabulary import Vocabulary
 from vrdp_prob.report.asked import world_of
 from vrdp_prob.scene import QuestionType
 
@@ -30,3 +32,13 @@ from vrdp_prob.scene import QuestionType
 def test_world_of_a_question(kind, question, world):
     answer = Answer(0, question, QuestionType(kind), "yes", 1.0, 0.0, 0.0, {"yes": 1.0})
     assert world_of(answer, BODIES) == world
+
+
+def test_world_of_a_question_with_a_learned_word() -> None:
+    vocabulary = Vocabulary.of([UNSURE])
+    for question in (
+        "If the cylinder were floppier, what would happen?",
+        "all_events objects cylinder filter_shape unique apply_floppier counterfact_floppier",
+    ):
+        answer = Answer(0, question, QuestionType.COUNTERFACTUAL, "yes", 1.0, 0.0, 0.0, {"yes": 1.0})
+        assert world_of(answer, BODIES, vocabulary) == "floppier:2"

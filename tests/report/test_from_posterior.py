@@ -9,6 +9,7 @@ import torch
 import xarray as xr
 from example_content import RADIUS, make_tracks
 
+from tests.concepts.physical.words import UNSURE
 from vrdp_prob.inference.identifiability import BodyStatus, ParameterStatus, Status
 from vrdp_prob.inference.infer import infer
 from vrdp_prob.inference.posterior import Posterior
@@ -19,6 +20,7 @@ from vrdp_prob.models.simulator.worlds import Worlds
 from vrdp_prob.reasoning.answer import Answer
 from vrdp_prob.reasoning.worlds import PosteriorWorlds
 from vrdp_prob.report import build, rollouts, schema, write_report
+from vrdp_prob.report.wording import world_label
 from vrdp_prob.scene import Camera, QuestionType, Tracks
 
 CYLINDER, SPHERE = 2, 3
@@ -99,6 +101,13 @@ def test_worlds_of_the_player(content):
     assert (future.times[0], future.times[-1]) == pytest.approx((factual.times[-1], factual.times[-1] + 2.32), abs=0.05)
     assert not without.exists[:, :, 0].any()
     assert len(without.collisions.time) == 0
+
+
+def test_a_learned_word_has_a_world_for_each_body():
+    content = build(hand_made(), (), draws=4, words=[UNSURE])
+    keys = [world.key for world in content.worlds]
+    assert keys[-2:] == ["floppier:2", "floppier:3"]
+    assert world_label(content.worlds[-1], content.tracks).endswith("were floppier")
 
 
 def test_worlds_of_the_answers_are_shown():

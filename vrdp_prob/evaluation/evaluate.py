@@ -45,9 +45,10 @@ GROUPS: Mapping[str, tuple[Kind, ...]] = {
     "descriptive": (Kind.DESCRIPTIVE,),
     "explanatory": (Kind.EXPLANATORY,),
     "predictive": (Kind.PREDICTIVE,),
-    "counterfactual": (Kind.REMOVAL, Kind.MASS),
+    "counterfactual": (Kind.REMOVAL, Kind.MASS, Kind.WORD),
     "counterfactual_removal": (Kind.REMOVAL,),
     "counterfactual_mass": (Kind.MASS,),
+    "counterfactual_word": (Kind.WORD,),
 }
 """What is scored together, by its name in the document."""
 

@@ -8,6 +8,7 @@ from typing import Any
 from vrdp_prob.errors import InputError
 from vrdp_prob.reasoning import Answer, ask
 from vrdp_prob.reasoning.change_operations import APPLY, COUNTERFACT
+from vrdp_prob.reasoning.changes import Change
 from vrdp_prob.reasoning.facts import Facts
 from vrdp_prob.reasoning.prepared import prepare
 from vrdp_prob.reasoning.vocabulary import ChangeWord, Vocabulary
@@ -16,6 +17,8 @@ from vrdp_prob.scene.question import RIGHT
 
 CHANGED = (APPLY, COUNTERFACT)
 """What tokens begin with that change an object without removing it."""
+MASS_TOKENS = {f"{prefix}{change}" for prefix in CHANGED for change in (Change.HEAVIER, Change.LIGHTER)}
+"""Those of CLEVRER's words; all others stand for learned ones."""
 
 
 class Kind(StrEnum):
@@ -26,6 +29,7 @@ class Kind(StrEnum):
     PREDICTIVE = "predictive"
     REMOVAL = "counterfactual_removal"
     MASS = "counterfactual_mass"
+    WORD = "counterfactual_word"
 
     @property
     def question_type(self) -> QuestionType:
@@ -145,7 +149,10 @@ def kind_of(question: Question, words: Sequence[ChangeWord] = ()) -> Kind:
     programs = [program for _, program in asked.options]
     programs += [] if asked.program is None else [asked.program]
     tokens = {token for program in programs for token in program.tokens}
-    return Kind.MASS if any(token.startswith(CHANGED) for token in tokens) else Kind.REMOVAL
+    changing = {token for token in tokens if token.startswith(CHANGED)}
+    if not changing:
+        return Kind.REMOVAL
+    return Kind.MASS if changing <= MASS_TOKENS else Kind.WORD
 
 
 def _truth(question: Question) -> str:

@@ -14,7 +14,8 @@ TITLES = {
     "predictive": "Predictive",
     "counterfactual": "Counterfactual, all",
     "counterfactual_removal": "Counterfactual, object removed",
-    "counterfactual_mass": "Counterfactual, an object changed",
+    "counterfactual_mass": "Counterfactual, heavier or lighter",
+    "counterfactual_word": "Counterfactual, a learned word",
 }
 SIDE = 150.0
 """Width and height of a diagram in pixels."""

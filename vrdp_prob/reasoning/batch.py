@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
 from vrdp_prob.models.physics import PhysicsModel
 from vrdp_prob.models.simulator.worlds import Worlds
@@ -145,14 +145,22 @@ class Batch:
     def simulated(self, change: Change, body: int) -> WorldDraws:
         """The same, simulated anew and not kept."""
         model, own = self._extended[1], self.seen.on_own_course
-        intervention = Intervention(change, body, self._acting, self.chance.numbers(Purpose.MEANING))
+        intervention = Intervention(change, body, self._acting, self.meanings(change))
         kept = Counterfactual(
             self.seen, self._acting, model, self.turning, self.scattering, intervention=intervention
         ).run()
         if not own.any():
             return kept
-        intervention = Intervention(change, body, self._extended[0], self.chance.numbers(Purpose.MEANING))
+        intervention = Intervention(change, body, self._extended[0], self.meanings(change))
         return kept.with_draws(own, changed_course(self.common.sight, intervention, model, own, self.seen.events))
+
+    def meanings(self, change: Change) -> Int[np.ndarray, "draw"]:
+        """Which of the meanings of its word each draw takes."""
+        if not change.is_uncertain:
+            return np.zeros(len(self), dtype=int)
+        probabilities = np.array([meaning.probability for meaning in change.meanings])
+        numbers = self.chance.numbers(Purpose.MEANING)
+        return numbers.choice(np.arange(len(probabilities)), len(self), p=probabilities)
 
     def turning(self, body: int, time: float) -> tuple[Float[np.ndarray, "draw"], Float[np.ndarray, "draw"]]:
         """Angle (rad) and spin (rad/s) of a body in every draw.

@@ -108,6 +108,11 @@ class Change:
         """Whether the object is taken away."""
         return not self.meanings
 
+    @property
+    def is_uncertain(self) -> bool:
+        """Whether the word may mean several things."""
+        return len(self.meanings) > 1
+
     def __str__(self) -> str:
         return self.word
 

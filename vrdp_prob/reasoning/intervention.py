@@ -9,7 +9,6 @@ from jaxtyping import Bool, Float, Int
 
 from vrdp_prob.models.effects.body_friction import FRICTION_RATIO
 from vrdp_prob.models.simulator.worlds import Worlds
-from vrdp_prob.reasoning.chance import Random
 from vrdp_prob.reasoning.changes import Change, PhysicalParameter
 from vrdp_prob.reasoning.facts import MOVING_SPEED
 
@@ -28,16 +27,12 @@ class Intervention:
         What is done, to which body.
     worlds
         The draws before it.
-    numbers
-        Picks the meaning of each draw where the word may mean several things.
+    taken
+        Which of the meanings of its word each draw takes.
     """
 
-    def __init__(self, change: Change, body: int, worlds: Worlds, numbers: Random) -> None:
-        self.change, self.body, self._before = change, body, worlds
-        self._taken: Int[np.ndarray, "draw"] = np.zeros(len(worlds), dtype=int)
-        if len(change.meanings) > 1:
-            probabilities = np.array([meaning.probability for meaning in change.meanings])
-            self._taken = numbers.choice(np.arange(len(probabilities)), len(worlds), p=probabilities)
+    def __init__(self, change: Change, body: int, worlds: Worlds, taken: Int[np.ndarray, "draw"]) -> None:
+        self.change, self.body, self._before, self._taken = change, body, worlds, taken
 
     @cached_property
     def worlds(self) -> Worlds:

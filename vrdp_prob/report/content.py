@@ -5,7 +5,6 @@ the player's data are renderings of it. So each rendering is tested with content
 """
 
 from dataclasses import dataclass
-from enum import StrEnum
 
 import numpy as np
 from jaxtyping import Bool, Float, Int, UInt8
@@ -52,14 +51,9 @@ class AnswerContent:
         }
 
 
-class WorldKind(StrEnum):
-    """What is done to a world; the future begins where the video ends."""
-
-    FACTUAL = "factual"
-    FUTURE = "future"
-    REMOVED = "removed"
-    HEAVIER = "heavier"
-    LIGHTER = "lighter"
+FACTUAL, FUTURE, REMOVED = "factual", "future", "removed"
+"""Kinds of worlds; the future begins where the video ends. Any other kind is the word for what one object is: heavier,
+lighter, or as was learned."""
 
 
 @dataclass(frozen=True)
@@ -114,7 +108,7 @@ class WorldContent:
     Parameters
     ----------
     kind
-        What is done to the world.
+        `factual`, `future`, or the word for what is done to one body: `removed`, `heavier`, a learned word.
     body
         Id of the body that it is done to, None for the factual world and its future.
     times
@@ -134,7 +128,7 @@ class WorldContent:
         If a trajectory is not finite.
     """
 
-    kind: WorldKind
+    kind: str
     body: str | None
     times: Float[np.ndarray, "time"]
     trajectory: Float[np.ndarray, "draw time body 3"]
@@ -149,7 +143,7 @@ class WorldContent:
     @property
     def key(self) -> str:
         """Name of the world within its report."""
-        return str(self.kind) if self.body is None else f"{self.kind}:{self.body}"
+        return self.kind if self.body is None else f"{self.kind}:{self.body}"
 
     @property
     def draws(self) -> int:
@@ -229,6 +223,6 @@ class ReportContent:
     misfit: Misfit | None = None
     sensitivities: tuple[Sensitivity, ...] = ()
 
-    def world(self, kind: WorldKind) -> WorldContent | None:
+    def world(self, kind: str) -> WorldContent | None:
         """The first world of a kind, None where there is none."""
-        return next((world for world in self.worlds if world.kind is kind), None)
+        return next((world for world in self.worlds if world.kind == kind), None)

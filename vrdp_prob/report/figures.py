@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from vrdp_prob.report.content import ReportContent, WorldContent, WorldKind
+from vrdp_prob.report.content import FACTUAL, FUTURE, ReportContent, WorldContent
 from vrdp_prob.report.wording import color_of, tags
 from vrdp_prob.scene import Camera
 from vrdp_prob.scene.camera import REST_HEIGHT
@@ -118,8 +118,8 @@ def _height(content: ReportContent) -> float:
 def _rollouts(
     content: ReportContent, index: int, projection: Projection, size: tuple[int, int]
 ) -> tuple[list[str], list[str], list[tuple[float, float]]]:
-    seen = _paths(content.world(WorldKind.FACTUAL), index, projection)
-    future = _paths(content.world(WorldKind.FUTURE), index, projection)
+    seen = _paths(content.world(FACTUAL), index, projection)
+    future = _paths(content.world(FUTURE), index, projection)
     ends = [_points(path[-1:])[0] for path in future if _inside(path[-1], size)]
     return _drawn(seen, size), _drawn(future, size), ends
 

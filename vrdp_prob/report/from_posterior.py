@@ -10,7 +10,7 @@ from vrdp_prob.inference.posterior import Posterior
 from vrdp_prob.inference.prior_sensitivity import prior_sensitivity
 from vrdp_prob.progress import ProgressDisplay
 from vrdp_prob.reasoning.answer import Answer
-from vrdp_prob.reasoning.vocabulary import ChangeWord
+from vrdp_prob.reasoning.vocabulary import ChangeWord, Vocabulary
 from vrdp_prob.reasoning.worlds import PosteriorWorlds
 from vrdp_prob.report.asked import world_of
 from vrdp_prob.report.content import AnswerContent, ReportContent
@@ -46,12 +46,12 @@ def build(
     draws
         Number of posterior draws that the player shows, evenly spaced over the posterior.
     words
-        Learned words; the player shows what a built-in word among them means now.
+        Learned words; the player shows each body as they say, too.
     progress
         Told how far the work is.
     """
-    tracks = posterior.tracks
-    asked = tuple(AnswerContent.of(answer, world_of(answer, tracks.bodies)) for answer in answers)
+    tracks, vocabulary = posterior.tracks, Vocabulary.of(words)
+    asked = tuple(AnswerContent.of(answer, world_of(answer, tracks.bodies, vocabulary)) for answer in answers)
     led_to = {item.world for item in asked if item.world is not None}
     few = PosteriorWorlds(posterior, draws=draws, progress=progress)
     return ReportContent(

@@ -9,7 +9,7 @@ from markupsafe import Markup
 from vrdp_prob.inference.summaries import PairSummary, ParameterSummary, Summary
 from vrdp_prob.reasoning.answer import Answer
 from vrdp_prob.report.axes import log_axis, unit_axis
-from vrdp_prob.report.content import AnswerContent, Footage, ReportContent, WorldKind
+from vrdp_prob.report.content import FACTUAL, FUTURE, AnswerContent, Footage, ReportContent
 from vrdp_prob.report.figures import FIGURE_DRAWS, still_figure
 from vrdp_prob.report.footage import still_uri
 from vrdp_prob.report.payload import player_data
@@ -74,7 +74,7 @@ def _objects(content: ReportContent) -> list[dict[str, Any]]:
 def _opening(content: ReportContent) -> dict[str, Any]:
     footage = _seen_by_camera(content)
     draws = max((min(world.draws, FIGURE_DRAWS) for world in content.worlds[:2]), default=0)
-    future = content.world(WorldKind.FUTURE)
+    future = content.world(FUTURE)
     if footage is not None:
         caption = f"The frame at {seconds(footage.time)}. "
     else:
@@ -151,7 +151,7 @@ def _question(item: AnswerContent, content: ReportContent) -> dict[str, Any]:
         who = listed(f"the {name.get(body, body)}" for body in answer.relies_on_default)
         notes.insert(0, f"Rests on default values of {who}, which this video does not determine.")
     world = next((world for world in content.worlds if world.key == item.world), None)
-    if world is not None and world.kind is WorldKind.FACTUAL:
+    if world is not None and world.kind == FACTUAL:
         world = None  # the page opens with it
     label = "" if world is None else world_label(world, content.tracks)
     return {

@@ -89,7 +89,7 @@ def _world(world: WorldContent, content: ReportContent, reach: float) -> dict[st
     order = np.argsort(collisions.time, kind="stable")
     return {
         "key": world.key,
-        "kind": str(world.kind),
+        "kind": world.kind,
         "label": world_label(world, content.tracks),
         "group": world_group(world.kind),
         "body": world.body,

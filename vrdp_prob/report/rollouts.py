@@ -6,22 +6,16 @@ import numpy as np
 from jaxtyping import Float
 
 from vrdp_prob.reasoning.answer import monte_carlo_error
-from vrdp_prob.reasoning.changes import Change
+from vrdp_prob.reasoning.changes import BUILT_IN
 from vrdp_prob.reasoning.events import EventTable
 from vrdp_prob.reasoning.timeline import WorldDraws
 from vrdp_prob.reasoning.vocabulary import ChangeWord
 from vrdp_prob.reasoning.worlds import PosteriorWorlds
-from vrdp_prob.report.content import Collisions, PairShare, WorldContent, WorldKind
+from vrdp_prob.report.content import FACTUAL, FUTURE, Collisions, PairShare, WorldContent
 from vrdp_prob.scene import Tracks
 
 MOST_FRAMES = 500
 """Most moments of a world that travel inside the page; longer recordings are thinned."""
-
-_KINDS = {
-    Change.REMOVED: WorldKind.REMOVED,
-    Change.HEAVIER: WorldKind.HEAVIER,
-    Change.LIGHTER: WorldKind.LIGHTER,
-}
 
 
 def player_worlds(
@@ -31,7 +25,7 @@ def player_worlds(
     many: PosteriorWorlds | None = None,
     words: Sequence[ChangeWord] = (),
 ) -> tuple[WorldContent, ...]:
-    """The video, what happens next, and the video with each body removed, heavier and lighter.
+    """The video, what happens next, and the video with each body removed, heavier, lighter, and as learned words say.
 
     Parameters
     ----------
@@ -41,17 +35,15 @@ def player_worlds(
         Keys of the worlds that answers come from, and the draws that these were counted in: such a world is shown by an
         even choice of those, and its probabilities are theirs.
     words
-        Learned words, in place of the built-in ones that they redefine.
+        Learned words, which may redefine built-in ones.
     """
     count = few.draws
     first = _factual(many or few, count)
     shown = [first] if first is not None else []
-    key = str(WorldKind.FUTURE)
-    source = _source(key, few, asked, many)
-    shown.append(_simulated(source.future, source.effective_draws, count, WorldKind.FUTURE))
-    learned = {word.change.word: word.change for word in words}
-    for built_in, kind in _KINDS.items():
-        change = learned.get(built_in.word, built_in)
+    source = _source(FUTURE, few, asked, many)
+    shown.append(_simulated(source.future, source.effective_draws, count, FUTURE))
+    changes = {change.word: change for change in (*BUILT_IN, *(word.change for word in words))}
+    for kind, change in changes.items():
         for place, body in enumerate(few.bodies):
             source = _source(f"{kind}:{body.id}", few, asked, many)
             world = source.counterfactual(change, place)
@@ -72,7 +64,7 @@ def _factual(worlds: PosteriorWorlds, count: int) -> WorldContent | None:
     tracks = worlds.posterior.tracks
     draws, frames = fine[_evenly(len(fine), count)], _evenly(len(tracks.times), MOST_FRAMES)
     return WorldContent(
-        WorldKind.FACTUAL,
+        FACTUAL,
         None,
         tracks.times[frames],
         rollout.trajectory.numpy()[draws][:, frames].astype(float),
@@ -83,7 +75,7 @@ def _factual(worlds: PosteriorWorlds, count: int) -> WorldContent | None:
 
 
 def _simulated(
-    world: WorldDraws, effective_draws: float, count: int, kind: WorldKind, body: str | None = None
+    world: WorldDraws, effective_draws: float, count: int, kind: str, body: str | None = None
 ) -> WorldContent:
     draws, frames = _evenly(len(world.trajectory), count), _evenly(len(world.times), MOST_FRAMES)
     return WorldContent(

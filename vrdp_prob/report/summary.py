@@ -1,7 +1,7 @@
 """The report in one paragraph: what is there, what happened, whether to trust it, how much is in doubt."""
 
 from vrdp_prob.reasoning.answer import Answer
-from vrdp_prob.report.content import AnswerContent, ReportContent, WorldKind
+from vrdp_prob.report.content import FACTUAL, AnswerContent, ReportContent
 from vrdp_prob.report.wording import counted, listed, number_word, percent, seconds, sentence
 from vrdp_prob.scene import QuestionType
 from vrdp_prob.scene.naming import names
@@ -49,7 +49,7 @@ def _objects(content: ReportContent) -> str:
 
 
 def _collisions(content: ReportContent) -> list[str]:
-    world = content.world(WorldKind.FACTUAL)
+    world = content.world(FACTUAL)
     if world is None:
         return []
     ids = [body.id for body in content.tracks.bodies]

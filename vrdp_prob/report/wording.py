@@ -6,7 +6,7 @@ import string
 from collections.abc import Iterable, Mapping, Sequence
 
 from vrdp_prob.inference.summaries import ParameterSummary, Summary
-from vrdp_prob.report.content import WorldContent, WorldKind
+from vrdp_prob.report.content import FACTUAL, FUTURE, REMOVED, WorldContent
 from vrdp_prob.scene import Body, Tracks
 from vrdp_prob.scene.body import COLORS
 from vrdp_prob.scene.naming import names
@@ -56,25 +56,19 @@ def color_of(body: Body, index: int) -> str:
 
 def world_label(world: WorldContent, tracks: Tracks) -> str:
     """What is shown in a world, in words."""
-    if world.kind is WorldKind.FACTUAL:
+    if world.kind == FACTUAL:
         return "What was seen"
-    if world.kind is WorldKind.FUTURE:
+    if world.kind == FUTURE:
         return "What happens next"
     name = names(tracks.bodies)[world.body or ""]
-    if world.kind is WorldKind.REMOVED:
+    if world.kind == REMOVED:
         return f"Without the {name}"
     return f"If the {name} were {world.kind}"
 
 
-def world_group(kind: WorldKind) -> str:
+def world_group(kind: str) -> str:
     """Heading under which the player lists a world."""
-    return {
-        WorldKind.FACTUAL: "This video",
-        WorldKind.FUTURE: "This video",
-        WorldKind.REMOVED: "One object removed",
-        WorldKind.HEAVIER: "One object heavier",
-        WorldKind.LIGHTER: "One object lighter",
-    }[kind]
+    return "This video" if kind in (FACTUAL, FUTURE) else f"One object {kind}"
 
 
 def listed(items: Iterable[str]) -> str:

@@ -9,6 +9,7 @@ from vrdp_prob.reasoning.explanation.explanation import Explanation, Part
 from vrdp_prob.reasoning.explanation.happenings import seen_quantities, world_quantities
 from vrdp_prob.reasoning.explanation.hinges import hinges
 from vrdp_prob.reasoning.explanation.information import answer_entropy
+from vrdp_prob.reasoning.explanation.meanings import meaning_quantities
 from vrdp_prob.reasoning.explanation.motions import FILMED_FRAMES, filmed, motion_quantities
 from vrdp_prob.reasoning.explanation.observations import Film, observations
 from vrdp_prob.reasoning.explanation.parameters import parameter_quantities, relevant_bodies
@@ -92,5 +93,5 @@ def _quantities(facts: Facts, worlds: list[World]) -> list[Quantity]:
         found |= {quantity.name: quantity for quantity in world_quantities(facts, world, name)}
         if isinstance(facts, PosteriorWorlds):
             own = [*parameter_quantities(facts, world, name), *motion_quantities(facts, world, name)]
-            found |= {quantity.name: quantity for quantity in own}
+            found |= {quantity.name: quantity for quantity in [*own, *meaning_quantities(facts, world)]}
     return list(found.values())

@@ -19,7 +19,7 @@ class Shares:
     Parameters
     ----------
     parameters
-        Would go if masses, restitutions, friction and the turning of cubes were known.
+        Would go if masses, restitutions, friction and the turning of cubes were known, and what learned words mean.
     events
         Would then go if it were known which doubtful contacts and rests of the video happened, and who looks how.
     motion
@@ -28,6 +28,8 @@ class Shares:
         Would remain even then: what is too small to be measured decides.
     error
         Monte Carlo standard error of the sums: of `parameters`, of it with `events`, and of `chaos`.
+    words
+        Learned words of the question that may mean several things.
     """
 
     parameters: float
@@ -35,12 +37,14 @@ class Shares:
     motion: float
     chaos: float
     error: float
+    words: tuple[str, ...] = ()
 
     @property
     def sentence(self) -> str:
         """In whole per cent, with what each share means."""
+        meaning = f", and from what '{self.words[0]}' means" if self.words else ""
         parts = (
-            (self.parameters, "comes from masses, restitutions, friction and the turning of cubes"),
+            (self.parameters, f"comes from masses, restitutions, friction and the turning of cubes{meaning}"),
             (self.events, "comes from doubtful contacts, rests and attributes"),
             (self.motion, f"would go if the motion were measured {PRECISER:.0f} times as exactly"),
             (self.chaos, "would remain even then (chaos)"),

@@ -19,6 +19,7 @@ class Kind(StrEnum):
     MOTION = "motion"
     EVENT = "event"
     ATTRIBUTE = "attribute"
+    MEANING = "meaning"
 
 
 @dataclass(frozen=True)

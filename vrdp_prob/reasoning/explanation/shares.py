@@ -71,7 +71,7 @@ class Twins:
         codes, valid
             Its answers, and where they make sense.
         """
-        found = []
+        found, words = [], set[str]()
         for verdict_of_twins in self._verdicts:
             if not verdict_of_twins:
                 return None
@@ -80,13 +80,13 @@ class Twins:
             if both.sum() < FEWEST:
                 return None
             found.append(_kappa(codes[both], twin.codes[both]))
+            words |= _uncertain_words(twin)
         kappa = np.clip([one for one, _ in found], 0, 1)
         shared = np.maximum.accumulate(kappa)
         scale = np.sqrt(max(len(codes) / self._draws, 1.0))
         error = scale * max(error for _, error in found)
-        return Shares(
-            float(shared[0]), float(shared[1] - shared[0]), float(shared[2] - shared[1]), float(1 - shared[2]), error
-        )
+        parameters, events, motion, chaos = np.diff(shared, prepend=0.0, append=1.0).tolist()
+        return Shares(parameters, events, motion, chaos, error, tuple(sorted(words)))
 
 
 def _verdicts(worlds: PosteriorWorlds, asked: PreparedQuestion) -> Sequence[Verdict]:
@@ -94,6 +94,11 @@ def _verdicts(worlds: PosteriorWorlds, asked: PreparedQuestion) -> Sequence[Verd
         return verdicts(worlds, asked)
     except InputError:
         return ()
+
+
+def _uncertain_words(verdict: Verdict) -> set[str]:
+    changes = [world[0] for world in verdict.run.looked_at if not isinstance(world, str)]
+    return {str(change) for change in changes if change.is_uncertain}
 
 
 def _kappa(codes: Int[np.ndarray, "draw"], twin: Int[np.ndarray, "draw"]) -> tuple[float, float]:

@@ -62,6 +62,7 @@ def learn_concepts(
         Path | None,
         typer.Option(metavar="DIR", help="Keeps what is done, to go on from; by default a folder beside the file."),
     ] = None,
+    processes: Processes = None,
     camera: CameraOption = None,
     seed: Seed = 0,
     quiet: Quiet = False,
@@ -75,6 +76,7 @@ def learn_concepts(
         camera=camera,
         seed=seed,
         checkpoint=checkpoint or out.with_name(f"{out.name}-checkpoint"),
+        processes=processes,
         progress=progress_display(quiet=quiet),
     )
     write_concepts(out, learned.concepts)

@@ -1,11 +1,15 @@
 """Concepts learned from a folder of videos and a question file; broken off, it can go on."""
 
+import os
 from collections.abc import Mapping
+from concurrent.futures import as_completed
 from dataclasses import dataclass
 from functools import cached_property
 from hashlib import sha256
 from itertools import chain
 from pathlib import Path
+
+import torch
 
 from vrdp_prob.concepts.perceived.examples import Example, examples_of
 from vrdp_prob.concepts.perceived.learning import Learned, learn, vocabulary_of
@@ -14,10 +18,13 @@ from vrdp_prob.concepts.perceived.observation import Observation
 from vrdp_prob.datasets import check_scenes, find_camera, questions_about, video_files
 from vrdp_prob.datasets.loading import CameraChoice
 from vrdp_prob.errors import InputError
-from vrdp_prob.inference.checkpoint import Checkpoint, film_facts, program_facts
+from vrdp_prob.inference.checkpoint import Arrays, Checkpoint, film_facts, program_facts
 from vrdp_prob.perception.reading import see_video
 from vrdp_prob.progress import ProgressDisplay, SilentProgress
 from vrdp_prob.scene import Camera
+from vrdp_prob.workers import local_workers
+
+OBSERVATION = "observation"
 
 
 @dataclass(frozen=True)
@@ -42,6 +49,7 @@ def learn_from_files(
     camera: CameraChoice = None,
     seed: int = 0,
     checkpoint: Path | None = None,
+    processes: int | None = None,
     progress: ProgressDisplay | None = None,
 ) -> Learned:
     """Learn concepts from the descriptive and explanatory questions of a file that have their answers.
@@ -55,6 +63,8 @@ def learn_from_files(
     checkpoint
         Folder that keeps what was seen and learned. The same call again, after an interruption, goes on from there and
         ends with the same numbers.
+    processes
+        Videos that are looked at at a time; as many as there are cores where None.
     progress
         Told of each video and epoch.
 
@@ -67,7 +77,8 @@ def learn_from_files(
     shown = films(folder, questions, scenes=scenes, camera=camera)
     vocabulary_of(chain.from_iterable(film.examples for film in shown.values()))
     kept = None if checkpoint is None else Checkpoint(checkpoint / "networks", facts(shown, seed))
-    videos = look_at(shown, checkpoint=None if checkpoint is None else checkpoint / "videos", progress=progress)
+    seen = None if checkpoint is None else checkpoint / "videos"
+    videos = look_at(shown, checkpoint=seen, processes=processes, progress=progress)
     return learn(videos, seed=seed, checkpoint=kept, progress=progress)
 
 
@@ -105,7 +116,11 @@ def films(
 
 
 def look_at(
-    shown: Mapping[str, Film], *, checkpoint: Path | None = None, progress: ProgressDisplay | None = None
+    shown: Mapping[str, Film],
+    *,
+    checkpoint: Path | None = None,
+    processes: int | None = None,
+    progress: ProgressDisplay | None = None,
 ) -> dict[str, Taught]:
     """What is seen of each video, with what is asked about it.
 
@@ -115,6 +130,8 @@ def look_at(
         The videos.
     checkpoint
         Folder that keeps what was seen, so that no video is looked at twice.
+    processes
+        Videos that are looked at at a time; as many as there are cores where None.
     progress
         Told of each video.
 
@@ -123,12 +140,22 @@ def look_at(
     InputError
         If a video is unusable, or `checkpoint` belongs to other videos.
     """
-    found = {}
+    kept = {} if checkpoint is None else {name: Checkpoint(checkpoint / name, shown[name].facts) for name in shown}
+    seen: dict[str, Arrays] = {
+        name: arrays for name, one in kept.items() if (arrays := one.arrays(OBSERVATION)) is not None
+    }
+    waiting = [name for name in shown if name not in seen]
     with (progress or SilentProgress()).stage("Looking at videos", total=len(shown)) as advance:
-        for name, film in shown.items():
-            found[name] = Taught(_seen(film, checkpoint), film.examples)
-            advance(1)
-    return found
+        advance(len(seen))
+        with local_workers(min(processes or os.cpu_count() or 1, max(len(waiting), 1))) as workers:
+            looking = {workers.submit(_observed, shown[name].file, shown[name].camera): name for name in waiting}
+            for future in as_completed(looking):
+                name = looking[future]
+                seen[name] = future.result()
+                if name in kept:
+                    kept[name].keep(OBSERVATION, seen[name])
+                advance(1)
+    return {name: Taught(Observation.of_arrays(seen[name]), film.examples) for name, film in shown.items()}
 
 
 def facts(shown: Mapping[str, Film], seed: int) -> dict[str, str]:
@@ -162,13 +189,7 @@ def _camera(file: Path, camera: CameraChoice) -> Camera:
     return found
 
 
-def _seen(film: Film, folder: Path | None) -> Observation:
-    """What is seen of a video, read where it was kept."""
-    if folder is None:
-        return Observation.of(see_video(film.file, film.camera))
-    kept = Checkpoint(folder / film.file.stem, film.facts)
-    arrays = kept.arrays("observation")
-    if arrays is None:
-        arrays = Observation.of(see_video(film.file, film.camera)).arrays
-        kept.keep("observation", arrays)
-    return Observation.of_arrays(arrays)
+def _observed(file: Path, camera: Camera) -> Arrays:
+    """What is seen of a video; it runs in a process of its own."""
+    torch.set_num_threads(1)
+    return Observation.of(see_video(file, camera)).arrays

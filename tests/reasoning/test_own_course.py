@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from sliding_discs import Disc, KnownPosterior, changed, path, tracks_of
 
+from vrdp_prob.models.simulator.events import RolloutEventKind
 from vrdp_prob.reasoning import Change, PosteriorWorlds
 from vrdp_prob.reasoning.contacts import Contact
 from vrdp_prob.reasoning.own_course import OwnCourses
@@ -61,6 +62,23 @@ def test_a_doubtful_contact_happens_where_the_draw_has_it() -> None:
     assert met[:, 0].all()
     assert not met[:, 1].any()
     assert met[:, 2].all()
+
+
+def test_a_pair_may_have_met_twice() -> None:
+    """Disc 1 comes back from the heavy disc 2, so that disc 0 hits it again."""
+    discs = (DISCS[0], replace(DISCS[1], position=(0.0, 0.0)), Disc((0.9, 0.0), mass=8.0))
+    posterior = KnownPosterior(tracks_of(discs, FRAMES), discs, spread=0.0)
+    sight = Sight(posterior.tracks)
+    released = PosteriorWorlds(posterior, draws=DRAWS).batches[0].released
+    events = released.rollout.events.of_kind(RolloutEventKind.COLLISION)
+    times = np.unique(events.time[(events.first == 0) & (events.second == 1)].round(3))
+    assert len(times) == 2
+    between = float(events.time[(events.first == 1) & (events.second == 2)][0])
+    seen = (Contact(0, 1, times[0], 9.0), Contact(1, 2, between, 9.0), Contact(0, 1, times[1], 9.0))
+    object.__setattr__(sight, "contacts", seen)
+    assert courses(posterior, sight).as_seen.all()
+    object.__setattr__(sight, "contacts", (*seen[:2], replace(seen[2], time=times[1] + 0.5)))
+    assert not courses(posterior, sight).as_seen.any()
 
 
 def test_a_change_is_simulated_from_the_release_on() -> None:

@@ -17,7 +17,7 @@ from vrdp_prob.models.physics import PhysicsModel
 from vrdp_prob.models.simulator.events import EventTable as RolloutEvents
 from vrdp_prob.models.simulator.events import RolloutEventKind
 from vrdp_prob.models.simulator.worlds import Worlds
-from vrdp_prob.reasoning.contacts import EDGE
+from vrdp_prob.reasoning.contacts import EDGE, Contact
 from vrdp_prob.reasoning.events import EventTable
 from vrdp_prob.reasoning.intervention import Intervention
 from vrdp_prob.reasoning.released import Released
@@ -53,7 +53,7 @@ class OwnCourses:
         """Which contacts that were seen, for sure or in doubt, happen in each draw."""
         met = np.zeros((len(self.released.worlds), len(self.sight.contacts)), dtype=bool)
         for place, contact in enumerate(self.sight.contacts):
-            met[self._collisions.world[self._like(contact.first, contact.second, contact.time)], place] = True
+            met[self._collisions.world[_like(self._collisions, contact)], place] = True
         return met
 
     @cached_property
@@ -61,32 +61,35 @@ class OwnCourses:
         """Draws in which all happens that was seen for sure, and nothing that would have been seen."""
         sure = np.array([contact.probability > SURE for contact in self.sight.contacts], dtype=bool)
         as_seen = self.released.rollout.fine & self.met[:, sure].all(axis=1)
-        as_seen[self._collisions.world[self._strange]] = False
+        as_seen[self._strange.world] = False
         return np.asarray(as_seen)
 
     @cached_property
     def _collisions(self) -> RolloutEvents:
-        """First collisions of each pair in each draw."""
-        events = self.released.rollout.events.of_kind(RolloutEventKind.COLLISION)
-        pairs = np.stack([events.world, events.first, events.second], axis=1)
-        _, first = np.unique(pairs, axis=0, return_index=True)
-        return events.where(np.sort(first))
-
-    def _like(self, first: int, second: int, time: float) -> Bool[np.ndarray, "collision"]:
-        """Collisions of a pair at about a time (s)."""
-        events = self._collisions
-        return (events.first == first) & (events.second == second) & (np.abs(events.time - time) < SAME_TIME)
+        """Collisions in each draw, in order of time."""
+        return self.released.rollout.events.of_kind(RolloutEventKind.COLLISION)
 
     @property
-    def _strange(self) -> Bool[np.ndarray, "collision"]:
-        """Collisions that nobody saw although both bodies were seen before and after them."""
-        events, tracks = self._collisions, self.sight.tracks
+    def _strange(self) -> RolloutEvents:
+        """First collisions of a pair that nobody saw although both bodies were seen before and after them.
+
+        Later ones may belong to an unbroken series: bodies that press on each other touch again and again.
+        """
+        pairs = np.stack([self._collisions.world, self._collisions.first, self._collisions.second], axis=1)
+        events = self._collisions.where(np.sort(np.unique(pairs, axis=0, return_index=True)[1]))
+        tracks = self.sight.tracks
         begin = np.maximum(tracks.first_seen[events.first], tracks.first_seen[events.second]) + EDGE
         end = np.minimum(tracks.last_seen[events.first], tracks.last_seen[events.second]) - EDGE
         strange = (events.time > begin) & (events.time < end)
         for contact in self.sight.contacts:
-            strange &= ~self._like(contact.first, contact.second, contact.time)
-        return np.asarray(strange)
+            strange &= ~_like(events, contact)
+        return events.where(strange)
+
+
+def _like(events: RolloutEvents, contact: Contact) -> Bool[np.ndarray, "collision"]:
+    """Which collisions are of the pair of a contact, and at about its time."""
+    pair = (events.first == contact.first) & (events.second == contact.second)
+    return np.asarray(pair & (np.abs(events.time - contact.time) < SAME_TIME))
 
 
 def changed_course(

@@ -46,6 +46,21 @@ class TwoModes:
 
 
 @dataclass(frozen=True)
+class Needle:
+    """A density that is flat and much narrower than the fit knows, so that walkers set out in one place and stay."""
+
+    dimension: int = 8
+    width: float = 1e-9
+
+    def __call__(self, points: torch.Tensor) -> torch.Tensor:
+        return -1e6 * ((points**2).sum(dim=1) / self.width**2 - 1).clamp(0.0, 1.0)
+
+    @property
+    def start(self) -> Mixture:
+        return Mixture.of(cloud(np.zeros(self.dimension), 1.0))
+
+
+@dataclass(frozen=True)
 class Hopeless:
     """A density that no importance sampling from a Gaussian at its mode can follow: a funnel in many dimensions."""
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import torch
 
-from tests.inference.densities import TwoModes
+from tests.inference.densities import Needle, TwoModes
 from vrdp_prob.inference.curved_gaussian import CurvedGaussian
 from vrdp_prob.inference.emcee_sampler import sample_emcee
 from vrdp_prob.inference.laplace import sample_laplace
@@ -40,6 +40,12 @@ class SkewedRidge:
     def start(self) -> Mixture:
         scales = np.array([0.5] + [1.0] * (DIMENSION - 1))
         return Mixture.of(CurvedGaussian.straight(Gaussian(np.zeros(DIMENSION), self.root * scales)))
+
+
+def test_walkers_that_cannot_move_leave_draws_that_are_not_trusted() -> None:
+    samples = sample_laplace(Needle(), Needle().start, draws=400, generator=np.random.default_rng(0))
+    assert np.isfinite(samples.points).all()
+    assert not assess("laplace", samples).converged
 
 
 @pytest.mark.parametrize("name", SAMPLERS)

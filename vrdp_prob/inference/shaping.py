@@ -52,6 +52,8 @@ EFFECTIVE_PER_DIMENSION = 8.0
 REFINEMENTS = 2
 JITTER = 0.1
 """Distance, in standard deviations, by which chains set out from where a walker was."""
+LEAST_VARIANCE = 1e-4
+"""Variance along an axis, relative to what it was, that is left at least after the cloud has taken a new shape."""
 CUT = 0.7
 """Variance along an axis, relative to the curvature's, below which something else than curvature bounds it."""
 
@@ -284,17 +286,20 @@ def _fitted(
 
     Eigenvalues that so many draws of the cloud itself would show by chance are taken for 1, the others freed of what
     chance adds to them. Source: Donoho, Gavish and Johnstone, Optimal shrinkage of eigenvalues in the spiked covariance
-    model, Annals of Statistics 46 (2018).
+    model, Annals of Statistics 46 (2018). Walkers that hardly moved lie in fewer places than there are axes, and say
+    nothing of how short an axis is.
     """
+    lengths_are_told = len(np.unique(whitened, axis=0)) > cloud.dimension
     mean = weights @ whitened
     centred = whitened - mean
     values, vectors = np.linalg.eigh((centred * weights[:, None]).T @ centred)
     ratio = min(cloud.dimension / independent, 0.9)
-    beyond = (values > (1 + ratio**0.5) ** 2) | (values < (1 - ratio**0.5) ** 2)
+    beyond = (values > (1 + ratio**0.5) ** 2) | (lengths_are_told & (values < (1 - ratio**0.5) ** 2))
     sums = values + 1 - ratio
     roots = np.sqrt(np.maximum(sums**2 - 4 * values, 0.0))
     freed = np.where(beyond, (sums + np.where(values > 1, roots, -roots)) / 2, 1.0)
-    return cloud.moved(mean, (vectors * np.maximum(freed, values / 4)) @ vectors.T)
+    variances = np.maximum(np.maximum(freed, values / 4), LEAST_VARIANCE)
+    return cloud.moved(mean, (vectors * variances) @ vectors.T)
 
 
 def _good_share(drawn: Weighted) -> float:

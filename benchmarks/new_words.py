@@ -113,7 +113,7 @@ def teach(task: tuple[int, Path]) -> Result:
         return {"scene": scene, "failed": f"{type(error).__name__}: {error}"}
     for word in BUILT_IN:
         (question,) = questions_with(word, scene)
-        several = [question, answers_of_the_video(question, scene)] if word == "heavier" else [question]
+        several = [[question], [answers_of_the_video(question, scene)]] if word == "heavier" else [[question]]
         told = agreements_of(word, posterior, several, draws=DRAWS, seed=0)
         found |= dict(zip((word, UNCHANGED), (one.draws.tolist() for one in told), strict=False))
     return {"scene": scene, "agreements": found}
@@ -139,7 +139,7 @@ def ask(task: tuple[int, Path, Mapping[str, Mapping[int, LearnedWord]]]) -> Resu
 def learned(word: str, taught: Sequence[Result]) -> LearnedWord:
     """The word that some videos teach."""
     agreements = [Agreement(np.array(one["agreements"][word])) for one in taught]
-    return word_of(word, agreements, videos=len(agreements), draws=DRAWS, seed=0)
+    return word_of(word, agreements, examples=len(agreements), draws=DRAWS, seed=0)
 
 
 def in_random_orders(taught: Sequence[Result]) -> dict[str, dict[int, list[LearnedWord]]]:

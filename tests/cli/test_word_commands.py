@@ -77,6 +77,20 @@ def test_files_that_cannot_teach(tmp_path: Path, capsys: pytest.CaptureFixture[s
     assert "not a JSON file" in refused(capsys, "learn-word", "faster", tmp_path, "--questions", questions)
 
 
+def test_answers_that_a_question_cannot_have(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    questions = write_videos(tmp_path, "faster", faster, [ROW])
+    document = json.loads(questions.read_text())
+    (judged,) = (question for question in document[0]["questions"] if "choices" in question)
+    learn = ["learn-word", "faster", tmp_path, "--questions", questions, "--out", tmp_path / "faster.json"]
+    judged["choices"][0]["answer"] = "perhaps"
+    questions.write_text(json.dumps(document))
+    assert "is judged 'perhaps'; judge it 'correct' or 'wrong'" in refused(capsys, *learn)
+    asked = "Would the red cylinder hit the blue cylinder if the red cylinder were faster?"
+    document[0]["questions"] = [{"question_id": 0, "question": asked, "answer": "maybe"}]
+    questions.write_text(json.dumps(document))
+    assert "the answer 'maybe' is none that this question can have; give 'yes' or 'no'" in refused(capsys, *learn)
+
+
 @pytest.mark.slow
 def test_learn_word_then_evaluate_with_it(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     questions = write_videos(tmp_path, "faster", faster, [ROW])

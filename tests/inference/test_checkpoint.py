@@ -41,6 +41,20 @@ def sampled(name: str, folder: Path | None) -> tuple[Samples, float]:
     return samples, float(generator.random())
 
 
+def test_a_folder_belongs_to_the_first_run_that_keeps_something_in_it(tmp_path: Path) -> None:
+    first, other = (Checkpoint(tmp_path, {"seed": seed}) for seed in "34")
+    first.keep("part", {"a": np.ones(2)})
+    with pytest.raises(InputError, match="belongs to another run"):
+        Checkpoint(tmp_path, {"seed": "4"})
+    assert first.arrays("part", ("a",)) is not None
+    assert first.arrays("part", ("a", "b")) is None
+    for damaged in ("[]", "{"):
+        (tmp_path / "fingerprint.json").write_text(damaged)
+        assert other.arrays("part") is None  # nobody knows whose it is
+    Checkpoint(tmp_path, {"seed": "4"}).keep("part", {"a": np.zeros(2)})
+    assert Checkpoint(tmp_path, {"seed": "4"}).arrays("part") is not None
+
+
 @pytest.mark.parametrize("name", ENOUGH)
 def test_a_run_that_was_killed_ends_with_the_same_numbers(name: str, tmp_path: Path) -> None:
     folder = tmp_path / "checkpoint"
@@ -74,7 +88,7 @@ def test_a_run_that_was_killed_ends_with_the_same_numbers(name: str, tmp_path: P
 
 
 def test_another_run_is_refused_by_name_of_what_differs(tmp_path: Path) -> None:
-    Checkpoint(tmp_path, {"seed": "1", "draws": "400"})
+    Checkpoint(tmp_path, {"seed": "1", "draws": "400"}).keep("part", {"a": np.ones(2)})
     with pytest.raises(InputError, match=r"belongs to another run \(other draws, sampler\)"):
         Checkpoint(tmp_path, {"seed": "1", "draws": "500", "sampler": "nuts"})
 

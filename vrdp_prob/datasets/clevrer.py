@@ -162,7 +162,8 @@ def check_scenes(path: Path | str, scenes: tuple[int, int] | None, found: Sized)
     if not found:
         index = scene_indices(path)
         first, last = min(index.values()), max(index.values())
-        raise InputError(f"{path}: no scene from {scenes} is in the file, which holds {first} to {last}.")
+        wanted = "" if scenes is None else f" from {scenes[0]} to {scenes[1] - 1}"
+        raise InputError(f"{path}: no scene{wanted} is in the file, which holds {first} to {last}.")
 
 
 def _scenes(path: Path | str) -> list[tuple[str, Document]]:
@@ -223,6 +224,8 @@ def _question(place: str, entry: Any) -> Question:
             answer=None if answer is None else str(answer),
             labels={"question_subtype": entry["question_subtype"]} if "question_subtype" in entry else None,
         )
+    except InputError as error:
+        raise InputError(f"{place}, question {entry.get('question_id', '?')}: {error}") from error
     except (KeyError, TypeError, AttributeError, ValueError) as error:
         name = entry.get("question_id", "?") if isinstance(entry, Mapping) else "?"
         raise InputError(

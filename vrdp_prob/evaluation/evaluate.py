@@ -7,9 +7,9 @@ from concurrent.futures import as_completed
 from dataclasses import dataclass
 from functools import cached_property
 from hashlib import sha256
-from itertools import chain
 from pathlib import Path
 
+from vrdp_prob.concepts.perceived.concepts import Concepts
 from vrdp_prob.concepts.perceived.storage import read_concepts
 from vrdp_prob.datasets import (
     check_scenes,
@@ -31,7 +31,7 @@ from vrdp_prob.inference.checkpoint import Checkpoint, film_facts, model_facts, 
 from vrdp_prob.models.physics import PhysicsModel
 from vrdp_prob.models.simulator.rollout import compile_model
 from vrdp_prob.progress import ProgressDisplay, SilentProgress
-from vrdp_prob.reasoning.prepared import prepare
+from vrdp_prob.reasoning.prepared import check_answer, prepare
 from vrdp_prob.reasoning.vocabulary import ChangeWord, Vocabulary
 from vrdp_prob.reasoning.worlds import DRAWS
 from vrdp_prob.scene import Question, Tracks
@@ -173,8 +173,7 @@ def evaluate(
     vocabulary = Vocabulary.of(words)
     asked = _asked(Path(questions), scenes, vocabulary)
     if learned is not None:
-        for question in chain.from_iterable(asked.values()):
-            learned.check_question(question, vocabulary)
+        _check_words(learned, asked, vocabulary, Path(questions))
     tasks = _tasks(Path(folder), asked, source, camera, settings)
     kept = {} if out is None else {task.scene: _checkpoint(Path(out), task) for task in tasks}
     done = {scene: result for scene, one in kept.items() if (result := _done(one)) is not None}
@@ -206,10 +205,22 @@ def _asked(path: Path, scenes: tuple[int, int] | None, vocabulary: Vocabulary) -
     for name, several in asked.items():
         for question in several:
             try:
-                prepare(question, (), vocabulary)
+                check_answer(prepare(question, (), vocabulary))
             except InputError as error:
                 raise InputError(f"{path}, {name}, question {question.question_id}: {error}") from error
     return {name: several for name, several in asked.items() if several}
+
+
+def _check_words(
+    learned: Concepts, asked: Mapping[str, Sequence[Question]], vocabulary: Vocabulary, path: Path
+) -> None:
+    """Refuse questions that use a word which was never learned."""
+    for name, several in asked.items():
+        for question in several:
+            try:
+                learned.check_question(question, vocabulary)
+            except InputError as error:
+                raise InputError(f"{path}, {name}, question {question.question_id}: {error}") from error
 
 
 def _tasks(

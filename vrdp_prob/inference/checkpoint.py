@@ -6,7 +6,7 @@ with a seed or a state of its own, and is kept when it is whole. A file that can
 
 import json
 import zipfile
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from hashlib import sha256
 from importlib.metadata import version
 from pathlib import Path
@@ -58,6 +58,9 @@ def program_facts(**settings: object) -> dict[str, str]:
     return {"version": version("vrdp-prob"), **{name: str(value) for name, value in settings.items()}}
 
 
+FINGERPRINT = "fingerprint.json"
+
+
 class Checkpoint:
     """What one run has done so far.
 
@@ -78,15 +81,9 @@ class Checkpoint:
     def __init__(self, folder: Path | str, facts: Mapping[str, str]) -> None:
         self.folder = Path(folder)
         check_writable(self.folder)
-        file = self.folder / "fingerprint.json"
-        try:
-            found = json.loads(file.read_text(encoding="utf-8"))
-        except (OSError, ValueError):
-            found = None
-        if found is None:
-            with write_atomically(file) as temporary:
-                temporary.write_text(json.dumps(dict(facts), indent=1), encoding="utf-8")
-        elif found != dict(facts):
+        self._facts = dict(facts)
+        found = self._claim()
+        if found is not None and found != self._facts:
             names = sorted(set(found) | set(facts))
             other = ", ".join(name for name in names if found.get(name) != facts.get(name))
             raise InputError(
@@ -95,14 +92,27 @@ class Checkpoint:
             )
 
     def path(self, name: str) -> Path:
-        """Place of a file."""
+        """Place of a file that is to be written; from now on the folder belongs to this run."""
+        if self._claim() is None:
+            with write_atomically(self.folder / FINGERPRINT) as temporary:
+                temporary.write_text(json.dumps(self._facts, indent=1), encoding="utf-8")
         return self.folder / name
 
-    def arrays(self, name: str) -> dict[str, np.ndarray] | None:
-        """Arrays that were kept under a name; None where there are none or they cannot be read."""
+    def _claim(self) -> dict[str, str] | None:
+        """What the run depends on that the folder belongs to; None where it belongs to none."""
         try:
-            with np.load(self.path(f"{name}.npz"), allow_pickle=False) as kept:
-                return {key: kept[key] for key in kept.files}
+            found = json.loads((self.folder / FINGERPRINT).read_text(encoding="utf-8"))
+        except (OSError, ValueError):
+            return None
+        return found if isinstance(found, dict) else None
+
+    def arrays(self, name: str, needed: Collection[str] = ()) -> dict[str, np.ndarray] | None:
+        """Arrays that were kept under a name; None where there are none, one is missing, or they cannot be read."""
+        if self._claim() is None:
+            return None
+        try:
+            with np.load(self.folder / f"{name}.npz", allow_pickle=False) as kept:
+                return {key: kept[key] for key in {*kept.files, *needed}}
         except (OSError, ValueError, EOFError, KeyError, zipfile.BadZipFile):
             return None
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from vrdp_prob.errors import InputError
 from vrdp_prob.reasoning.language import Reading, read_choice, read_question
 from vrdp_prob.reasoning.program import ENTRIES, Program, check, needs_choices, question_type
-from vrdp_prob.reasoning.values import Truth
+from vrdp_prob.reasoning.values import Count, Truth
 from vrdp_prob.reasoning.vocabulary import PLAIN, Vocabulary
 from vrdp_prob.scene import Choice, Question, QuestionType
 
@@ -61,6 +61,23 @@ def prepare(
         for choice, option in zip(given, readings, strict=True)
     )
     return PreparedQuestion(stated, kind, None, options, _how_read(reading, *readings))
+
+
+def check_answer(asked: PreparedQuestion) -> None:
+    """Refuse an answer beside an open question that it cannot have, whatever the video shows.
+
+    Raises
+    ------
+    InputError
+        If it should be yes or no, or a number, and is not.
+    """
+    answer, program = asked.question.answer, asked.program
+    if answer is None or program is None:
+        return
+    if program.gives is Truth and answer not in ("yes", "no"):
+        raise InputError(f"the answer '{answer}' is none that this question can have; give 'yes' or 'no'.")
+    if program.gives is Count and not (answer.isascii() and answer.isdigit()):
+        raise InputError(f"the answer '{answer}' is none that this question can have; give a whole number from 0 on.")
 
 
 def _how_read(*readings: Reading) -> tuple[str, ...]:

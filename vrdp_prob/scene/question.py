@@ -4,6 +4,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import StrEnum
 
+from vrdp_prob.errors import InputError
+
 RIGHT, WRONG = "correct", "wrong"
 """Judgements of a choice in CLEVRER's files."""
 
@@ -31,12 +33,21 @@ class Choice:
         Its program in postfix order, None where only the text is known.
     answer
         The true judgement (`correct` or `wrong`) where it is known; for scoring alone.
+
+    Raises
+    ------
+    InputError
+        If the judgement is another word.
     """
 
     choice_id: int | str
     text: str
     program: tuple[str, ...] | None = None
     answer: str | None = None
+
+    def __post_init__(self) -> None:
+        if self.answer not in (None, RIGHT, WRONG):
+            raise InputError(f"choice '{self.text}' is judged '{self.answer}'; judge it '{RIGHT}' or '{WRONG}'.")
 
 
 @dataclass(frozen=True)

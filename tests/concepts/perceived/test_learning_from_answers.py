@@ -85,6 +85,9 @@ def test_training_that_was_broken_off_ends_with_the_same_numbers(
     resumed, again = teach(lesson, tmp_path / "state.pt")
     assert again == standing
     np.testing.assert_array_equal(weights(resumed), weights(whole))
+    torch.save({"epoch": 3}, tmp_path / "damaged.pt")
+    anew, _ = teach(lesson, tmp_path / "damaged.pt")
+    np.testing.assert_array_equal(weights(anew), weights(whole))
     taken_up, _ = teach(lesson, tmp_path / "state.pt")
     np.testing.assert_array_equal(weights(taken_up), weights(whole))
 
@@ -131,11 +134,29 @@ def test_a_file_of_other_weights_or_of_another_version(concepts: Concepts, tmp_p
     torch.save({**stored, "version": 99}, file)
     with pytest.raises(InputError, match="format version 99, this program reads 1; learn them again"):
         read_concepts(file)
-    torch.save({**stored, "networks": [{"layer": torch.zeros(2)}]}, file)
-    with pytest.raises(InputError, match="holds no learned concepts"):
-        read_concepts(file)
+    for networks in ([{"layer": torch.zeros(2)}], [], [_without_a_number(stored["networks"][0])]):
+        torch.save({**stored, "networks": networks}, file)
+        with pytest.raises(InputError, match="holds no learned concepts"):
+            read_concepts(file)
     with pytest.raises(InputError, match="no such file; learn concepts first"):
         read_concepts(tmp_path / "nowhere")
+
+
+def _without_a_number(state: dict[str, torch.Tensor]) -> dict[str, torch.Tensor]:
+    name = next(name for name, value in state.items() if value.is_floating_point())
+    return {**state, name: torch.full_like(state[name], torch.nan)}
+
+
+def test_of_few_videos_only_those_held_out_say_how_good_it_is(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(learning, "LESSONS", SHORT)
+    told = iter([0.5, 0.5, 0.7, 0.7, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0])
+    monkeypatch.setattr(learning, "train", lambda *_, **__: Standing(1.0, next(told)))
+    lessons = learn({str(place): one for place, one in enumerate(TAUGHT[:2])}).concepts.lessons
+    assert (lessons.attributes_right, lessons.events_right) == (pytest.approx(0.6), pytest.approx(0.6))
+    told = iter([1.0] * 10)
+    alone = learn({"0": TAUGHT[0]})
+    assert alone.concepts.lessons.attributes_right is None
+    assert alone.lines[1].startswith("With a single video nothing is held out")
 
 
 def test_what_was_learned_is_told(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:

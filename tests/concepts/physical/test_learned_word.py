@@ -55,6 +55,12 @@ def _set(*path: str | int, to: object) -> Callable[[Any], None]:
         (_set("beliefs", 0, "why", to="?"), "not a whole word"),
         (_set("evidence", "videos", to="many"), "not a whole word"),
         (_set("lapse", to={"mean": 0.1}), "not a whole word"),
+        (_set("beliefs", 1, "rule", to=None), "the beliefs are not about changes that a word may mean"),
+        (_set("beliefs", 1, "rule", to="offset"), "the beliefs are not about changes that a word may mean"),
+        (_set("beliefs", to=[]), "the beliefs are not about changes that a word may mean"),
+        (_set("beliefs", 1, "log_evidence", to=None), "not a whole word"),
+        (_set("log_gain", to=float("nan")), "a number is not finite"),
+        (_set("mc_errors", to={}), "mc_errors and beliefs are not about the same parameters"),
     ],
 )
 def test_files_that_are_no_words(tmp_path: Path, change: Callable[[Any], None], message: str) -> None:
@@ -107,6 +113,7 @@ def test_sentences() -> None:
     against = word(NOTHING, MASS, SPEED, log_gain=-2.0)
     assert against.contradicts_itself
     assert against.summary[0].endswith("guessing explains the 9 answers better (by 2.0 nats).")
+    assert against.summary[-1] == "v9 was left out."
 
 
 @pytest.mark.parametrize(

@@ -93,7 +93,7 @@ def test_a_word_from_files_goes_on_where_it_was_broken_off(tmp_path: Path) -> No
     learned = learn_from_files("faster", tmp_path, questions, draws=20, checkpoint=tmp_path / "kept", processes=1)
     assert learned.evidence.videos == 2
     assert learned.probabilities["nothing"] < 0.1
-    (tmp_path / "kept" / "video_00001.npz").unlink()
+    (tmp_path / "kept" / "video_00001" / "agreement.npz").unlink()
     again = learn_from_files("faster", tmp_path, questions, draws=20, checkpoint=tmp_path / "kept", processes=1)
     assert again == learned
     with pytest.raises(InputError, match="the checkpoint belongs to another run"):

@@ -26,7 +26,7 @@ def agreement_of(wrong: np.ndarray, answers: int) -> Agreement:
 
 
 def word(agreements: list[Agreement]) -> LearnedWord:
-    return word_of("floppier", agreements, videos=len(agreements), draws=DRAWS, seed=0)
+    return word_of("floppier", agreements, examples=len(agreements), draws=DRAWS, seed=0)
 
 
 def test_the_prior_treats_parameters_alike() -> None:

@@ -42,17 +42,18 @@ class Lessons:
     guessed
         Share of the answers that are right when the commonest answer to the same kind of question is given.
     attributes_right, events_right
-        Share of held-out answers that are right, with the events of the tracks and with those of the concepts.
+        Share of held-out answers that are right, with the events of the tracks and with those of the concepts; None
+        where nothing was held out.
     """
 
     videos: int
     examples: int
     seed: int
     guessed: float
-    attributes_right: float
-    events_right: float
+    attributes_right: float | None
+    events_right: float | None
 
-    def to_document(self) -> dict[str, float]:
+    def to_document(self) -> dict[str, float | None]:
         """As plain values by name."""
         return asdict(self)
 

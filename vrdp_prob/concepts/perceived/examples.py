@@ -3,10 +3,11 @@
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
+from vrdp_prob.concepts.perceived.vocabulary import attribute_words
 from vrdp_prob.errors import InputError
-from vrdp_prob.reasoning.prepared import PreparedQuestion, prepare
+from vrdp_prob.reasoning.prepared import PreparedQuestion, check_answer, prepare
 from vrdp_prob.reasoning.program import Program
-from vrdp_prob.reasoning.values import Word
+from vrdp_prob.reasoning.values import Label, Word
 from vrdp_prob.scene import Question, QuestionType
 
 TAUGHT_BY = (QuestionType.DESCRIPTIVE, QuestionType.EXPLANATORY)
@@ -77,6 +78,8 @@ def _examples(question: Question) -> list[Example]:
     asked = prepare(question, ())
     if asked.kind not in TAUGHT_BY:
         return []
+    check_answer(asked)
+    _check_word(asked)
     name = str(question.question_id)
     return [Example(name, program, answer) for program, answer in _stated(asked) if answer is not None]
 
@@ -85,6 +88,15 @@ def _stated(asked: PreparedQuestion) -> list[tuple[Program, str | None]]:
     if asked.program is not None:
         return [(asked.program, asked.question.answer)]
     return [(program, _JUDGEMENTS.get(choice.answer or "")) for choice, program in asked.options]
+
+
+def _check_word(asked: PreparedQuestion) -> None:
+    """Refuse a value of an attribute that is no word of the question language."""
+    answer, program = asked.question.answer, asked.program
+    if program is not None and program.gives is Label and answer is not None:
+        words = attribute_words()[program.tokens[-1].removeprefix("query_")]
+        if answer not in words:
+            raise InputError(f"the answer '{answer}' is no word that can be learned; the words are {', '.join(words)}.")
 
 
 def _check_agreement(examples: Sequence[Example], place: str) -> None:

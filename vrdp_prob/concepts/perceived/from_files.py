@@ -24,7 +24,7 @@ from vrdp_prob.progress import ProgressDisplay, SilentProgress
 from vrdp_prob.scene import Camera
 from vrdp_prob.workers import local_workers
 
-OBSERVATION = "observation"
+OBSERVATION, OBSERVED = "observation", tuple(Observation.__dataclass_fields__)
 
 
 @dataclass(frozen=True)
@@ -142,7 +142,7 @@ def look_at(
     """
     kept = {} if checkpoint is None else {name: Checkpoint(checkpoint / name, shown[name].facts) for name in shown}
     seen: dict[str, Arrays] = {
-        name: arrays for name, one in kept.items() if (arrays := one.arrays(OBSERVATION)) is not None
+        name: arrays for name, one in kept.items() if (arrays := one.arrays(OBSERVATION, OBSERVED)) is not None
     }
     waiting = [name for name in shown if name not in seen]
     with (progress or SilentProgress()).stage("Looking at videos", total=len(shown)) as advance:

@@ -46,10 +46,19 @@ class Learned:
         words = [word for known in self.concepts.vocabulary.values.values() for word in known]
         return [
             f"Learned from {lessons.videos} videos and {lessons.examples} answers: {', '.join(words)}.",
-            f"Of the answers about held-out videos {lessons.attributes_right:.0%} are right with the events of the "
-            f"tracks, {lessons.events_right:.0%} with learned events, {lessons.guessed:.0%} by guessing.",
+            _standing(lessons),
             *self.notes,
         ]
+
+
+def _standing(lessons: Lessons) -> str:
+    if lessons.attributes_right is None or lessons.events_right is None:
+        return "With a single video nothing is held out, so nobody knows how good the concepts are."
+    return (
+        f"Of the answers about held-out videos {lessons.attributes_right:.0%} are right with the events of the tracks, "
+        f"{lessons.events_right:.0%} with learned events, {lessons.guessed:.0%} by guessing. The same videos said when "
+        "to stop, so new ones may do a little worse."
+    )
 
 
 def learn(
@@ -84,9 +93,12 @@ def learn(
     trained = [
         _trained(vocabulary, taught, place, seed=seed, kept=checkpoint, progress=display) for place in range(NETWORKS)
     ]
-    standings = np.array([[one.right for one in standing] for _, standing in trained]).mean(axis=0)
-    guessed = _guessed(examples)
-    lessons = Lessons(len(videos), len(examples), seed, guessed, float(standings[0]), float(standings[1]))
+    # with few videos some networks hold out none, and stand where they do by what they learned
+    right = [
+        [one.right for one in standings] for place, (_, standings) in enumerate(trained) if _held_out(taught, place)
+    ]
+    attributes, events = np.mean(right, axis=0).tolist() if right else (None, None)
+    lessons = Lessons(len(videos), len(examples), seed, _guessed(examples), attributes, events)
     concepts = Concepts(tuple(network for network, _ in trained), lessons)
     return Learned(concepts, _notes(concepts))
 
@@ -118,7 +130,7 @@ def _trained(
     progress: ProgressDisplay,
 ) -> tuple[ConceptNetwork, list[Standing]]:
     """One network, that holds out every fifth video, another fifth for each place."""
-    held_out = taught[place::NETWORKS] if len(taught) > 1 else []
+    held_out = _held_out(taught, place)
     rest = [one for one in taught if not any(one is other for other in held_out)] or list(taught)
     own_seed = seed * NETWORKS + place
     with torch.random.fork_rng(devices=[]):
@@ -133,6 +145,11 @@ def _trained(
         with progress.stage(title, total=lesson.epochs) as advance:
             standings.append(train(network, lesson, rest, held_out, seed=own_seed, checkpoint=file, advance=advance))
     return network.cpu().eval(), standings
+
+
+def _held_out(taught: Sequence[Taught], place: int) -> Sequence[Taught]:
+    """The videos that a network does not learn from: every fifth, where there are several."""
+    return taught[place::NETWORKS] if len(taught) > 1 else []
 
 
 def _guessed(examples: Sequence[Example]) -> float:
@@ -152,7 +169,7 @@ def _notes(concepts: Concepts) -> tuple[str, ...]:
             f"The word{'' if one else 's'} {', '.join(missing)} never occur{'s' if one else ''} in the questions; "
             f"{'it was' if one else 'they were'} not learned."
         )
-    if lessons.attributes_right < lessons.guessed + _HARDLY:
+    if lessons.attributes_right is not None and lessons.attributes_right < lessons.guessed + _HARDLY:
         notes.append(
             "The answers are hardly better explained than by guessing: there are too few of them, or they contradict "
             "what the videos show."

@@ -61,6 +61,8 @@ def read_concepts(path: Path | str) -> Concepts:
     try:
         vocabulary = Vocabulary({name: tuple(words) for name, words in json.loads(stored["words"]).items()})
         networks = tuple(_network(vocabulary, state) for state in stored["networks"])
+        if not networks:
+            raise _unreadable(path)
         return Concepts(networks, Lessons(**json.loads(stored["lessons"])))
     except (KeyError, TypeError, ValueError, AttributeError, RuntimeError) as error:
         raise _unreadable(path) from error
@@ -69,6 +71,8 @@ def read_concepts(path: Path | str) -> Concepts:
 def _network(vocabulary: Vocabulary, state: dict[str, torch.Tensor]) -> ConceptNetwork:
     network = ConceptNetwork(vocabulary)
     network.load_state_dict(state)
+    if not all(torch.isfinite(value).all() for value in state.values()):
+        raise ValueError("weights that are not finite")
     return network.eval()
 
 

@@ -13,6 +13,7 @@ from vrdp_prob.concepts.perceived.standing import Standing
 from vrdp_prob.files import write_atomically
 
 State = dict[str, Any]
+KEPT = frozenset(("network", "optimiser", "best", "epoch", "best_epoch", "loss", "right"))
 
 
 class TrainingState:
@@ -67,7 +68,7 @@ def _read(file: Path | None) -> State | None:
         kept: State = torch.load(file, weights_only=True, map_location="cpu")
     except Exception:  # torch raises many kinds for a broken file, and each means the same
         return None
-    return kept
+    return kept if isinstance(kept, dict) and kept.keys() == KEPT else None
 
 
 def _copy(state: Mapping[str, Tensor]) -> dict[str, Tensor]:

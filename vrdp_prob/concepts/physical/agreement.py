@@ -1,4 +1,4 @@
-"""How far the simulation agrees, under every meaning of a word, with the answers of an example."""
+"""How far the simulation agrees, under every meaning of a word, with the answers about a video."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -25,7 +25,7 @@ GROUPS = 10
 
 @dataclass(frozen=True)
 class Agreement:
-    """How many answers of one example every meaning gets wrong.
+    """How many answers about one video every meaning gets wrong; all its questions are asked of the same draws.
 
     Parameters
     ----------
@@ -38,7 +38,7 @@ class Agreement:
 
     @property
     def answers(self) -> int:
-        """Number of answers of the example: one, or one for each choice."""
+        """Number of answers: one of a question, or one for each of its choices."""
         return self.draws.shape[2] - 1
 
 
@@ -58,13 +58,13 @@ class PassingWorlds(PosteriorWorlds):
 def agreements_of(
     word: str,
     posterior: PosteriorLike,
-    questions: Sequence[Question],
+    lessons: Sequence[Sequence[Question]],
     *,
     draws: int,
     seed: int,
     advance: Callable[[float], None] | None = None,
 ) -> tuple[Agreement, ...]:
-    """How far every meaning of a word agrees with the answers to questions about one video.
+    """How far every meaning of a word agrees with the answers to questions about one video, for each of some lessons.
 
     All meanings are tried on the same draws with the same random numbers, so that they differ by what they mean alone.
     Masses and restitutions that a video does not tell are drawn from their prior: a default would be surer than the
@@ -76,8 +76,8 @@ def agreements_of(
         The word that the questions use.
     posterior
         What is known of the video.
-    questions
-        Questions with their right answers.
+    lessons
+        Questions with their right answers; those of one lesson are taken together.
     draws
         Number of posterior draws.
     seed
@@ -91,10 +91,10 @@ def agreements_of(
         If a question cannot be asked of this video; see `vrdp_prob.reasoning.ask`.
     """
     worlds = PassingWorlds(posterior, draws=draws, defaults="prior", chance=Seeded(seed))
-    counted: list[list[Int[np.ndarray, "group wrong"]]] = [[] for _ in questions]
+    counted: list[list[Int[np.ndarray, "group wrong"]]] = [[] for _ in lessons]
     for shift in MEANINGS:
-        for place, question in enumerate(questions):
-            counted[place].append(_counts(worlds, question, _change(word, shift)))
+        for place, questions in enumerate(lessons):
+            counted[place].append(_counts(worlds, questions, _change(word, shift)))
         if advance is not None:
             advance(1)
     return tuple(Agreement(np.stack(counts)) for counts in counted)
@@ -104,13 +104,16 @@ def _change(word: str, shift: Shift | None) -> Change:
     return Change(word, (Meaning(1.0, shift),))
 
 
-def _counts(worlds: PosteriorWorlds, question: Question, change: Change) -> Int[np.ndarray, "group wrong"]:
-    """Draws by their group and by how many answers are otherwise than was answered."""
-    asked = prepared(question, change)
-    try:
-        disagree, valid = _disagreements(worlds, asked)
-    except InputError as error:
-        raise InputError(f"{worlds.posterior.tracks.video}, '{question.text}': {error}") from error
+def _counts(worlds: PosteriorWorlds, questions: Sequence[Question], change: Change) -> Int[np.ndarray, "group wrong"]:
+    """Draws in which all questions make sense, by their group and by how many answers are otherwise."""
+    parts = []
+    for question in questions:
+        try:
+            parts.append(_disagreements(worlds, prepared(question, change)))
+        except InputError as error:
+            raise InputError(f"{worlds.posterior.tracks.video}, '{question.text}': {error}") from error
+    disagree = np.concatenate([part for part, _ in parts], axis=1)
+    valid = np.all([part for _, part in parts], axis=0)
     group = np.arange(len(valid)) * GROUPS // len(valid)
     counts = np.zeros((GROUPS, disagree.shape[1] + 1), dtype=np.int64)
     np.add.at(counts, (group[valid], disagree[valid].sum(axis=1)), 1)

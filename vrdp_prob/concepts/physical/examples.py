@@ -8,7 +8,7 @@ from vrdp_prob.reasoning.change_operations import APPLY, COUNTERFACT
 from vrdp_prob.reasoning.changes import Change
 from vrdp_prob.reasoning.language.words import split
 from vrdp_prob.reasoning.posterior_like import PosteriorLike
-from vrdp_prob.reasoning.prepared import PreparedQuestion, prepare
+from vrdp_prob.reasoning.prepared import PreparedQuestion, check_answer, prepare
 from vrdp_prob.reasoning.vocabulary import Vocabulary
 from vrdp_prob.scene import Choice, Question
 from vrdp_prob.scene.question import RIGHT, WRONG
@@ -71,13 +71,15 @@ def prepared(question: Question, change: Change) -> PreparedQuestion:
     Raises
     ------
     InputError
-        If the question is not understood, does not use the word, or has no right answer beside it.
+        If the question is not understood, does not use the word, has no right answer beside it, or one that it cannot
+        have.
     """
     asked = prepare(question, (), Vocabulary({change.word: change}))
     if not uses(asked, change.word):
         raise InputError(f"'{question.text}' does not use the word '{change.word}'; give questions that do.")
     if not question.is_answered:
         raise InputError(f"'{question.text}' has no right answer beside it; give the answer, or judge every choice.")
+    check_answer(asked)
     return asked
 
 

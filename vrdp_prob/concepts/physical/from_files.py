@@ -1,13 +1,12 @@
 """A word learned from a folder of videos and a question file; broken off, it can go on."""
 
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import as_completed
 from dataclasses import dataclass
 from hashlib import sha256
 from pathlib import Path
 
-import numpy as np
 import torch
 
 from vrdp_prob.concepts.physical.agreement import Agreement, agreements_of
@@ -28,7 +27,7 @@ from vrdp_prob.reasoning.changes import Change, Meaning
 from vrdp_prob.scene import Question, Tracks
 from vrdp_prob.workers import local_workers
 
-AGREEMENTS = "agreements"
+AGREEMENT, DRAWS_BY_MISTAKES = "agreement", "draws"
 
 
 @dataclass(frozen=True)
@@ -117,7 +116,7 @@ def learn_from_files(
     asked = _asked(name, Path(questions), scenes)
     lessons = _lessons(Path(folder), asked, camera, settings, progress)
     kept = {} if checkpoint is None else {one.tracks.video: one.checkpoint(Path(checkpoint)) for one in lessons}
-    found: dict[str, tuple[Agreement, ...] | str] = {}
+    found: dict[str, Agreement | str] = {}
     found |= {video: known for video, one in kept.items() if (known := _kept(one)) is not None}
     waiting = [lesson for lesson in lessons if lesson.tracks.video not in found]
     if waiting:
@@ -129,21 +128,22 @@ def learn_from_files(
                 video, told = future.result()
                 found[video] = told
                 if video in kept and not isinstance(told, str):
-                    kept[video].keep(AGREEMENTS, {str(place): one.draws for place, one in enumerate(told)})
+                    kept[video].keep(AGREEMENT, {DRAWS_BY_MISTAKES: told.draws})
                 advance(1)
-    return _word(settings, [found[lesson.tracks.video] for lesson in lessons])
+    return _word(settings, lessons, found)
 
 
-def _word(settings: Settings, told: Sequence[tuple[Agreement, ...] | str]) -> LearnedWord:
+def _word(settings: Settings, lessons: Sequence[Lesson], found: Mapping[str, Agreement | str]) -> LearnedWord:
     """The word that the usable videos teach."""
-    usable = [agreements for agreements in told if not isinstance(agreements, str)]
-    left_out = tuple(reason for reason in told if isinstance(reason, str))
+    told = [(lesson, found[lesson.tracks.video]) for lesson in lessons]
+    usable = [(lesson, agreement) for lesson, agreement in told if not isinstance(agreement, str)]
+    left_out = tuple(reason for _, reason in told if isinstance(reason, str))
     if not usable:
         raise InputError(left_out[0])
     return word_of(
         settings.word,
-        [one for agreements in usable for one in agreements],
-        videos=len(usable),
+        [agreement for _, agreement in usable],
+        examples=sum(len(lesson.questions) for lesson, _ in usable),
         draws=settings.draws,
         seed=settings.seed,
         left_out=left_out,
@@ -185,12 +185,12 @@ def _lessons(
     return [Lesson(one, asked[one.video], settings) for one in videos]
 
 
-def _taught(lesson: Lesson) -> tuple[str, tuple[Agreement, ...] | str]:
+def _taught(lesson: Lesson) -> tuple[str, Agreement | str]:
     """What one video says, or why it says nothing; it runs in a process of its own."""
     torch.set_num_threads(1)
     video = lesson.tracks.video
     try:
-        return video, _agreements(lesson)
+        return video, _agreement(lesson)
     except InputError as error:
         reason = str(error)
     except Exception as error:  # one video must not take the others with it; the reason is told
@@ -198,16 +198,15 @@ def _taught(lesson: Lesson) -> tuple[str, tuple[Agreement, ...] | str]:
     return video, f"{video} was left out: {reason.removesuffix('.')}."
 
 
-def _agreements(lesson: Lesson) -> tuple[Agreement, ...]:
+def _agreement(lesson: Lesson) -> Agreement:
     settings = lesson.settings
     # the fast way does not hand on here: many videos would take hours
     posterior = infer(lesson.tracks, sampler=settings.sampler, model=settings.model, seed=settings.seed, hand_on=False)
-    return agreements_of(settings.word, posterior, lesson.questions, draws=settings.draws, seed=settings.seed)
+    (agreement,) = agreements_of(settings.word, posterior, [lesson.questions], draws=settings.draws, seed=settings.seed)
+    return agreement
 
 
-def _kept(checkpoint: Checkpoint) -> tuple[Agreement, ...] | None:
+def _kept(checkpoint: Checkpoint) -> Agreement | None:
     """What a video was found to say in an earlier call; None where it has to be worked on."""
-    arrays = checkpoint.arrays(AGREEMENTS)
-    if arrays is None:
-        return None
-    return tuple(Agreement(np.asarray(arrays[str(place)])) for place in range(len(arrays)))
+    arrays = checkpoint.arrays(AGREEMENT, (DRAWS_BY_MISTAKES,))
+    return None if arrays is None else Agreement(arrays[DRAWS_BY_MISTAKES])

@@ -71,12 +71,12 @@ def learn_concept(
     found: list[Agreement] = []
     with (progress or SilentProgress()).stage(f"Learning '{name}'", total=len(videos) * len(MEANINGS)) as advance:
         for posterior, questions in videos:
-            found += agreements_of(name, posterior, questions, draws=draws, seed=seed, advance=advance)
-    return word_of(name, found, videos=len(videos), draws=draws, seed=seed)
+            found += agreements_of(name, posterior, [questions], draws=draws, seed=seed, advance=advance)
+    return word_of(name, found, examples=len(examples), draws=draws, seed=seed)
 
 
 def word_of(
-    name: str, agreements: Sequence[Agreement], *, videos: int, draws: int, seed: int, left_out: tuple[str, ...] = ()
+    name: str, agreements: Sequence[Agreement], *, examples: int, draws: int, seed: int, left_out: tuple[str, ...] = ()
 ) -> LearnedWord:
     """The word that its examples make.
 
@@ -85,8 +85,8 @@ def word_of(
     name
         The word.
     agreements
-        How far every meaning agrees with each example.
-    videos, draws, seed, left_out
+        How far every meaning agrees with the answers about each video.
+    examples, draws, seed, left_out
         How they were made; see `Evidence`.
     """
     everything = weigh(agreements)
@@ -101,7 +101,7 @@ def word_of(
         Interval(float(everything.lapse @ everything.lapse_probability), low, high),
         everything.log_gain,
         jackknife_error([one.log_gain for one in without_group]),
-        Evidence(videos, len(agreements), sum(one.answers for one in agreements), draws, seed, left_out),
+        Evidence(len(agreements), examples, sum(one.answers for one in agreements), draws, seed, left_out),
     )
 
 

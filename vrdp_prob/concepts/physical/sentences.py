@@ -14,7 +14,7 @@ ALIKE = 1e-3
 def summary(word: LearnedWord) -> tuple[str, ...]:
     """What a word means, how sure that is, and what the answers are worth."""
     if word.contradicts_itself:
-        return (_contradiction(word),)
+        return (_contradiction(word), *word.evidence.left_out)
     if not _informed(word):
         return (f"The answers do not tell what '{word.name}' means.", _lapse(word), *word.evidence.left_out)
     return (_meaning(word), *_rivals(word), _lapse(word), *word.evidence.left_out)
@@ -23,7 +23,7 @@ def summary(word: LearnedWord) -> tuple[str, ...]:
 def _contradiction(word: LearnedWord) -> str:
     return (
         f"The answers about '{word.name}' contradict each other, or nothing that a word may mean here explains them: "
-        f"guessing explains the {word.evidence.answers} answers better (by {-word.log_gain:.1f} nats)."
+        f"guessing explains the {_several(word.evidence.answers, 'answer')} better (by {-word.log_gain:.1f} nats)."
     )
 
 
@@ -57,7 +57,11 @@ def _rivals(word: LearnedWord) -> tuple[str, ...]:
 
 def _lapse(word: LearnedWord) -> str:
     return (
-        f"Of the {word.evidence.answers} answers to {word.evidence.examples} questions about {word.evidence.videos} "
-        f"videos about {100 * word.lapse.mean:.0f} % are no better than guessed "
+        f"Of the {_several(word.evidence.answers, 'answer')} to {_several(word.evidence.examples, 'question')} about "
+        f"{_several(word.evidence.videos, 'video')} about {100 * word.lapse.mean:.0f} % are no better than guessed "
         f"(90 % interval {100 * word.lapse.q05:.0f} to {100 * word.lapse.q95:.0f} %)."
     )
+
+
+def _several(count: int, noun: str) -> str:
+    return f"{count} {noun}" if count == 1 else f"{count} {noun}s"

@@ -2,9 +2,9 @@
 
 An answer is what the simulation of a draw says, except for a share of answers (the lapse) that are guessed: the
 physics is not exact, and who answers errs. With a guessed answer right by chance in half of the cases, a draw that
-disagrees with k of the n answers of an example has the likelihood (1 - lapse/2)^(n-k) (lapse/2)^k; that of the example
-is its mean over the posterior draws of the video. The lapse is unknown, the same for all examples, and integrated out
-by Gauss-Jacobi quadrature, which is exact here up to 127 answers.
+disagrees with k of the n answers about its video has the likelihood (1 - lapse/2)^(n-k) (lapse/2)^k; that of the video
+is its mean over the posterior draws. The lapse is unknown, the same for all videos, and integrated out by Gauss-Jacobi
+quadrature, which is exact here up to 127 answers.
 """
 
 from collections.abc import Sequence
@@ -56,7 +56,7 @@ def weigh(agreements: Sequence[Agreement], *, without: int | None = None) -> Wei
     Parameters
     ----------
     agreements
-        How far each example agrees; without any the posterior is the prior.
+        How far the answers about each video agree; without any the posterior is the prior.
     without
         A group of draws to leave out.
     """

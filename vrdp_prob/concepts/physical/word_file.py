@@ -2,13 +2,14 @@
 
 import json
 from collections.abc import Mapping
-from dataclasses import asdict, fields
+from dataclasses import asdict, astuple, fields
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from vrdp_prob.concepts.physical.belief import Belief
+from vrdp_prob.concepts.physical.hypotheses import HYPOTHESES
 from vrdp_prob.concepts.physical.learned_word import Evidence, Interval, LearnedWord
 from vrdp_prob.concepts.physical.naming import check_name
 from vrdp_prob.datasets.clevrer import read_json
@@ -44,13 +45,14 @@ def read_word(path: Path) -> LearnedWord:
         raise InputError(f"{path}: not a learned word; give a file that `vrdp-prob learn-word` wrote.")
     if document.get("version") != VERSION:
         raise InputError(
-            f"{path}: a word of version {document.get('version')}, but version {VERSION} is read; learn the word anew."
+            f"{path}: a word of version {document.get('version')!r}, but version {VERSION} is read; learn it anew."
         )
     try:
         word = _word(document)
         check_name(word.name)
+        _check_beliefs(word)
         _check_sums(word)
-    except (AttributeError, KeyError, TypeError, ValueError) as error:
+    except (AttributeError, IndexError, KeyError, TypeError, ValueError) as error:
         raise InputError(f"{path}: not a whole word ({error}); learn it anew.") from error
     return word
 
@@ -81,10 +83,24 @@ def _belief(entry: Mapping[str, Any]) -> Belief:
             **entry,
             "parameter": None if parameter is None else PhysicalParameter(parameter),
             "rule": None if rule is None else Rule(rule),
-            "amounts": tuple(float(amount) for amount in entry["amounts"]),
-            "weights": tuple(float(weight) for weight in entry["weights"]),
+            **{name: float(entry[name]) for name in ("probability", "mc_error", "log_evidence")},
+            **{name: tuple(float(value) for value in entry[name]) for name in ("amounts", "weights")},
         }
     )
+
+
+def _check_beliefs(word: LearnedWord) -> None:
+    """Beliefs are about what a word may mean, each once, and every number is finite."""
+    believed = [(belief.parameter, belief.rule) for belief in word.beliefs]
+    possible = {(None, None), *((one.parameter, one.rule) for one in HYPOTHESES)}
+    if not believed or len(set(believed)) < len(believed) or not possible.issuperset(believed):
+        raise ValueError("the beliefs are not about changes that a word may mean, each once")
+    if set(word.mc_errors) != set(word.probabilities):
+        raise ValueError("mc_errors and beliefs are not about the same parameters")
+    numbers = [word.log_gain, word.log_gain_error, *astuple(word.lapse), *word.mc_errors.values()]
+    numbers += [number for one in word.beliefs for number in (one.probability, one.mc_error, one.log_evidence)]
+    if not np.isfinite(numbers).all():
+        raise ValueError("a number is not finite")
 
 
 def _check_sums(word: LearnedWord) -> None:

@@ -10,7 +10,7 @@ from vrdp_prob.reasoning.chance import Purpose, Seeded
 from vrdp_prob.reasoning.changes import Change
 from vrdp_prob.reasoning.events import EventTable, EventUniverse
 from vrdp_prob.reasoning.facts import MOVING_SPEED, Motion, draw_attributes
-from vrdp_prob.reasoning.intervention import Intervention
+from vrdp_prob.reasoning.intervention import Intervention, drawn_meanings
 from vrdp_prob.reasoning.posterior_like import PosteriorLike
 from vrdp_prob.reasoning.stretch import State, Stretch, advance
 from vrdp_prob.reasoning.timeline import Timeline
@@ -91,7 +91,9 @@ class ReleasedWorlds:
         """Motion of a world from the release on, into the time after the video."""
         worlds = self.posterior.worlds(self.draws)
         numbers = Seeded(self.posterior.seed).numbers(Purpose.MEANING)
-        changed = worlds if change is None else Intervention(change, body, worlds, numbers).worlds
+        changed = worlds
+        if change is not None:
+            changed = Intervention(change, body, worlds, drawn_meanings(change, len(worlds), numbers)).worlds
         times = self.posterior.tracks.times
         more = times[-1] + np.arange(1, FUTURE_FRAMES + 1) / self.posterior.tracks.frame_rate
         state = State.released(changed)

@@ -6,8 +6,10 @@
 Tracks of ../shared/data/clevrer_bullet. Two-fold cross-fitting: how much motion deviates from the model is learned on
 the odd scenes for the even ones, and the other way round. Fits (Laplace draws) and judgements are written to
 `--results` as they come, so that a run that was interrupted goes on; delete that folder after a change of the code.
-`--extended` names the model file of the row `extended model`, whose fits take a minute a scene; without it the row is
-left out. `--docs` writes the tables into `practice.md` there.
+`--extended` names the model file of the row `extended model` (`contact_friction_and_slip.toml` beside this script),
+whose fits take a minute a scene; without it the row is left out. What each half of the scenes says of it (WAIC) is
+printed: a half may be answered with the model that the other half prefers. `--docs` writes the tables into
+`practice.md` there.
 """
 
 import argparse
@@ -27,6 +29,7 @@ from _page import write_between
 from _released_worlds import ReleasedWorlds
 from _resumable import Result, measured
 from _true_posterior import TruePosterior
+from scipy.special import logsumexp
 
 from vrdp_prob.datasets import load, read_questions
 from vrdp_prob.evaluation.judgement import Judgement, Kind, judge
@@ -86,7 +89,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     few = {scene: task for scene, task in tasks.items() if scene < options.thinned}
     fewer = _measured(with_fewer_frames, few, options, "fewer", "With fewer frames")
     rows = _rows(list(judged.values()))
-    text = "\n".join([*_tables(rows), "", *_fewer_table(list(fewer.values()))])
+    preferred: list[str] = []
+    if extended is not None:
+        preferred = _preference(_measured(preference, tasks, options, "models", "Comparing models"))
+    text = "\n".join([*_tables(rows), *preferred, "", *_fewer_table(list(fewer.values()))])
     print(text)
     if options.docs:
         write_between(options.docs / "practice.md", text)
@@ -179,6 +185,34 @@ def _worlds(task: Task, tracks: Tracks) -> dict[str, Facts]:
         extended = posterior_of(task, tracks, "extended", task.extended)
         worlds[EXTENDED] = PosteriorWorlds(extended, draws=DRAWS, deviating=deviating)
     return worlds
+
+
+def preference(task: Task) -> Result:
+    """How much better than the base model the extended one is expected to predict new positions of a scene, in nats."""
+    assert task.extended is not None
+    tracks, models = load(DATA, video=task.video), {"base": task.model, "extended": task.extended}
+    waic = {name: expected_log_density(posterior_of(task, tracks, name, model)) for name, model in models.items()}
+    return {"scene": task.scene, "gain": waic["extended"] - waic["base"]}
+
+
+def expected_log_density(posterior: AskablePosterior) -> float:
+    """Expected log density in nats of new positions (WAIC; Watanabe, JMLR 11, 2010, equation 6, without its sign)."""
+    position = posterior.data["log_likelihood"]["position"]
+    values = position.stack(sample=("chain", "draw")).transpose("sample", ...).values
+    log_mean = logsumexp(values, axis=0) - np.log(len(values))
+    return float((log_mean - values.var(axis=0)).sum())
+
+
+def _preference(found: Mapping[int, Result]) -> list[str]:
+    """What each half of the scenes says of the extended model."""
+    told = []
+    for half, name in enumerate(("even", "odd")):
+        gains = np.array([one["gain"] for scene, one in found.items() if scene % 2 == half])
+        error = gains.std(ddof=1) * np.sqrt(len(gains))
+        told.append(
+            f"{gains.sum():.0f} ± {error:.0f} nats on the {name} scenes (better in {(gains > 0).sum()} of {len(gains)})"
+        )
+    return ["", f"Expected log density of new positions (WAIC), extended model less base model: {' and '.join(told)}."]
 
 
 def with_fewer_frames(task: Task) -> Result:

@@ -14,7 +14,7 @@ from vrdp_prob.reasoning.counterfactual import Counterfactual
 from vrdp_prob.reasoning.deviations import FEWEST_DRAWS, Deviation, DeviationModel, seen_deviations, turns
 from vrdp_prob.reasoning.facts import draw_attributes
 from vrdp_prob.reasoning.friction import OwnFriction, ToldFriction, apply_friction, told_friction, with_friction_ratio
-from vrdp_prob.reasoning.intervention import Intervention
+from vrdp_prob.reasoning.intervention import Intervention, drawn_meanings
 from vrdp_prob.reasoning.own_course import OwnCourses, changed_course
 from vrdp_prob.reasoning.refit import state_at_end
 from vrdp_prob.reasoning.released import Released
@@ -156,11 +156,7 @@ class Batch:
 
     def meanings(self, change: Change) -> Int[np.ndarray, "draw"]:
         """Which of the meanings of its word each draw takes."""
-        if not change.is_uncertain:
-            return np.zeros(len(self), dtype=int)
-        probabilities = np.array([meaning.probability for meaning in change.meanings])
-        numbers = self.chance.numbers(Purpose.MEANING)
-        return numbers.choice(np.arange(len(probabilities)), len(self), p=probabilities)
+        return drawn_meanings(change, len(self), self.chance.numbers(Purpose.MEANING))
 
     def turning(self, body: int, time: float) -> tuple[Float[np.ndarray, "draw"], Float[np.ndarray, "draw"]]:
         """Angle (rad) and spin (rad/s) of a body in every draw.

@@ -9,10 +9,19 @@ from jaxtyping import Bool, Float, Int
 
 from vrdp_prob.models.effects.body_friction import FRICTION_RATIO
 from vrdp_prob.models.simulator.worlds import Worlds
+from vrdp_prob.reasoning.chance import Random
 from vrdp_prob.reasoning.changes import Change, PhysicalParameter
 from vrdp_prob.reasoning.facts import MOVING_SPEED
 
 MASS, RESTITUTION, FRICTION, SPEED = PhysicalParameter
+
+
+def drawn_meanings(change: Change, draws: int, numbers: Random) -> Int[np.ndarray, "draw"]:
+    """Which of the meanings of its word each of some draws takes."""
+    if not change.is_uncertain:
+        return np.zeros(draws, dtype=int)
+    probabilities = np.array([meaning.probability for meaning in change.meanings])
+    return numbers.choice(np.arange(len(probabilities)), draws, p=probabilities)
 
 
 class Intervention:

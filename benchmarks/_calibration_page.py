@@ -154,8 +154,9 @@ def figures(results: Results, folder: Path) -> None:
         chosen = {group: {one.kind: one for one in calibrations(part)} for group, part in groups(found).items()}
         kinds = [kind for kind in KINDS if any(kind in part for part in chosen.values())]
         rows = -(-len(kinds) // 3)
-        size = {"figsize": (9, 1.8 * rows), "layout": "constrained"}
-        figure, axes = plt.subplots(rows, 3, sharex=True, sharey=True, squeeze=False, **size)
+        figure, axes = plt.subplots(
+            rows, 3, sharex=True, sharey=True, squeeze=False, figsize=(9, 1.8 * rows), layout="constrained"
+        )
         for axis, kind in zip_longest(axes.ravel(), kinds):
             if kind is None:
                 axis.set_axis_off()

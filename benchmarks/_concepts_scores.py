@@ -70,7 +70,7 @@ def add_video(score: Score, case: Case, facts: TableFacts) -> None:
                 score.sure_of_material.append(best == true.material)
         both = truth.motion().in_view[0, :, true_place] & facts.motion().in_view.all(axis=0)[:, place]
         moves = facts.motion().moving.mean(axis=0)[:, place] > 0.5
-        score.right["moving"] += (moves == truth.motion().moving[0, :, true_place])[both].tolist()
+        score.right["moving"] += (moves[both] == truth.motion().moving[0, both, true_place]).tolist()
     for question in case.asked:
         judged = judge(case.seen.tracks.video, facts, question)
         score.right[judged.kind.value].append(judged.right)

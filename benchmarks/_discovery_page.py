@@ -10,7 +10,6 @@ from _discovery_results import (
     NULLS,
     REACHED,
     SURE,
-    Result,
     Share,
     alarm,
     alone,
@@ -29,6 +28,7 @@ from _discovery_results import (
 )
 from _discovery_tasks import SIZES, Kind
 from _page import write_between
+from _resumable import Result
 
 from tests.discovery.causes import CATALOGUE
 from tests.discovery.other_effects import ALL

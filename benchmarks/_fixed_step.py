@@ -123,7 +123,9 @@ def constants_of(xp: Any, system: System, inputs: Inputs) -> Constants:
     parameters = inputs.parameters
     sphere = np.array([float(shape is Shape.SPHERE) for shape in system.shapes])[:, None]
     is_sphere = xp.asarray(sphere)
-    inertia = xp.asarray(np.array([INERTIA_FACTORS.get(shape, 1.0) for shape in system.shapes])[:, None])
+    inertia = xp.asarray(
+        np.array([1.0 if shape is None else INERTIA_FACTORS[shape] for shape in system.shapes])[:, None]
+    )
     inertia = inertia * inputs.mass * inputs.radius**2
     friction = is_sphere * parameters["rolling_resistance"] + (1 - is_sphere) * parameters["sliding_friction"]
     zero = 0.0 * parameters["air_drag"]

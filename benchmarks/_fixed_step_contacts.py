@@ -46,7 +46,7 @@ class Pair(NamedTuple):
 
     offset: Array
     closing: Array
-    turns: tuple[Any, Any]
+    turns: tuple[Any, ...]
     spin: tuple[Array, Array]
     fixed: Fixed
 
@@ -72,8 +72,9 @@ def cross(xp: Any, a: Array, b: Array) -> Array:
     return dot(across(xp, a), b)
 
 
-def turned(xp: Any, cosine: Array, sine: Array, vector: Array) -> Array:
-    """Turn a vector by an angle."""
+def turned(xp: Any, turn: tuple[Array, Array], vector: Array) -> Array:
+    """Turn a vector by an angle, given by its cosine and sine."""
+    cosine, sine = turn
     return cosine[..., None, :] * vector + sine[..., None, :] * across(xp, vector)
 
 
@@ -134,7 +135,7 @@ def discs_meet(xp: Any, laws: Laws, pair: Pair) -> tuple[Array, Array, Array]:
 def box_meets_disc(xp: Any, laws: Laws, pair: Pair, height: float = 1.0) -> tuple[Array, Array, Array]:
     """Contact of a square (or of a wall, whose `height` is 0) and a disc, at the nearest point of the box."""
     cosine, sine = pair.turns[0]
-    seen = turned(xp, cosine, -sine, pair.offset)
+    seen = turned(xp, (cosine, -sine), pair.offset)
     half = pair.fixed.radius_0[..., None, :] * xp.asarray([[1.0], [height]])
     nearest = xp.minimum(xp.maximum(seen, -half), half)
     between = seen - nearest
@@ -144,7 +145,7 @@ def box_meets_disc(xp: Any, laws: Laws, pair: Pair, height: float = 1.0) -> tupl
     beside = (dot(nearest, flat), -pair.fixed.radius_1) if laws.contact_friction else None
     # A wall does not turn.
     along = (cross(xp, nearest, flat) if height else None, None)
-    return impulse_of(xp, pair, touches, turned(xp, cosine, sine, flat), along=along, beside=beside)
+    return impulse_of(xp, pair, touches, turned(xp, (cosine, sine), flat), along=along, beside=beside)
 
 
 def wall_meets_disc(xp: Any, laws: Laws, pair: Pair) -> tuple[Array, Array, Array]:
@@ -161,13 +162,13 @@ def corners_of(xp: Any, pair: Pair, side: int) -> Array:
     """Corners [..., corner, 2, world] of one square of each pair, from its centre, without derivative."""
     cosine, sine = (constant(part)[..., None, :] for part in pair.turns[side])
     radius = constant((pair.fixed.radius_0, pair.fixed.radius_1)[side])[..., None, None, :]
-    return turned(xp, cosine, sine, radius * xp.asarray(CORNERS))
+    return turned(xp, (cosine, sine), radius * xp.asarray(CORNERS))
 
 
 def seen_from(xp: Any, pair: Pair, side: int, points: Array) -> Array:
     """Points [..., corner, 2, world] in the frame of one body of each pair, without derivative."""
     cosine, sine = (constant(part)[..., None, :] for part in pair.turns[side])
-    return turned(xp, cosine, -sine, points)
+    return turned(xp, (cosine, -sine), points)
 
 
 def chosen(choice: Array, values: Array) -> Array:
@@ -198,10 +199,9 @@ def squares_meet(xp: Any, laws: Laws, pair: Pair) -> tuple[Array, Array, Array]:
     side = xp.sign(at) * xp.stack([1.0 * across_x, 1.0 - across_x * 1.0], -2)
     corner = chosen(choice, xp.asarray(np.concatenate([CORNERS, CORNERS])))
     # From here on with derivatives, for the chosen corner alone.
-    turns = pair.turns
-    arms = [turned(xp, *turn, corner * radius[..., None, :]) for turn, radius in zip(turns, radii, strict=True)]
+    arms = [turned(xp, turn, corner * radius[..., None, :]) for turn, radius in zip(pair.turns, radii, strict=True)]
     point = xp.where(of_second[..., None, :], pair.offset + arms[1], arms[0])
-    normal = xp.where(of_second[..., None, :], turned(xp, *turns[0], side), -turned(xp, *turns[1], side))
+    normal = xp.where(of_second[..., None, :], turned(xp, pair.turns[0], side), -turned(xp, pair.turns[1], side))
     levers = (cross(xp, point, normal), cross(xp, point - pair.offset, normal))
     beside = (dot(point, normal), dot(point - pair.offset, normal)) if laws.contact_friction else None
     return impulse_of(xp, pair, touches, normal, along=levers, beside=beside)
@@ -215,7 +215,7 @@ def wall_meets_square(xp: Any, laws: Laws, pair: Pair) -> tuple[Array, Array, Ar
     beside = abs(seen[..., 0, :]) > constant(pair.fixed.radius_0)[..., None, :]
     touches, choice = deepest(xp, xp.where(beside, -1.0, -behind * seen[..., 1, :]))
     corner = chosen(choice, xp.asarray(CORNERS)) * pair.fixed.radius_1[..., None, :]
-    arm = turned(xp, *pair.turns[1], corner)
+    arm = turned(xp, pair.turns[1], corner)
     normal = behind * xp.stack([-pair.turns[0][1], pair.turns[0][0]], -2)
     beside = (0.0 * pair.fixed.radius_0, dot(arm, normal)) if laws.contact_friction else None
     return impulse_of(xp, pair, touches, normal, along=(None, cross(xp, arm, normal)), beside=beside)

@@ -71,8 +71,8 @@ def checks(words: Words, asked: Sequence[Result]) -> list[Check]:
         found.append(_check(f"{word}: probability of {parameter}", probability, LEAST_PROBABILITY))
         if factor is None:
             continue
-        low, high = (None, None) if last is None else _mass(last).interval()
-        inside = None if low is None else float(low <= factor <= high)
+        low, high = (np.nan, np.nan) if last is None else _mass(last).interval()
+        inside = None if last is None else float(low <= factor <= high)
         found.append(_check(f"{word}: {factor:g} in the 90 % interval of the factor", inside, 1.0))
         own = None if last is None else accuracy(asked, word, str(last.evidence.videos))
         known = accuracy(asked, word, "built-in")

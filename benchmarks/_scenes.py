@@ -96,7 +96,7 @@ def positions_of(model: PhysicsModel = BASE) -> Callable[[Worlds], Tensor]:
 def gradient_of(worlds: Worlds, positions: Callable[[Worlds], Tensor], seen: Tensor) -> dict[str, Tensor]:
     """Derivative of the log density by `LEAVES`, where `positions` simulates."""
     leaves = {name: getattr(worlds, name).clone().requires_grad_() for name in LEAVES}
-    (-0.5 * ((positions(replace(worlds, **leaves)) - seen) / NOISE) ** 2).sum().backward()
+    torch.autograd.backward((-0.5 * ((positions(replace(worlds, **leaves)) - seen) / NOISE) ** 2).sum())
     return {name: leaf.grad for name, leaf in leaves.items() if leaf.grad is not None}
 
 

@@ -16,7 +16,6 @@ from pathlib import Path
 
 import _project  # noqa: F401  the generator belongs to the tests, which lie beside the package
 import numpy as np
-import questions as scoring
 import torch
 from map import PLANS
 
@@ -24,6 +23,7 @@ from tests.inference.generator import states
 from tests.inference.map_comparison import compare
 from tests.inference.random_scenes import TIMES, Truth, random_truth
 from vrdp_prob.datasets import load, read_questions
+from vrdp_prob.evaluation.judgement import judge
 from vrdp_prob.inference import Posterior, default_model
 from vrdp_prob.inference.assembly import posterior_from
 from vrdp_prob.inference.map_fit import MapFit, fit_map
@@ -32,8 +32,9 @@ from vrdp_prob.inference.samples import Convergence, Samples
 from vrdp_prob.models.simulator.rollout import simulate
 from vrdp_prob.models.simulator.worlds import Worlds
 from vrdp_prob.reasoning import PosteriorWorlds
-from vrdp_prob.scene import Tracks
+from vrdp_prob.scene import Question, Tracks
 
+DATA = Path(__file__).parents[2] / "shared" / "data" / "clevrer_bullet"
 ROWS = {
     "all at once": "all-at-once",
     "collision-independent first": "free-first",
@@ -54,7 +55,7 @@ class Row:
     inside: list[float] = field(default_factory=list)
     later: list[float] = field(default_factory=list)
     later_reoptimised: list[float] = field(default_factory=list)
-    score: scoring.Score = field(default_factory=scoring.Score)
+    right: list[bool] = field(default_factory=list)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -97,10 +98,10 @@ def row(plan: FitPlan, scenes: int, practice: int) -> Row:
         future = PosteriorWorlds(posterior, draws=DRAWS).future
         frame = int(np.abs(future.times - (end + LATER)).argmin())
         result.later_reoptimised.append(later_error(truth, future.trajectory[:, frame, :, :2].mean(axis=0)))
-    if scoring.DATA.is_dir():
-        asked = read_questions(scoring.DATA / "questions.json")
-        for scene in range(practice):
-            answer(result.score, load(scoring.DATA, video=f"video_{scene:05d}"), asked[f"video_{scene:05d}"], plan)
+    if DATA.is_dir():
+        asked = read_questions(DATA / "questions.json")
+        for video in (f"video_{scene:05d}" for scene in range(practice)):
+            result.right += answers(load(DATA, video=video), asked[video], plan)
     return result
 
 
@@ -116,13 +117,11 @@ def later_error(truth: Truth, predicted: np.ndarray) -> float:
     return float(np.sqrt(((predicted - true) ** 2).sum(axis=1).mean()))
 
 
-def answer(score: scoring.Score, tracks: Tracks, asked: Sequence[scoring.Question], plan: FitPlan) -> None:
-    """Answer the questions of a practice scene from its MAP."""
+def answers(tracks: Tracks, asked: Sequence[Question], plan: FitPlan) -> list[bool]:
+    """Whether each question about a practice scene is answered rightly from its MAP."""
     fit = fit_map(tracks, default_model(), np.random.default_rng(0), plan=plan)
     facts = PosteriorWorlds(map_posterior(fit), draws=DRAWS)
-    for question in asked:
-        for _ in scoring._judge(score, facts, question, question):
-            pass
+    return [judge(tracks.video, facts, question).right for question in asked]
 
 
 def map_posterior(fit: MapFit) -> Posterior:
@@ -142,8 +141,8 @@ def table(rows: dict[str, Row]) -> str:
     for title, one in rows.items():
         errors = [f"{np.median(part):.4f} ({np.mean(part):.3f})" for part in (one.inside, one.later)]
         again = f"{np.median(one.later_reoptimised):.4f} ({np.mean(one.later_reoptimised):.3f})"
-        answers = f"{one.score.per_question:.1%}" if one.score.questions else "not asked"
-        cells = [title, f"{np.mean(one.found):.0%}", *errors, again, answers]
+        asked = f"{np.mean(one.right):.1%}" if one.right else "not asked"
+        cells = [title, f"{np.mean(one.found):.0%}", *errors, again, asked]
         lines.append(f"| {' | '.join(cells)} |")
     return "\n".join(lines) + "\n"
 

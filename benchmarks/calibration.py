@@ -22,8 +22,8 @@ sys.path.insert(0, str(Path(__file__).parents[1]))  # the scenes are those of th
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 import torch
-from _calibration_page import Result, checks, figures, page, tables
-from _resumable import measured
+from _calibration_page import checks, figures, page, tables
+from _resumable import Result, measured
 
 from tests.inference.prior_scenes import PriorScene, prior_scene
 from tests.inference.scene_ranks import ranks

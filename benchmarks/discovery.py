@@ -25,9 +25,9 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 import torch
 from _discovery_page import page, tables
-from _discovery_results import Result, checks
+from _discovery_results import checks
 from _discovery_tasks import SIZES, Kind, Task, tasks
-from _resumable import measured, read
+from _resumable import Result, measured, read
 
 from tests.discovery.data_set import Truth
 from tests.discovery.hidden import ROUGH, hide, true_values

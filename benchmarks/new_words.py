@@ -19,6 +19,7 @@ import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 
@@ -108,9 +109,10 @@ def teach(task: tuple[int, Path]) -> Result:
     scene, folder = task
     torch.set_num_threads(1)
     try:
-        posterior, found = posterior_of(scene, folder), {}
+        posterior = posterior_of(scene, folder)
     except Exception as error:  # one video must not take the others with it; the reason stands in the results
         return {"scene": scene, "failed": f"{type(error).__name__}: {error}"}
+    found: dict[str, list[Any]] = {}
     for word in BUILT_IN:
         (question,) = questions_with(word, scene)
         several = [[question], [answers_of_the_video(question, scene)]] if word == "heavier" else [[question]]

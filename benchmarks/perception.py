@@ -13,6 +13,7 @@ import time
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from scipy.optimize import linear_sum_assignment
@@ -65,7 +66,7 @@ class Tally:
                 setattr(self, name, getattr(self, name) + value)
 
 
-def truth(annotation: dict) -> np.ndarray:
+def truth(annotation: dict[str, Any]) -> np.ndarray:
     """True positions (time, object, 2), NaN out of view."""
     frames = annotation["motion_trajectory"]
     positions = np.full((len(frames), len(annotation["object_property"]), 2), np.nan)
@@ -76,7 +77,7 @@ def truth(annotation: dict) -> np.ndarray:
     return positions
 
 
-def score(tracks: Tracks, annotation: dict) -> Tally:
+def score(tracks: Tracks, annotation: dict[str, Any]) -> Tally:
     """Compare the tracks of one video with its annotation."""
     true, measured = truth(annotation), tracks.positions
     distance = np.linalg.norm(measured[:, :, None] - true[:, None], axis=-1)
@@ -96,7 +97,7 @@ def score(tracks: Tracks, annotation: dict) -> Tally:
 def _score_object(
     tally: Tally,
     tracks: Tracks,
-    properties: dict,
+    properties: dict[str, Any],
     true: np.ndarray,
     distance: np.ndarray,
     *,
@@ -127,7 +128,7 @@ def _score_object(
         tally.sure.append(body.material == properties["material"])
 
 
-def checks(name: str, tally: Tally) -> list[dict]:
+def checks(name: str, tally: Tally) -> list[dict[str, Any]]:
     """The goals, measured on one group of videos."""
 
     def percent(values: Sequence[bool]) -> float | None:
@@ -171,7 +172,7 @@ def checks(name: str, tally: Tally) -> list[dict]:
     return [_check(f"{name}: {label}", value, goal, sense) for label, value, goal, sense in rows]
 
 
-def calibration_checks(camera: Camera) -> list[dict]:
+def calibration_checks(camera: Camera) -> list[dict[str, Any]]:
     """A camera estimated from the development videos and their annotations against the true one."""
     known = [read_annotation(DATA / f"annotations/annotation_{number:05d}.json") for number in DEVELOPMENT]
     videos = [DATA / f"videos/video_{number:05d}.mp4" for number in DEVELOPMENT]
@@ -190,7 +191,7 @@ def calibration_checks(camera: Camera) -> list[dict]:
     return [_check(f"calibration: {label}", value, goal, sense) for label, value, goal, sense in rows]
 
 
-def _check(name: str, value: float | None, goal: float | None, sense: str) -> dict:
+def _check(name: str, value: float | None, goal: float | None, sense: str) -> dict[str, Any]:
     met = value is not None and (goal is None or (value <= goal if sense == "<=" else value >= goal))
     return {"name": name, "value": value, "goal": None if goal is None else f"{sense} {goal:g}", "ok": met}
 

@@ -84,7 +84,7 @@ def measured(tracks: Tracks, sampler: str) -> Result:
     begin = time.perf_counter()
     posterior = infer(Tracks(tracks.video, bodies, tracks.data, tracks.walls), sampler=sampler)
     seconds = time.perf_counter() - begin
-    draws = posterior.data["posterior"]["mass"].values.reshape(-1, 2)
+    draws = posterior.data["posterior"].to_dataset()["mass"].values.reshape(-1, 2)
     log_ratio = np.log(draws[:, 0] / draws[:, 1])
     true = float(np.log((masses[0] or np.nan) / (masses[1] or np.nan)))
     levels = {}
@@ -97,7 +97,7 @@ def measured(tracks: Tracks, sampler: str) -> Result:
         float(np.exp(np.median(log_ratio))),
         float(log_ratio.std()),
         levels,
-        posterior.misfit.error_acceleration,
+        np.nan if posterior.misfit is None else posterior.misfit.error_acceleration,
         posterior.convergence.converged,
         seconds,
     )

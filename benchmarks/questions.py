@@ -101,7 +101,7 @@ def _miss(judged: Judgement) -> str:
 
 
 def _checks(scores: dict[Kind, Scores]) -> list[dict[str, object]]:
-    checks = []
+    checks: list[dict[str, object]] = []
     for kind, goals in GOALS.items():
         reached = (scores[kind].accuracy_per_option, scores[kind].accuracy_per_question)
         for goal, unit, value in zip(goals, ("option", "question"), reached, strict=True):

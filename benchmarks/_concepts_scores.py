@@ -68,7 +68,8 @@ def add_video(score: Score, case: Case, facts: TableFacts) -> None:
             score.right[name].append(best == str(getattr(true, name)))
             if name == "material" and shares[best] >= 0.9:
                 score.sure_of_material.append(best == true.material)
-        both = truth.motion().in_view[0, :, true_place] & facts.motion().in_view.all(axis=0)[:, place]
+        there = np.asarray(facts.motion().in_view.all(axis=0))
+        both = truth.motion().in_view[0, :, true_place] & there[:, place]
         moves = facts.motion().moving.mean(axis=0)[:, place] > 0.5
         score.right["moving"] += (moves[both] == truth.motion().moving[0, both, true_place]).tolist()
     for question in case.asked:

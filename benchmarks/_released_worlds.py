@@ -5,11 +5,11 @@ from functools import cache
 
 import numpy as np
 
-from vrdp_prob.reasoning.batch import FUTURE_FRAMES
 from vrdp_prob.reasoning.chance import Purpose, Seeded
 from vrdp_prob.reasoning.changes import Change
 from vrdp_prob.reasoning.events import EventTable, EventUniverse
 from vrdp_prob.reasoning.facts import MOVING_SPEED, Motion, draw_attributes
+from vrdp_prob.reasoning.future import FUTURE_FRAMES
 from vrdp_prob.reasoning.intervention import Intervention, drawn_meanings
 from vrdp_prob.reasoning.posterior_like import PosteriorLike
 from vrdp_prob.reasoning.stretch import State, Stretch, advance

@@ -18,9 +18,9 @@ from _true_posterior import TruePosterior
 from vrdp_prob.datasets import load
 from vrdp_prob.files import write_atomically
 from vrdp_prob.reasoning import PosteriorWorlds, ask
-from vrdp_prob.reasoning.batch import FUTURE_FRAMES
 from vrdp_prob.reasoning.entropy import entropy
 from vrdp_prob.reasoning.explanation.motions import FILMED_FRAMES
+from vrdp_prob.reasoning.future import FUTURE_FRAMES
 from vrdp_prob.scene import Body, Tracks
 
 DATA = Path(__file__).parents[2] / "shared" / "data" / "clevrer_bullet"

@@ -248,15 +248,15 @@ def _rows(results: Sequence[Result]) -> dict[str, list[Judgement]]:
 def _tables(rows: Mapping[str, Sequence[Judgement]]) -> list[str]:
     head = ("questions", "right, per question", "per option", "Brier", "lower than the best fit's by", *CALIBRATION)
     lines = [_row(*head), _row(*["---"] * len(head))]
-    for kind in Kind:
+    for kind in GOALS:
         ours, plain = ([one for one in rows[name] if one.kind is kind] for name in (FULL, BEST_FIT))
         score, (gain, interval) = Scores.of(ours), brier_gain(ours, plain)
         shares = [_with_interval(score, f"accuracy_per_{unit}") for unit in ("question", "option")]
         lower = f"{gain:.4f} ({interval.low:.4f} to {interval.high:.4f})"
         lines.append(_row(f"{_title(kind)} ({score.questions})", *shares, _number(score.brier), lower, *_ece(score)))
-    lines += ["", _row("right per question, Brier", *map(_title, Kind)), _row(*["---"] * (len(Kind) + 1))]
+    lines += ["", _row("right per question, Brier", *map(_title, GOALS)), _row(*["---"] * (len(GOALS) + 1))]
     for name, made in rows.items():
-        scores = [Scores.of([one for one in made if one.kind is kind]) for kind in Kind]
+        scores = [Scores.of([one for one in made if one.kind is kind]) for kind in GOALS]
         lines.append(_row(name, *(f"{_percent(one.accuracy_per_question)}, {_number(one.brier)}" for one in scores)))
     return lines
 
@@ -264,7 +264,7 @@ def _tables(rows: Mapping[str, Sequence[Judgement]]) -> list[str]:
 def _fewer_table(results: Sequence[Result]) -> list[str]:
     head = ("frames seen", "questions", "options", "right, per question", "per option", "Brier", "entropy, nats")
     lines = [_row(*head, *CALIBRATION), _row(*["---"] * (len(head) + len(CALIBRATION)))]
-    for kind in Kind:
+    for kind in GOALS:
         for frames in map(str, FEWER_FRAMES):
             made = [Judgement.of_document(one) for result in results for one in result["rows"].get(frames, ())]
             score = Scores.of([one for one in made if one.kind is kind])

@@ -13,7 +13,6 @@ from vrdp_prob.errors import InputError
 from vrdp_prob.inference import Status
 from vrdp_prob.reasoning import PosteriorWorlds, ask
 from vrdp_prob.reasoning.answer import Answer
-from vrdp_prob.reasoning.batch import FUTURE_FRAMES
 from vrdp_prob.reasoning.chance import MostProbable, Purpose, Seeded
 from vrdp_prob.reasoning.changes import Change, Meaning, PhysicalParameter, Rule, Shift
 from vrdp_prob.reasoning.coupled import Coupled
@@ -21,6 +20,7 @@ from vrdp_prob.reasoning.entropy import entropy
 from vrdp_prob.reasoning.explanation.explanation import Part
 from vrdp_prob.reasoning.explanation.motions import FILMED_FRAMES
 from vrdp_prob.reasoning.explanation.quantities import Kind
+from vrdp_prob.reasoning.future import FUTURE_FRAMES
 from vrdp_prob.scene import QuestionType
 
 ACCURACY = 0.05
@@ -35,8 +35,11 @@ class Word:
 
 
 def asked(known: KnownPosterior | PosteriorWorlds, *choices: str) -> Answer:
-    """An answer where all motion is known to follow the model, as the discs do."""
-    worlds = known if isinstance(known, PosteriorWorlds) else PosteriorWorlds(known, deviating=None)
+    """An answer where all motion is known to follow the model, and is known from the tracks alone.
+
+    Draws of the discs know their release exactly; on their own course they would not need the tracks.
+    """
+    worlds = known if isinstance(known, PosteriorWorlds) else PosteriorWorlds(known, deviating=None, own_courses=False)
     return ask(worlds, QUESTION, choices=choices or (OPEN,))
 
 
@@ -51,7 +54,7 @@ def part() -> Part:
 
 
 def entropy_of(known: KnownPosterior) -> float:
-    probability = asked(PosteriorWorlds(known, draws=200, deviating=None)).choices[0].probability
+    probability = asked(PosteriorWorlds(known, draws=200, deviating=None, own_courses=False)).choices[0].probability
     return entropy(np.array([probability, 1 - probability]))
 
 
@@ -115,7 +118,7 @@ def test_filming_on_lowers_the_entropy_as_predicted(part: Part, monkeypatch: pyt
     assert predicted.words == f"filming {FILMED_FRAMES} more frames"
     friction = PosteriorWorlds(posterior()).batches[0].common.friction
     assert friction is not None
-    monkeypatch.setattr("vrdp_prob.reasoning.batch.FUTURE_FRAMES", FUTURE_FRAMES - FILMED_FRAMES)
+    monkeypatch.setattr("vrdp_prob.reasoning.future.FUTURE_FRAMES", FUTURE_FRAMES - FILMED_FRAMES)
     random = np.random.default_rng(4)
     found = []
     for seed in range(TRUTHS):
@@ -143,7 +146,7 @@ def test_the_share_of_the_parameters_is_that_of_a_nested_simulation() -> None:
     """Many twins of every draw instead of one: the intraclass correlation of their answers."""
     discs = (*DISCS[:2], Disc((3.4, 0.0)))
     known = replace(posterior(mass_spread=0.03), discs=discs, tracks=tracks_of(discs, FRAMES, noise=0.01))
-    worlds = PosteriorWorlds(known, draws=200, deviating=None)
+    worlds = PosteriorWorlds(known, draws=200, deviating=None, own_courses=False)
     (told,) = asked(worlds).explain().parts
     assert told.shares is not None
     kept = {Purpose.FRICTION: 1.0, Purpose.LAST_FRICTION: 1.0}
@@ -190,7 +193,11 @@ def test_where_all_that_matters_is_known_the_rest_is_motion_or_chaos() -> None:
     )
     known = KnownPosterior(tracks_of(discs, 11, noise=0.003), discs, spread=0.0)
     choice = "The yellow object collides with the purple object"
-    (told,) = ask(PosteriorWorlds(known, draws=300, deviating=None), QUESTION, choices=[choice]).explain().parts
+    (told,) = (
+        ask(PosteriorWorlds(known, draws=300, deviating=None, own_courses=False), QUESTION, choices=[choice])
+        .explain()
+        .parts
+    )
     assert told.shares is not None
     assert told.shares.parameters < 0.4
     assert told.shares.motion > 0.5

@@ -9,6 +9,7 @@ from sliding_discs import Disc, KnownPosterior, changed, path, tracks_of
 from vrdp_prob.models.simulator.events import RolloutEventKind
 from vrdp_prob.reasoning import Change, PosteriorWorlds
 from vrdp_prob.reasoning.contacts import Contact
+from vrdp_prob.reasoning.future import FUTURE_FRAMES
 from vrdp_prob.reasoning.own_course import OwnCourses
 from vrdp_prob.reasoning.sight import Sight
 
@@ -94,6 +95,23 @@ def test_a_change_is_simulated_from_the_release_on() -> None:
     np.testing.assert_allclose(
         removed.trajectory[own, -1, 2, :2], np.tile(DISCS[2].position, (own.sum(), 1)), atol=1e-6
     )
+
+
+def test_after_the_video_a_draw_goes_on_as_it_came() -> None:
+    """The video ends before the first contact; a draw on its own course goes on from its release."""
+    posterior = KnownPosterior(tracks_of(DISCS, 10), DISCS, spread=0.0)
+    worlds = PosteriorWorlds(posterior, draws=DRAWS)
+    own = worlds.batches[0].seen.on_own_course
+    assert 0 < own.mean() < 1
+    expected, contacts = path(DISCS, 10 + FUTURE_FRAMES)
+    np.testing.assert_allclose(
+        worlds.future.trajectory[own, :, :, :2], np.tile(expected[10:], (own.sum(), 1, 1, 1)), atol=0.01
+    )
+    assert len(contacts) == 2
+    for time, first, second in contacts:
+        place = worlds.events().universe.collision(first, second)
+        assert worlds.future.events.happens[own, place].all()
+        np.testing.assert_allclose(worlds.future.events.time[own, place], time, atol=0.01)
 
 
 def test_without_a_camera_who_left_leaves_in_every_draw() -> None:

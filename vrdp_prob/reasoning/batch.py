@@ -14,8 +14,9 @@ from vrdp_prob.reasoning.counterfactual import Counterfactual
 from vrdp_prob.reasoning.deviations import FEWEST_DRAWS, Deviation, DeviationModel, seen_deviations, turns
 from vrdp_prob.reasoning.facts import draw_attributes
 from vrdp_prob.reasoning.friction import OwnFriction, ToldFriction, apply_friction, told_friction, with_friction_ratio
+from vrdp_prob.reasoning.future import after_the_video, future_times
 from vrdp_prob.reasoning.intervention import Intervention, drawn_meanings
-from vrdp_prob.reasoning.own_course import OwnCourses, changed_course
+from vrdp_prob.reasoning.own_course import OwnCourses, changed_course, continued_course
 from vrdp_prob.reasoning.refit import state_at_end
 from vrdp_prob.reasoning.released import Released
 from vrdp_prob.reasoning.scales import Examples
@@ -23,12 +24,9 @@ from vrdp_prob.reasoning.scattering import INSTANTS, Scattering, advance_scatter
 from vrdp_prob.reasoning.seen import SeenVideo
 from vrdp_prob.reasoning.sight import Sight
 from vrdp_prob.reasoning.stretch import State
-from vrdp_prob.reasoning.timeline import Timeline, WorldDraws
+from vrdp_prob.reasoning.timeline import WorldDraws
 from vrdp_prob.reasoning.values import Label
 from vrdp_prob.reasoning.wander import Foretelling
-
-FUTURE_FRAMES = 58
-"""Frames after the video that predictive questions ask about: 128 to 185 of a CLEVRER video."""
 
 FORETOLD_DRAWS = 60
 """Draws with which flights are foretold: enough for the variance of a place."""
@@ -121,20 +119,18 @@ class Batch:
         state = state.copy()
         if self.friction is not None:
             worlds = apply_friction(worlds, log_ratio)
-        end = float(seen.tracks.times[-1])
-        times = end + np.arange(FUTURE_FRAMES + 1) / seen.tracks.frame_rate
+        end, times = float(seen.tracks.times[-1]), future_times(self.common.sight)
         # in view of the last frame, bodies are held to start there; those that left are on their way since they did
         here = seen.presence[:, 1] >= len(seen.tracks.times)
         unseen = np.where(here, end - state.release[0], 0.0)
         state.position += state.velocity * unseen[:, None]
         state.release[:, here] = end
-        stretch = advance_scattered(worlds, state, times, model, self.scattering)
-        timeline = Timeline(seen.universe, seen.draws, seen.tracks.camera)
-        timeline.met[:, seen.universe.collisions] = seen.events.happens[:, seen.universe.collisions]
-        for meeting in stretch.meetings():
-            timeline.note_meeting(meeting, meeting.time > end)
-        timeline.note_crossings(stretch.times, stretch.position, stretch.exists, np.ones_like(timeline.collided))
-        return timeline.of(stretch)
+        stretch = advance_scattered(worlds, state, np.append(end, times), model, self.scattering)
+        refitted = after_the_video(self.common.sight, stretch, seen.events)
+        own = seen.on_own_course
+        if not own.any():
+            return refitted
+        return refitted.with_draws(own, continued_course(self.common.sight, self._extended[0], model, own, seen.events))
 
     def counterfactual(self, change: Change, body: int) -> WorldDraws:
         """What happens when one object (by its place) is changed from the beginning."""

@@ -4,7 +4,8 @@ There are two ways to what would have happened. What was seen may be kept wherev
 of the model cannot grow in it, but the states from which the simulation is resumed carry the noise of the tracks. Or a
 draw of the posterior is simulated as it is: then all of it fits together, but a draw in which something else happened
 than was seen tells of another video. Both err, in different ways; so half of those draws whose own course of events is
-the one that was seen follow it, in doubtful contacts and in changes, and the other draws keep what was seen.
+the one that was seen follow it, in doubtful contacts, in changes and after the video, and the other draws keep what was
+seen.
 """
 
 from dataclasses import dataclass
@@ -19,6 +20,7 @@ from vrdp_prob.models.simulator.events import RolloutEventKind
 from vrdp_prob.models.simulator.worlds import Worlds
 from vrdp_prob.reasoning.contacts import EDGE, Contact
 from vrdp_prob.reasoning.events import EventTable
+from vrdp_prob.reasoning.future import after_the_video, future_times
 from vrdp_prob.reasoning.intervention import Intervention
 from vrdp_prob.reasoning.released import Released
 from vrdp_prob.reasoning.sight import Sight
@@ -126,6 +128,16 @@ def changed_course(
         there = intervention.leaves_there[draws]
         timeline.note_as_seen(seen.select(draws), entering=there, leaving=there)
     return timeline.of(stretch)
+
+
+def continued_course(
+    sight: Sight, worlds: Worlds, model: PhysicsModel, chosen: Bool[np.ndarray, "draw"], seen: EventTable
+) -> WorldDraws:
+    """Some draws after the video, simulated from the release on; see `changed_course` for the parameters."""
+    draws = np.flatnonzero(chosen)
+    own = worlds.select(draws.tolist())
+    stretch = advance(own, State.released(own), future_times(sight), model)
+    return after_the_video(sight, stretch, seen.select(draws))
 
 
 def _at_release(worlds: Worlds, intervention: Intervention, draws: np.ndarray) -> State:

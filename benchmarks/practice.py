@@ -51,6 +51,7 @@ RESULTS = Path("out") / "practice"
 DRAWS = 100
 FEWER_FRAMES = (40, 80, 128)
 FULL, BEST_FIT, TRUE, EXTENDED = "everything", "best fit (VRDP's way)", "true masses and restitutions", "extended model"
+EXTENDED_BEST_FIT = "extended model, best fit"
 CALIBRATION = ("ECE", "95 % quantile if calibrated")
 
 
@@ -184,6 +185,7 @@ def _worlds(task: Task, tracks: Tracks) -> dict[str, Facts]:
     if task.extended is not None:
         extended = posterior_of(task, tracks, "extended", task.extended)
         worlds[EXTENDED] = PosteriorWorlds(extended, draws=DRAWS, deviating=deviating)
+        worlds[EXTENDED_BEST_FIT] = plug_in_worlds(extended)
     return worlds
 
 
@@ -246,18 +248,31 @@ def _rows(results: Sequence[Result]) -> dict[str, list[Judgement]]:
 
 
 def _tables(rows: Mapping[str, Sequence[Judgement]]) -> list[str]:
-    head = ("questions", "right, per question", "per option", "Brier", "lower than the best fit's by", *CALIBRATION)
-    lines = [_row(*head), _row(*["---"] * len(head))]
-    for kind in GOALS:
-        ours, plain = ([one for one in rows[name] if one.kind is kind] for name in (FULL, BEST_FIT))
-        score, (gain, interval) = Scores.of(ours), brier_gain(ours, plain)
-        shares = [_with_interval(score, f"accuracy_per_{unit}") for unit in ("question", "option")]
-        lower = f"{gain:.4f} ({interval.low:.4f} to {interval.high:.4f})"
-        lines.append(_row(f"{_title(kind)} ({score.questions})", *shares, _number(score.brier), lower, *_ece(score)))
+    lines = _scores(rows, FULL, BEST_FIT)
+    if EXTENDED in rows:
+        lines += [
+            "",
+            "With the extended model, beside its own best fit:",
+            "",
+            *_scores(rows, EXTENDED, EXTENDED_BEST_FIT),
+        ]
     lines += ["", _row("right per question, Brier", *map(_title, GOALS)), _row(*["---"] * (len(GOALS) + 1))]
     for name, made in rows.items():
         scores = [Scores.of([one for one in made if one.kind is kind]) for kind in GOALS]
         lines.append(_row(name, *(f"{_percent(one.accuracy_per_question)}, {_number(one.brier)}" for one in scores)))
+    return lines
+
+
+def _scores(rows: Mapping[str, Sequence[Judgement]], name: str, best_fit: str) -> list[str]:
+    """Scores of a row by kind, beside those of a best fit."""
+    head = ("questions", "right, per question", "per option", "Brier", "lower than the best fit's by", *CALIBRATION)
+    lines = [_row(*head), _row(*["---"] * len(head))]
+    for kind in GOALS:
+        ours, plain = ([one for one in rows[row] if one.kind is kind] for row in (name, best_fit))
+        score, (gain, interval) = Scores.of(ours), brier_gain(ours, plain)
+        shares = [_with_interval(score, f"accuracy_per_{unit}") for unit in ("question", "option")]
+        lower = f"{gain:.4f} ({interval.low:.4f} to {interval.high:.4f})"
+        lines.append(_row(f"{_title(kind)} ({score.questions})", *shares, _number(score.brier), lower, *_ece(score)))
     return lines
 
 

@@ -82,7 +82,7 @@ class Checkpoint:
         self.folder = Path(folder)
         check_writable(self.folder)
         self._facts = dict(facts)
-        found = self._claim()
+        found = self._owner()
         if found is not None and found != self._facts:
             names = sorted(set(found) | set(facts))
             other = ", ".join(name for name in names if found.get(name) != facts.get(name))
@@ -91,14 +91,18 @@ class Checkpoint:
                 "delete this one to start anew."
             )
 
-    def path(self, name: str) -> Path:
-        """Place of a file that is to be written; from now on the folder belongs to this run."""
-        if self._claim() is None:
+    def claim(self) -> None:
+        """From now on the folder belongs to this run, which does so by itself when it keeps something."""
+        if self._owner() is None:
             with write_atomically(self.folder / FINGERPRINT) as temporary:
                 temporary.write_text(json.dumps(self._facts, indent=1), encoding="utf-8")
+
+    def path(self, name: str) -> Path:
+        """Place of a file that is to be written; it claims the folder."""
+        self.claim()
         return self.folder / name
 
-    def _claim(self) -> dict[str, str] | None:
+    def _owner(self) -> dict[str, str] | None:
         """What the run depends on that the folder belongs to; None where it belongs to none."""
         try:
             found = json.loads((self.folder / FINGERPRINT).read_text(encoding="utf-8"))
@@ -108,7 +112,7 @@ class Checkpoint:
 
     def arrays(self, name: str, needed: Collection[str] = ()) -> dict[str, np.ndarray] | None:
         """Arrays that were kept under a name; None where there are none, one is missing, or they cannot be read."""
-        if self._claim() is None:
+        if self._owner() is None:
             return None
         try:
             with np.load(self.folder / f"{name}.npz", allow_pickle=False) as kept:

@@ -109,6 +109,7 @@ def infer(
     if checkpoint is not None:
         settings = {"sampler": sampler, "draws": draws, "noise": noise, "motion": motion, "hand_on": hand_on}
         kept = Checkpoint(checkpoint, fingerprint(tracks, physics, seed=seed, **settings))
+        kept.claim()
     generator = np.random.default_rng(seed)
     fit = fit_map(tracks, physics, generator, progress, noise=None if noise == "auto" else NoiseFamily(noise))
     if motion == "fixed":

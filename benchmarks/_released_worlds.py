@@ -9,7 +9,7 @@ from vrdp_prob.reasoning.chance import Purpose, Seeded
 from vrdp_prob.reasoning.changes import Change
 from vrdp_prob.reasoning.events import EventTable, EventUniverse
 from vrdp_prob.reasoning.facts import MOVING_SPEED, Motion, draw_attributes
-from vrdp_prob.reasoning.future import FUTURE_FRAMES
+from vrdp_prob.reasoning.future import future_times
 from vrdp_prob.reasoning.intervention import Intervention, drawn_meanings
 from vrdp_prob.reasoning.posterior_like import PosteriorLike
 from vrdp_prob.reasoning.stretch import State, Stretch, advance
@@ -95,7 +95,7 @@ class ReleasedWorlds:
         if change is not None:
             changed = Intervention(change, body, worlds, drawn_meanings(change, len(worlds), numbers)).worlds
         times = self.posterior.tracks.times
-        more = times[-1] + np.arange(1, FUTURE_FRAMES + 1) / self.posterior.tracks.frame_rate
+        more = future_times(self.posterior.tracks)
         state = State.released(changed)
         if change is not None and change.removes:
             state.present[:, body] = False

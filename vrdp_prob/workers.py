@@ -14,9 +14,12 @@ PATIENCE = 20
 
 
 @contextmanager
-def local_workers(processes: int | None) -> Iterator[Executor]:
-    """Processes of this machine, as many as there are cores where None; they end with the block, however it ends."""
-    workers = loky.ProcessPoolExecutor(max_workers=processes or os.cpu_count() or 1)
+def local_workers(processes: int | None, *, tasks: int) -> Iterator[Executor]:
+    """Processes of this machine, as many as there are cores where None; they end with the block, however it ends.
+
+    There are no more of them than tasks.
+    """
+    workers = loky.ProcessPoolExecutor(max_workers=min(processes or os.cpu_count() or 1, max(tasks, 1)))
     finished = False
     try:
         yield workers

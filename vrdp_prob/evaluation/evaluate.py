@@ -1,7 +1,6 @@
 """Evaluate the answers to a file of questions about many videos, in parallel; broken off, it can go on."""
 
 import json
-import os
 from collections.abc import Mapping, Sequence
 from concurrent.futures import as_completed
 from dataclasses import dataclass
@@ -175,15 +174,15 @@ def evaluate(
     if learned is not None:
         _check_words(learned, asked, vocabulary, Path(questions))
     tasks = _tasks(Path(folder), asked, source, camera, settings)
-    kept = {} if out is None else {task.scene: _checkpoint(Path(out), task) for task in tasks}
+    looks = "rules" if file is None else sha256(file.read_bytes()).hexdigest()
+    kept = {} if out is None else {task.scene: _checkpoint(Path(out), task, looks) for task in tasks}
     done = {scene: result for scene, one in kept.items() if (result := _done(one)) is not None}
     waiting = [task for task in tasks if task.scene not in done]
     if waiting and dask is None:
         compile_model(settings.model)
     with (progress or SilentProgress()).stage("Evaluating", total=len(tasks)) as advance:
         advance(len(done))
-        several = min(processes or os.cpu_count() or 1, max(len(waiting), 1))
-        with cluster(dask) if dask is not None else local_workers(several) as workers:
+        with cluster(dask) if dask is not None else local_workers(processes, tasks=len(waiting)) as workers:
             for future in as_completed([workers.submit(evaluate_scene, task) for task in waiting]):
                 result = future.result()
                 done[result.scene] = result
@@ -254,10 +253,9 @@ def _some(folder: Path, tasks: list[Task]) -> list[Task]:
     return tasks
 
 
-def _checkpoint(out: Path, task: Task) -> Checkpoint:
-    """What keeps the result of a video; another evaluation must not go on from it."""
+def _checkpoint(out: Path, task: Task, concepts: str) -> Checkpoint:
+    """What keeps the result of a video; another evaluation, with other concepts say, must not go on from it."""
     settings, source = task.settings, task.source
-    concepts = "rules" if settings.concepts is None else sha256(settings.concepts.read_bytes()).hexdigest()
     seen = tracks_facts(source) if isinstance(source, Tracks) else film_facts(source, task.camera)
     run = program_facts(
         questions=sha256(repr(task.questions).encode()).hexdigest(),

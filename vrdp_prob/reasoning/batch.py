@@ -119,7 +119,7 @@ class Batch:
         state = state.copy()
         if self.friction is not None:
             worlds = apply_friction(worlds, log_ratio)
-        end, times = float(seen.tracks.times[-1]), future_times(self.common.sight)
+        end, times = float(seen.tracks.times[-1]), future_times(seen.tracks)
         # in view of the last frame, bodies are held to start there; those that left are on their way since they did
         here = seen.presence[:, 1] >= len(seen.tracks.times)
         unseen = np.where(here, end - state.release[0], 0.0)

@@ -7,14 +7,14 @@ from vrdp_prob.reasoning.events import EventTable
 from vrdp_prob.reasoning.sight import Sight
 from vrdp_prob.reasoning.stretch import Stretch
 from vrdp_prob.reasoning.timeline import Timeline, WorldDraws
+from vrdp_prob.scene import Tracks
 
 FUTURE_FRAMES = 58
 """Frames after the video that predictive questions ask about: 128 to 185 of a CLEVRER video."""
 
 
-def future_times(sight: Sight) -> Float[np.ndarray, "frame"]:
+def future_times(tracks: Tracks) -> Float[np.ndarray, "frame"]:
     """Times in s of the frames after the last one of the video."""
-    tracks = sight.tracks
     return float(tracks.times[-1]) + np.arange(1, FUTURE_FRAMES + 1) / tracks.frame_rate
 
 

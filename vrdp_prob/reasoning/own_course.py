@@ -136,7 +136,7 @@ def continued_course(
     """Some draws after the video, simulated from the release on; see `changed_course` for the parameters."""
     draws = np.flatnonzero(chosen)
     own = worlds.select(draws.tolist())
-    stretch = advance(own, State.released(own), future_times(sight), model)
+    stretch = advance(own, State.released(own), future_times(sight.tracks), model)
     return after_the_video(sight, stretch, seen.select(draws))
 
 

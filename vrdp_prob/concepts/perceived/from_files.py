@@ -1,6 +1,5 @@
 """Concepts learned from a folder of videos and a question file; broken off, it can go on."""
 
-import os
 from collections.abc import Mapping
 from concurrent.futures import as_completed
 from dataclasses import dataclass
@@ -147,7 +146,7 @@ def look_at(
     waiting = [name for name in shown if name not in seen]
     with (progress or SilentProgress()).stage("Looking at videos", total=len(shown)) as advance:
         advance(len(seen))
-        with local_workers(min(processes or os.cpu_count() or 1, max(len(waiting), 1))) as workers:
+        with local_workers(processes, tasks=len(waiting)) as workers:
             looking = {workers.submit(_observed, shown[name].file, shown[name].camera): name for name in waiting}
             for future in as_completed(looking):
                 name = looking[future]

@@ -1,6 +1,5 @@
 """A word learned from a folder of videos and a question file; broken off, it can go on."""
 
-import os
 from collections.abc import Mapping, Sequence
 from concurrent.futures import as_completed
 from dataclasses import dataclass
@@ -123,7 +122,7 @@ def learn_from_files(
         compile_model(settings.model)
     with (progress or SilentProgress()).stage(f"Learning '{name}'", total=len(lessons)) as advance:
         advance(len(found))
-        with local_workers(min(processes or os.cpu_count() or 1, max(len(waiting), 1))) as workers:
+        with local_workers(processes, tasks=len(waiting)) as workers:
             for future in as_completed([workers.submit(_taught, lesson) for lesson in waiting]):
                 video, told = future.result()
                 found[video] = told

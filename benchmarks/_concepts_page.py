@@ -35,16 +35,18 @@ def draw(path: Path, sizes: Sequence[int], learned: Sequence[Score], alone: Sequ
 
     plt.rcParams["svg.hashsalt"] = "concepts"
     figure, (left, right) = plt.subplots(1, 2, figsize=(9, 3.4), sharey=True, layout="constrained")
-    for name, marker in zip(ATTRIBUTES, "os^", strict=True):
-        left.plot(sizes, [100 * score.share(name) for score in learned], marker=marker, label=name)
-    left.plot(sizes, [100 * score.share("moving") for score in alone], marker="v", label="moving")
+    for name, marker, color in zip(ATTRIBUTES, "os^", ("C0", "C1", "C2"), strict=True):
+        left.plot(sizes, [100 * score.share(name) for score in learned], marker=marker, color=color, label=name)
+        left.axhline(100 * rules.share(name), color=color, linewidth=0.8, linestyle="--")
+    left.plot(sizes, [100 * score.share("moving") for score in alone], "v:", color="C3", label="moving, learned events")
+    left.axhline(100 * rules.share("moving"), color="C3", linewidth=0.8, linestyle="--")
     for name, color in (("descriptive", "C0"), ("explanatory", "C1")):
         right.plot(sizes, [100 * score.share(name) for score in learned], marker="o", color=color, label=name)
         right.plot(
             sizes, [100 * score.share(name) for score in alone], "x:", color=color, label=f"{name}, learned events"
         )
         right.axhline(100 * rules.share(name), color=color, linewidth=0.8, linestyle="--")
-    for axes, title in ((left, "concepts"), (right, "questions (dashed: rules)")):
+    for axes, title in ((left, "concepts (dashed: rules)"), (right, "questions (dashed: rules)")):
         axes.set_xscale("log", base=2)
         axes.set_xticks(sizes, [str(size) for size in sizes])
         axes.set_xlabel("videos learned from")

@@ -1,5 +1,7 @@
-"""How long work tells that it goes on: a bar with the time left in a terminal, nothing elsewhere."""
+"""How long work tells that it goes on: a bar with the time left in a terminal, a line now and then in a log."""
 
+import sys
+import time
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 from typing import Protocol, runtime_checkable
@@ -69,7 +71,48 @@ class TerminalProgress:
                 progress.update(task, completed=total)
 
 
+class LogProgress:
+    """A line on standard error now and then; short stages tell nothing.
+
+    Parameters
+    ----------
+    every
+        Seconds between two lines at least.
+    clock
+        Tells the time in seconds.
+    """
+
+    def __init__(self, every: float = 30.0, clock: Callable[[], float] = time.monotonic) -> None:
+        self._every = every
+        self._clock = clock
+
+    @contextmanager
+    def stage(self, description: str, total: float | None = None) -> Iterator[Advance]:
+        """Open a stage told in lines."""
+        begin = told = self._clock()
+        done = 0.0
+
+        def advance(steps: float) -> None:
+            nonlocal done, told
+            done += steps
+            now = self._clock()
+            if now - told >= self._every:
+                told = now
+                print(_line(description, done, total, now - begin), file=sys.stderr, flush=True)
+
+        yield advance
+
+
+def _line(description: str, done: float, total: float | None, seconds: float) -> str:
+    if not total:
+        return f"{description}: {done:g} steps in {seconds:.0f} s"
+    left = f", about {seconds * (total - done) / done:.0f} s left" if 0 < done < total else ""
+    return f"{description}: {done:g} of {total:g} in {seconds:.0f} s{left}"
+
+
 def progress_display(*, quiet: bool) -> ProgressDisplay:
-    """Bars where standard error is a terminal and nobody asked for quiet, else nothing."""
+    """Nothing where somebody asked for quiet; bars where standard error is a terminal, lines elsewhere."""
+    if quiet:
+        return SilentProgress()
     console = Console(stderr=True)
-    return TerminalProgress(console) if console.is_terminal and not quiet else SilentProgress()
+    return TerminalProgress(console) if console.is_terminal else LogProgress()

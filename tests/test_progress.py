@@ -1,0 +1,27 @@
+"""Long work tells that it goes on."""
+
+import pytest
+
+from vrdp_prob.progress import LogProgress, SilentProgress, progress_display
+
+
+def test_a_log_gets_a_line_now_and_then(capsys: pytest.CaptureFixture[str]) -> None:
+    times = iter([100.0, 110.0, 120.0, 131.0, 135.0, 162.0])
+    with LogProgress(every=30, clock=times.__next__).stage("Evaluating", total=60) as advance:
+        for _ in range(5):
+            advance(3)
+    assert capsys.readouterr().err.splitlines() == [
+        "Evaluating: 9 of 60 in 31 s, about 176 s left",
+        "Evaluating: 15 of 60 in 62 s, about 186 s left",
+    ]
+
+
+def test_a_stage_of_unknown_length_counts_its_steps(capsys: pytest.CaptureFixture[str]) -> None:
+    with LogProgress(every=0).stage("Trying causes") as advance:
+        advance(2)
+    assert capsys.readouterr().err == "Trying causes: 2 steps in 0 s\n"
+
+
+def test_a_log_has_no_bars() -> None:
+    assert isinstance(progress_display(quiet=False), LogProgress)
+    assert isinstance(progress_display(quiet=True), SilentProgress)

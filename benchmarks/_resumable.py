@@ -1,12 +1,13 @@
 """Long runs of many tasks whose results are written one by one, so that a run that was interrupted goes on."""
 
 import json
-import multiprocessing
 from collections.abc import Callable, Mapping
+from concurrent.futures import as_completed
 from pathlib import Path
 from typing import Any, TypeVar
 
 from vrdp_prob.progress import progress_display
+from vrdp_prob.workers import local_workers
 
 Task = TypeVar("Task")
 Result = dict[str, Any]
@@ -40,11 +41,12 @@ def measured(
     known = {result[field]: result for result in read(path)}
     missing = [task for key, task in tasks.items() if key not in known]
     with (
-        multiprocessing.get_context("spawn").Pool(max(1, min(processes, len(missing)))) as pool,
+        local_workers(processes, tasks=len(missing)) as workers,
         path.open("a", encoding="utf-8") as file,
         progress_display(quiet=False).stage(label, total=len(missing)) as advance,
     ):
-        for result in pool.imap_unordered(work, missing):
+        for future in as_completed([workers.submit(work, task) for task in missing]):
+            result = future.result()
             file.write(json.dumps(result) + "\n")
             file.flush()
             known[result[field]] = result

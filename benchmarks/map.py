@@ -12,7 +12,6 @@ import json
 import sys
 import time
 from collections.abc import Sequence
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -26,6 +25,7 @@ from tests.inference.random_scenes import random_truth
 from vrdp_prob.inference import default_model
 from vrdp_prob.inference.map_fit import fit_map
 from vrdp_prob.inference.plan import ALL_AT_ONCE, CURRICULUM, FREE_FIRST, GROWING, FitPlan, Optimiser
+from vrdp_prob.workers import local_workers
 
 PLANS = {
     "default": FitPlan(),
@@ -74,8 +74,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     seeds = range(options.first, options.first + options.scenes)
     work = partial(outcome, plan=PLANS[options.plan])
     outcomes = []
-    with ProcessPoolExecutor(options.processes) as pool:
-        for one in pool.map(work, seeds):
+    with local_workers(options.processes, tasks=len(seeds)) as workers:
+        for one in workers.map(work, seeds):
             outcomes.append(one)
             print(one.line, flush=True)
     text = table(outcomes)

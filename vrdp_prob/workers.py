@@ -1,6 +1,8 @@
 """Who works on the videos: processes of this machine, or a Dask cluster."""
 
 import os
+import threading
+import time
 from collections.abc import Iterator
 from concurrent.futures import Executor
 from contextlib import contextmanager
@@ -19,13 +21,26 @@ def local_workers(processes: int | None, *, tasks: int) -> Iterator[Executor]:
 
     There are no more of them than tasks.
     """
-    workers = loky.ProcessPoolExecutor(max_workers=min(processes or os.cpu_count() or 1, max(tasks, 1)))
+    workers = loky.ProcessPoolExecutor(
+        max_workers=min(processes or os.cpu_count() or 1, max(tasks, 1)), initializer=_end_with, initargs=(os.getpid(),)
+    )
     finished = False
     try:
         yield workers
         finished = True
     finally:
         workers.shutdown(wait=finished, kill_workers=not finished)
+
+
+def _end_with(parent: int) -> None:
+    """Let this process end once its parent is gone, which may have been killed without a chance to tell."""
+
+    def watch() -> None:
+        while os.getppid() == parent:
+            time.sleep(1)
+        os._exit(1)
+
+    threading.Thread(target=watch, daemon=True).start()
 
 
 @contextmanager

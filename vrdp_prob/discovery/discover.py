@@ -144,7 +144,7 @@ def _cause(
     *,
     named: bool,
 ) -> FoundCause:
-    values = estimates(trial.fit, effect, overdispersion)
+    values = estimates(trial.fit, effect, unexplained=trial.unexplained, overdispersion=overdispersion)
     credible = min(1.0, surprise(trial.fit, effect) / SURPRISING)
     return FoundCause(
         name=effect.name,
@@ -187,6 +187,16 @@ def _notes(found: Search) -> list[str]:
         "has as its limit, and its probability counts that."
         for name in _strange(found)
     ]
+    largest = [max(video, key=lambda one: one.size) for video in found.best.unexplained.straying if video]
+    if largest:
+        sizes = [f"{one.size:.2g}" for one in sorted(largest, key=lambda one: one.size)]
+        duration = float(np.median([one.duration for one in largest]))
+        notes.append(
+            f"Something that no cause explains accelerates the bodies in {len(largest)} of the "
+            f"{len(found.best.fit.videos)} videos at random, by {' to '.join(dict.fromkeys((sizes[0], sizes[-1])))} "
+            f"m/s² for about {duration:.1g} s at a time. A cause has to explain more than such chance does, and "
+            "intervals allow for it."
+        )
     worst = int(np.argmax(found.overdispersion))
     if found.overdispersion[worst] > TELLING:
         notes.append(

@@ -9,6 +9,7 @@ from scipy.stats import chi2
 
 from vrdp_prob.discovery.finding import Estimate, UpperBound
 from vrdp_prob.discovery.scores import CauseScore
+from vrdp_prob.discovery.unexplained import Unexplained
 from vrdp_prob.inference.several_videos.fitting import SharedFit
 from vrdp_prob.inference.several_videos.linking import place_words
 from vrdp_prob.models.effects.effect import Effect
@@ -24,7 +25,11 @@ ONE_SIDED = 1.644854
 
 
 def estimates(
-    fit: SharedFit, effect: Effect, overdispersion: Float[np.ndarray, "video"] | None = None
+    fit: SharedFit,
+    effect: Effect,
+    *,
+    unexplained: Unexplained | None = None,
+    overdispersion: Float[np.ndarray, "video"] | None = None,
 ) -> dict[str, Estimate]:
     """Parameters of an effect by name, with the material, or the body and video, that each belongs to.
 
@@ -34,12 +39,16 @@ def estimates(
         Fit of a model with the effect.
     effect
         The effect.
+    unexplained
+        What the fit leaves to chance, which widens what is known; nothing where None.
     overdispersion
-        Factor of each video by which variances are larger than what the likelihood says, shared numbers by their mean;
-        1 where None.
+        Further factor of each video by which variances are larger than what the likelihood says, shared numbers by
+        their mean; 1 where None.
     """
     factors = np.ones(len(fit.videos)) if overdispersion is None else overdispersion
     shared_sd = fit.joint.gaussian.sd * np.sqrt(factors.mean())
+    if unexplained is not None:
+        shared_sd = shared_sd * unexplained.shared_widening
     units = {parameter.name: parameter for parameter in effect.parameters}
     found: dict[str, Estimate] = {}
     joint = fit.joint
@@ -52,6 +61,8 @@ def estimates(
     for index, video in enumerate(joint.videos):
         coordinates, point = video.likelihood.coordinates, joint.point(index)
         sd = np.sqrt(factors[index] * np.diag(np.linalg.inv(joint.precision(index))))
+        if unexplained is not None:
+            sd[list(unexplained.plain.videos[index].own_places)] *= unexplained.own_widening(index)
         for place in video.local_places:
             entry = coordinates.entries[place]
             if entry.field in units:

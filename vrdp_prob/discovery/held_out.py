@@ -53,7 +53,7 @@ def cavities(fit: SharedFit) -> dict[str, Cavity]:
     # The search ends a little off the maximum, which matters to what a single video says of a sharp number.
     rest = np.linalg.solve(total, -(prior.gradient + sum(gradients)))
     return {
-        video.name: _cavity(_own(fit, index), total, gradients[index] + one.reduced @ rest, one.reduced, mean + rest)
+        video.name: left_out(_own(fit, index), total, gradients[index] + one.reduced @ rest, one.reduced, mean + rest)
         for index, (video, one) in enumerate(zip(joint.videos, expansions, strict=True))
     }
 
@@ -67,13 +67,26 @@ def _own(fit: SharedFit, index: int) -> float:
     return own + log_prior_constant(entries[place] for place in video.local_places)
 
 
-def _cavity(
+def left_out(
     own: float,
     total: Float[np.ndarray, "shared shared"],
     gradient: Float[np.ndarray, "shared"],
     curvature: Float[np.ndarray, "shared shared"],
     mean: Float[np.ndarray, "shared"],
 ) -> Cavity:
+    """Leave out one video of a joint Gaussian.
+
+    Parameters
+    ----------
+    own
+        Log density (nats) of the video at the most probable shared unknowns, its own ones integrated out.
+    total, curvature
+        Curvature of the negative log density along the shared unknowns: of all videos with the prior, and of this one.
+    gradient
+        Gradient of the video's negative log density there.
+    mean
+        The most probable shared unknowns.
+    """
     others = _definite(total - curvature)
     covariance = np.linalg.inv(others)
     shift = covariance @ gradient

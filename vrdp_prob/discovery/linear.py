@@ -10,8 +10,11 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+import torch
 from jaxtyping import Float
 from scipy.stats import chi2
+
+from vrdp_prob.models.model_error import Whitening
 
 RIDGE = 1e-9
 """Relative size below which what unknowns do counts as nothing."""
@@ -33,6 +36,8 @@ class LinearVideo:
         Their derivatives by the video's own unknowns, and by those that all videos share.
     data
         Number of the residuals that are of the data.
+    whitening
+        What makes the data's residuals independent, where they stray; None where they are independent.
     """
 
     name: str
@@ -40,19 +45,50 @@ class LinearVideo:
     own: Float[np.ndarray, "residual own"]
     shared: Float[np.ndarray, "residual shared"]
     data: int
+    whitening: Whitening | None = None
+
+    @cached_property
+    def _decomposed(
+        self,
+    ) -> tuple[Float[np.ndarray, "residual own"], Float[np.ndarray, "own"], Float[np.ndarray, "own own"]]:
+        """Singular value decomposition of what the own unknowns do, each in a unit in which it does as much."""
+        basis, values, turn = np.linalg.svd(self.own / self._scale, full_matrices=False)
+        return basis, values, turn
+
+    @property
+    def _scale(self) -> Float[np.ndarray, "own"]:
+        return np.maximum(np.linalg.norm(self.own, axis=0), 1e-300)
 
     @cached_property
     def _basis(self) -> Float[np.ndarray, "residual rank"]:
         """Orthonormal basis of what the own unknowns can do."""
-        scale = np.maximum(np.linalg.norm(self.own, axis=0), 1e-300)
-        basis, values, _ = np.linalg.svd(self.own / scale, full_matrices=False)
+        basis, values, _ = self._decomposed
         kept: np.ndarray = basis[:, values > RIDGE * values.max(initial=0.0)]
         return kept
+
+    @property
+    def log_volume(self) -> float:
+        """Logarithm of the root of the determinant of the own unknowns' covariance where the shared ones are known."""
+        values = self._decomposed[1]
+        return -float(np.log(np.maximum(values, RIDGE * values.max(initial=0.0)) * self._scale).sum())
+
+    @property
+    def own_sd(self) -> Float[np.ndarray, "own"]:
+        """Standard deviations of the own unknowns where the shared ones are known."""
+        _, values, turn = self._decomposed
+        known = np.maximum(values, RIDGE * values.max(initial=0.0))
+        sd: np.ndarray = np.linalg.norm(turn.T / known, axis=1) / self._scale
+        return sd
 
     @property
     def absorbed(self) -> float:
         """Mean sum of squares that the own unknowns absorb of the data's residuals if these are noise."""
         return float((self._basis[: self.data] ** 2).sum())
+
+    @property
+    def left(self) -> Float[np.ndarray, "residual"]:
+        """The residuals when the own unknowns are at their best, the shared ones being those of the fit."""
+        return self.without_own(self.residuals[:, None])[:, 0]
 
     def without_own(
         self, directions: Float[np.ndarray, "residual direction"]
@@ -75,8 +111,34 @@ class LinearVideo:
         return replace(self, own=np.concatenate([self.own, self.shared], axis=1), shared=self.shared[:, :0])
 
     def padded(self, data: Float[np.ndarray, "data direction"]) -> Float[np.ndarray, "residual direction"]:
-        """Directions of the data's residuals, continued by zeros for the prior."""
-        return np.concatenate([data, np.zeros((len(self.residuals) - self.data, data.shape[1]))])
+        """Directions of the data's residuals, independent where these stray, continued by zeros for the prior."""
+        return np.concatenate([self._whitened(data), np.zeros((len(self.residuals) - self.data, data.shape[1]))])
+
+    def straying(self, whitening: Whitening) -> "LinearVideo":
+        """The video where its data's residuals stray, made independent."""
+
+        def independent(rows: Float[np.ndarray, "residual column"]) -> Float[np.ndarray, "residual column"]:
+            return np.concatenate([straying._whitened(rows[: self.data]), rows[self.data :]])
+
+        straying = replace(self, whitening=whitening)
+        return replace(
+            straying,
+            residuals=independent(self.residuals[:, None])[:, 0],
+            own=independent(self.own),
+            shared=independent(self.shared),
+        )
+
+    def _whitened(self, data: Float[np.ndarray, "data column"]) -> Float[np.ndarray, "data column"]:
+        if self.whitening is None:
+            return data
+        positions = len(self.whitening.position_log_volume)
+        rows = torch.from_numpy(np.ascontiguousarray(data.T))
+        parts = (
+            self.whitening.whitened_positions(rows[:, :positions]),
+            self.whitening.whitened_angles(rows[:, positions:]),
+        )
+        whitened: np.ndarray = torch.cat(parts, dim=1).numpy().T
+        return whitened
 
 
 @dataclass(frozen=True)
@@ -162,10 +224,20 @@ class LinearFit:
         return LinearFit(videos, np.pad(self.prior_gradient, room), np.pad(self.prior, room))
 
     @cached_property
+    def curvature(self) -> Float[np.ndarray, "shared shared"]:
+        """Information about the shared unknowns, the own ones of all videos following."""
+        return self.prior + sum(video.reduced_shared.T @ video.reduced_shared for video in self.videos)
+
+    @cached_property
     def _root(self) -> Float[np.ndarray, "shared known"]:
         """Root of the covariance of the shared unknowns, in the directions of which something is known."""
-        curvature = self.prior + sum(video.reduced_shared.T @ video.reduced_shared for video in self.videos)
-        return _covariance_root(curvature, RIDGE)
+        return _covariance_root(self.curvature, RIDGE)
+
+    @property
+    def shared_sd(self) -> Float[np.ndarray, "shared"]:
+        """Standard deviations of the shared unknowns."""
+        sd: np.ndarray = np.linalg.norm(self._root, axis=1)
+        return sd
 
     def _step(self, gradient: Float[np.ndarray, "shared column"]) -> Float[np.ndarray, "shared column"]:
         """Step of the shared unknowns."""

@@ -105,6 +105,8 @@ class VideoResiduals:
         The fitted noise.
     raw
         Differences of positions in m, observed less predicted.
+    own_places
+        Places of the video's own unknowns in its vector, in the order of the columns of `linear.own`.
     """
 
     linear: LinearVideo
@@ -112,6 +114,7 @@ class VideoResiduals:
     motion: FittedMotion
     noise: Noise
     raw: Float[np.ndarray, "observation 2"]
+    own_places: tuple[int, ...]
 
     @classmethod
     def of(cls, video: LinkedVideo, point: Float[np.ndarray, "dimension"], shared: int) -> "VideoResiduals":
@@ -137,14 +140,15 @@ class VideoResiduals:
             derivative[first:last] *= noise.slope(numbers)
         columns = np.zeros((len(values), shared))
         columns[:, video.shared_columns] = derivative[:, video.shared_places]
-        own = derivative[:, [place for place in video.local_places if world[place]]]
+        own = [place for place in video.local_places if world[place]]
         predicted = likelihood.predicted(torch.from_numpy(point[None]))[0, observations.frame, observations.body, :2]
         return cls(
-            LinearVideo(video.name, values, own, columns, data),
+            LinearVideo(video.name, values, derivative[:, own], columns, data),
             likelihood,
             FittedMotion.of(likelihood, point),
             noise,
             observations.position - predicted,
+            tuple(int(place) for place in own),
         )
 
     @property

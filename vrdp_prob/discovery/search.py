@@ -8,7 +8,6 @@ from jaxtyping import Float
 
 from vrdp_prob.discovery.overdispersion import overdispersion
 from vrdp_prob.discovery.proposals import hidden_things
-from vrdp_prob.discovery.residual_model import ResidualModel
 from vrdp_prob.discovery.scores import CauseScore, happens_once, score_causes
 from vrdp_prob.discovery.single_videos import causes_of_lost_videos, lost_videos
 from vrdp_prob.discovery.trials import Trial, gain, weights
@@ -146,10 +145,20 @@ class _Searcher:
         """A step in which nothing was tried yet; a trial that is asked for again is not scored again."""
         if trial not in self._known:
             left = [effect for effect in self.catalogue if effect.name not in trial.names]
-            residuals = ResidualModel.of(trial.fit)
-            scores = score_causes(trial.fit, residuals, left, seed=self.seed)
+            residuals = trial.unexplained.model
+            scores = self._scores(trial, left)
             self._known[trial] = Step(tuple(scores), (), overdispersion(residuals, seed=self.seed))
         return self._known[trial]
+
+    def _scores(self, trial: Trial, left: Sequence[Effect]) -> list[CauseScore]:
+        """Scores beside what the trial leaves to chance; a cause may explain that, too, and so promises more."""
+        found = trial.unexplained
+        scores = score_causes(trial.fit, found.model, left, seed=self.seed)
+        alone = scores
+        if found.model is not found.plain:
+            alone = score_causes(trial.fit, found.plain, left, seed=self.seed)
+        most = {one.effect.name: one.size / 2 - float(found.gains.sum()) for one in alone}
+        return [replace(one, promised=max(one.size / 2, most.get(one.effect.name, 0.0))) for one in scores]
 
     def tried(self, trial: Trial, step: Step) -> Step:
         """The step with the causes tried that may be the best one.
@@ -285,7 +294,7 @@ class _Searcher:
         lost their course of events on the way to it, and are searched anew.
         """
         found = self._all(trial.with_cause, scores)
-        promised = {one.effect.name: one.size / 2 for one in scores if not happens_once(one.effect)}
+        promised = {one.effect.name: one.promised for one in scores if not happens_once(one.effect)}
         for _ in range(MENDINGS):
             most = max((gain(one, trial)[0] for one in found), default=0.0)
             short = [

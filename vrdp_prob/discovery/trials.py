@@ -11,6 +11,7 @@ from vrdp_prob.discovery.finding import HeldOut
 from vrdp_prob.discovery.forecast import held_out
 from vrdp_prob.discovery.held_out import Cavity, cavities
 from vrdp_prob.discovery.scores import CauseScore, happens_once
+from vrdp_prob.discovery.unexplained import Unexplained, unexplained
 from vrdp_prob.inference.several_videos.ascent import ImpossibleStartError
 from vrdp_prob.inference.several_videos.fitting import Owned, SharedFit
 from vrdp_prob.inference.several_videos.second_look import MOST
@@ -58,13 +59,19 @@ class Trial:
         points = [joint.point(index) for index in range(len(joint.videos))]
         return held_out(joint.videos, points, list(self.cavities.values()))
 
+    @cached_property
+    def unexplained(self) -> Unexplained:
+        """What it leaves to chance."""
+        return unexplained(self.fit)
+
     @property
     def log_density(self) -> Float[np.ndarray, "video"]:
         """Log predictive density (nats, up to constants of the tracks) of each video given the others.
 
-        An effect that happens once may have happened to any body of any video, which counts against it.
+        What it leaves unexplained is chance as it is most probable. An effect that happens once may have happened to
+        any body of any video, which counts against it.
         """
-        density = np.array([one.log_density for one in self.cavities.values()])
+        density = np.array([one.log_density for one in self.cavities.values()]) + self.unexplained.gains
         return density - sum(self.choices.values(), np.zeros(len(density)))
 
     @property

@@ -7,6 +7,7 @@ is. Source: Kennedy and O'Hagan, Bayesian calibration of computer models, Journa
 for manned maneuvering targets, IEEE Transactions on Aerospace and Electronic Systems 6 (1970) (this process).
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -136,6 +137,9 @@ class Strands:
         return cls(tuple(positions), tuple(angles))
 
 
+Factors = tuple[tuple[Int[Tensor, "_"], Float[Tensor, "_ _"]], ...]
+
+
 @dataclass(frozen=True)
 class Whitening:
     """Turns residuals that stray into independent ones of unit variance.
@@ -146,21 +150,16 @@ class Whitening:
         Per strand its places and the inverse of its covariance's Cholesky factor.
     """
 
-    positions: tuple[tuple[Int[Tensor, "_"], Float[Tensor, "_ _"]], ...]
-    angles: tuple[tuple[Int[Tensor, "_"], Float[Tensor, "_ _"]], ...]
+    positions: Factors
+    angles: Factors
 
     @classmethod
     def of(cls, error: ModelError, strands: Strands) -> "Whitening":
         """The whitening of a model error."""
         variance = np.repeat(error.position_variance, 2)
         return cls(
-            tuple(
-                _factor(one, one.covariance(error.acceleration, error.duration, variance)) for one in strands.positions
-            ),
-            tuple(
-                _factor(one, one.covariance(error.angular_acceleration, error.duration, error.angle_variance))
-                for one in strands.angles
-            ),
+            factors(strands.positions, error.acceleration, error.duration, variance),
+            factors(strands.angles, error.angular_acceleration, error.duration, error.angle_variance),
         )
 
     @cached_property
@@ -177,7 +176,11 @@ class Whitening:
         return _whitened(residuals, self.angles)
 
 
-Factors = tuple[tuple[Int[Tensor, "_"], Float[Tensor, "_ _"]], ...]
+def factors(
+    strands: Sequence[Strand], size: float, duration: float, variance: Float[np.ndarray, "all_numbers"]
+) -> Factors:
+    """The places of each strand and what makes its numbers independent; see `Strand.covariance`."""
+    return tuple(_factor(one, one.covariance(size, duration, variance)) for one in strands)
 
 
 def _factor(strand: Strand, covariance: Float[np.ndarray, "number number"]) -> tuple[Tensor, Tensor]:

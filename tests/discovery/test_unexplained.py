@@ -1,0 +1,83 @@
+"""What a model leaves to chance: nothing of noise, most of accelerations at random, little of a cause once it is in."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tests.discovery.fitted import fitted
+from vrdp_prob.discovery import unexplained as module
+from vrdp_prob.discovery.residual_model import ResidualModel
+from vrdp_prob.discovery.trials import Trial, gain
+from vrdp_prob.discovery.unexplained import unexplained
+from vrdp_prob.inference.several_videos.fitting import SharedFit
+from vrdp_prob.inference.several_videos.population import with_learned_spreads
+from vrdp_prob.models.effects.surface_tilt import SurfaceTilt
+from vrdp_prob.models.model_error import straying
+
+
+def null() -> SharedFit:
+    _, fit = fitted(seed=1)
+    return fit.under(with_learned_spreads(fit), model_error=False)
+
+
+def _shaken(model: ResidualModel, size: float, duration: float) -> ResidualModel:
+    """The residuals of bodies that were accelerated at random: by another number every so often, summed by hand."""
+    generator = np.random.default_rng(3)
+    videos = []
+    for video in model.videos:
+        motion, steps = video.motion, 20
+        fine = np.linspace(motion.times[0], motion.times[-1], steps * len(motion.times))
+        moved = np.zeros((*motion.speed.shape, 3, 1))
+        for body in range(motion.speed.shape[1]):
+            for axis in (0, 1):
+                count = int(np.ceil(np.ptp(fine) / duration)) + 1
+                acceleration = size * generator.standard_normal(count)[((fine - fine[0]) / duration).astype(int)]
+                velocity = np.cumsum(acceleration) * (fine[1] - fine[0])
+                place = np.cumsum(velocity) * (fine[1] - fine[0])
+                moved[:, body, axis, 0] = np.interp(motion.times, fine, place)
+        # Rows are what a change of the measured places does to predicted less observed.
+        extra = -video.linear.padded(video.rows(moved))[:, 0]
+        videos.append(replace(video, linear=replace(video.linear, residuals=video.linear.residuals + extra)))
+    return ResidualModel(replace(model.linear, videos=tuple(one.linear for one in videos)), tuple(videos))
+
+
+def test_noise_leaves_nothing_unexplained() -> None:
+    found = unexplained(null())
+    assert found.straying == (None,) * 3
+    assert not found.gains.any()
+    assert found.model is found.plain
+
+
+@pytest.mark.parametrize("size", [0.02, 0.1])
+def test_accelerations_at_random_are_found(size: float, monkeypatch: pytest.MonkeyPatch) -> None:
+    fit, duration = null(), 0.5
+    shaken = _shaken(ResidualModel.of(fit), size, duration)
+    monkeypatch.setattr(module.ResidualModel, "of", lambda _: shaken)
+    found = unexplained(fit)
+    second = np.ones(1)
+    strayed = [
+        one.size * float(np.sqrt(straying(second, 0.0, one.duration)[0, 0]))
+        for video in found.straying
+        for one in video
+    ]
+    assert len(strayed) == 6
+    # Two steps of half a second each, of which the first moves a body by 3/8 of a m per m/s^2 and the second by 1/8.
+    assert 0.6 < np.median(strayed) / (size * np.hypot(3 / 8, 1 / 8)) < 1.6
+    assert found.gains.min() > 6
+    assert found.model.dispersion < 1.2 < found.plain.dispersion
+    assert found.shared_widening.max() > 1.5
+
+
+def test_a_cause_stands_out_and_leaves_nothing() -> None:
+    _, fit = fitted("surface_tilt", seed=2)
+    without = Trial((), fit.under(with_learned_spreads(fit), model_error=False))
+    tilt = SurfaceTilt()
+    within = Trial((tilt,), without.fit.under(without.fit.model.with_effect(tilt), model_error=False))
+    assert any(without.unexplained.straying)
+    assert within.unexplained.straying == (None,) * 3
+    plain = sum(one.log_density for one in within.cavities.values())
+    plain -= sum(one.log_density for one in without.cavities.values())
+    gained, error = gain(within, without)
+    assert 0 < gained < plain
+    assert gained > 2 * error

@@ -1,0 +1,251 @@
+"""Accelerations at random that a model leaves unexplained, beside which a cause has to stand out.
+
+No table is level to a micrometre. Where residuals are alike in neighbouring frames almost any cause follows some of
+them, and kicks and jumps follow each of them. So a model is judged by how probable it makes the videos together with an
+unknown acceleration in each, of the most probable size and duration: what chance explains as well is no merit of a
+cause. The process is that of `vrdp_prob/models/model_error.py`.
+
+Source: Kennedy and O'Hagan, Bayesian calibration of computer models, Journal of the Royal Statistical Society B 63
+(2001), section 4.4; restricted likelihood: Rasmussen and Williams, Gaussian Processes for Machine Learning (2006),
+section 2.7.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from jaxtyping import Float, Int
+from scipy.optimize import minimize
+from scipy.stats import chi2
+from torch import Tensor
+
+from vrdp_prob.discovery.held_out import left_out
+from vrdp_prob.discovery.linear import LinearFit, LinearVideo
+from vrdp_prob.discovery.residual_model import ResidualModel, VideoResiduals
+from vrdp_prob.inference.parallel import in_parallel
+from vrdp_prob.inference.several_videos.fitting import SharedFit
+from vrdp_prob.models.model_error import Strand, Whitening, factors
+
+NEEDED = 6.0
+"""Gain (nats) in the probability of a video from which on something is said to be unexplained in it."""
+SHARES = (0.001, 0.01, 0.1, 1.0)
+DURATIONS = (0.5, 2.0)
+"""Where the search begins: share of the accelerations that bodies show, and duration in s."""
+SHORTEST, LEAST_FRAMES = 0.3, 8
+"""Time in s from which an acceleration lasts, and number of frames that this is at least; what is faster is noise."""
+PARABOLA = 3
+"""Numbers that a parabola has."""
+SIMPLEX = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.5, 0.0], [0.0, 0.0, -0.5]])
+"""Corners of the search's first simplex about its start: logarithms of size, duration and variance of the noise."""
+EVALUATIONS = 60
+FAR = 1e12
+"""Cost of what is out of bounds."""
+
+
+@dataclass(frozen=True)
+class Straying:
+    """How the residuals of a video stray along one axis, or along both where the noise mixes them.
+
+    Parameters
+    ----------
+    size
+        Standard deviation in m/s^2 of a random acceleration of every body; 0 for none.
+    duration
+        Time in s after which it is another.
+    noise
+        Variance of the noise beside it in units of the fit's.
+    """
+
+    size: float
+    duration: float
+    noise: float
+
+
+@dataclass(frozen=True)
+class Unexplained:
+    """What a fit leaves unexplained.
+
+    Parameters
+    ----------
+    straying
+        How each video strays along its axes; None where noise explains what is left.
+    gains
+        How much (nats) more probable each video is with them, given the others.
+    plain, model
+        Residuals of the fit without them, and with them made independent.
+    """
+
+    straying: tuple[tuple[Straying, ...] | None, ...]
+    gains: Float[np.ndarray, "video"]
+    plain: ResidualModel
+    model: ResidualModel
+
+    @cached_property
+    def shared_widening(self) -> Float[np.ndarray, "shared"]:
+        """Factors by which the shared unknowns are less well known than noise alone would leave them."""
+        return _ratio(self.model.linear.shared_sd, self.plain.linear.shared_sd)
+
+    def own_widening(self, index: int) -> Float[np.ndarray, "own"]:
+        """The same of a video's own unknowns."""
+        return _ratio(self.model.linear.videos[index].own_sd, self.plain.linear.videos[index].own_sd)
+
+
+def unexplained(fit: SharedFit) -> Unexplained:
+    """Find the accelerations that make what a fit leaves most probable."""
+    plain = ResidualModel.of(fit)
+    searches = [_Search(video, part.clues.acceleration) for video, part in zip(plain.videos, fit.fits, strict=True)]
+    straying = tuple(in_parallel(_Search.found, searches))
+    nothing = np.zeros(len(searches))
+    if not any(straying):
+        return Unexplained(straying, nothing, plain, plain)
+    whitenings = [
+        None if one is None else search.whitening(one) for search, one in zip(searches, straying, strict=True)
+    ]
+    videos = tuple(
+        video if one is None else replace(video, linear=video.linear.straying(one))
+        for video, one in zip(plain.videos, whitenings, strict=True)
+    )
+    model = ResidualModel(replace(plain.linear, videos=tuple(one.linear for one in videos)), videos)
+    stretched = np.array([0.0 if one is None else _stretch(one) for one in whitenings])
+    gains = _log_densities(model.linear, stretched) - _log_densities(plain.linear, nothing)
+    return Unexplained(straying, gains, plain, model)
+
+
+@dataclass(frozen=True)
+class _Search:
+    """The search for the unknown acceleration of one video, whose bodies show accelerations of a typical size."""
+
+    video: VideoResiduals
+    shown: float
+
+    def found(self) -> tuple[Straying, ...] | None:
+        """The most probable straying; None where noise does as well, even if it is not that of the fit."""
+        noise = tuple(Straying(0.0, SHORTEST, float(one)) for one in self._variances(self._alone.left))
+        most = max(self._gain(noise), 0.0)
+        best = noise
+        for axis, fast in enumerate(self._fast_variances):
+            best = self._along(axis, best, fast)
+        return best if self._gain(best) - most > NEEDED else None
+
+    def _along(self, axis: int, others: tuple[Straying, ...], fast: float) -> tuple[Straying, ...]:
+        """The most probable straying along one axis, given that along the others."""
+
+        def with_logs(logs: Float[np.ndarray, "3"]) -> tuple[Straying, ...]:
+            return (*others[:axis], Straying(*np.exp(logs).tolist()), *others[axis + 1 :])
+
+        def cost(logs: Float[np.ndarray, "3"]) -> float:
+            return -self._gain(with_logs(logs)) if shortest <= np.exp(logs[1]) <= longest else FAR
+
+        times = self.video.motion.times
+        shortest = max(SHORTEST, LEAST_FRAMES * self.video.motion.frame_time)
+        longest = max(float(np.ptp(times)), shortest * np.e)
+        starts = [
+            np.log([share * self.shown, min(max(duration, shortest), longest), noise])
+            for share in SHARES
+            for duration in DURATIONS
+            for noise in (fast, others[axis].noise)
+        ]
+        best = min(starts, key=cost)
+        options = {"initial_simplex": best + SIMPLEX, "maxfev": EVALUATIONS, "xatol": 0.05, "fatol": 0.5}
+        found = minimize(cost, best, method="Nelder-Mead", options=options)
+        return with_logs(found.x) if -found.fun > self._gain(others) else others
+
+    def _gain(self, straying: tuple[Straying, ...]) -> float:
+        whitening = self.whitening(straying)
+        return _stretch(whitening) + _log_density(self._alone.straying(whitening)) - _log_density(self._alone)
+
+    @cached_property
+    def _alone(self) -> LinearVideo:
+        return self.video.linear.alone()
+
+    def whitening(self, straying: tuple[Straying, ...]) -> Whitening:
+        """What makes the residuals independent."""
+        video, unit = self.video, self.video.noise.slope(2) / self.video.noise_sd
+        strands = video.likelihood.strands
+        positions: list[tuple[Int[Tensor, "_"], Float[Tensor, "_ _"]]] = []
+        for axes, one in zip(self._axes, straying, strict=True):
+            some = [strand for strand in strands.positions if _axes(strand) == axes]
+            positions += factors(some, one.size * unit, one.duration, np.full(video.positions, one.noise))
+        angles = np.ones(video.linear.data - video.positions)
+        return Whitening(tuple(positions), factors(strands.angles, 0.0, 1.0, angles))
+
+    @cached_property
+    def _axes(self) -> list[tuple[int, ...]]:
+        """The axes, or both together where the noise mixes them."""
+        return sorted({_axes(strand) for strand in self.video.likelihood.strands.positions})
+
+    def _variances(self, residuals: Float[np.ndarray, "residual"]) -> list[float]:
+        """Mean square of the residuals, axis by axis."""
+        strands = self.video.likelihood.strands.positions
+        return [
+            float(np.mean(np.concatenate([residuals[one.places] for one in strands if _axes(one) == axes]) ** 2))
+            for axes in self._axes
+        ]
+
+    @cached_property
+    def _fast_variances(self) -> list[float]:
+        """Variance of the residuals about short parabolas, axis by axis: of what is faster than an acceleration.
+
+        Bodies shake, and noise may be alike in neighbouring frames.
+        """
+        several: list[list[float]] = [[] for _ in self._axes]
+        for strand in self.video.likelihood.strands.positions:
+            values = self.video.linear.residuals[strand.places].reshape(len(strand.times), -1)
+            several[self._axes.index(_axes(strand))].extend(_about_parabolas(values, strand.times))
+        return [float(np.median(some)) if some else 1.0 for some in several]
+
+
+def _axes(strand: Strand) -> tuple[int, ...]:
+    return tuple(sorted({int(place) % 2 for place in strand.places}))
+
+
+def _about_parabolas(values: Float[np.ndarray, "seen axis"], times: Float[np.ndarray, "seen"]) -> list[float]:
+    """Variances about parabolas through stretches of neighbours, whose median is that of the noise."""
+    if len(times) < LEAST_FRAMES:
+        return []
+    frames = max(LEAST_FRAMES, round(SHORTEST / float(np.median(np.diff(times)))))
+    found = []
+    for first in range(0, len(times) - frames + 1, frames):
+        inside = slice(first, first + frames)
+        since = times[inside] - times[first]
+        design = np.stack([since**power for power in range(PARABOLA)], axis=1)
+        left = values[inside] - design @ np.linalg.lstsq(design, values[inside], rcond=None)[0]
+        found.append(float((left**2).sum() / chi2.median((frames - PARABOLA) * left.shape[1])))
+    return found
+
+
+def _stretch(whitening: Whitening) -> float:
+    """Logarithm of the factor by which the residuals of a video are stretched when they are made independent."""
+    return float(whitening.position_log_volume.sum())
+
+
+def _log_density(video: LinearVideo) -> float:
+    """Log density (nats, up to a constant) of a video by itself, its unknowns integrated out."""
+    return video.log_volume - float(video.left @ video.left) / 2
+
+
+def _log_densities(linear: LinearFit, stretched: Sequence[float] | Float[np.ndarray, "video"]) -> np.ndarray:
+    """Log density (nats, up to constants of the tracks) of each video given the others.
+
+    Parameters
+    ----------
+    linear
+        Residuals of all videos.
+    stretched
+        Logarithm of the factor by which those of each video were stretched.
+    """
+    total = linear.curvature
+    found = []
+    for video, left, log_factor in zip(linear.videos, linear.left, stretched, strict=True):
+        shared = video.reduced_shared
+        own = video.log_volume + float(log_factor) - float(left @ left) / 2
+        cavity = left_out(own, total, shared.T @ left, shared.T @ shared, np.zeros(len(total)))
+        found.append(cavity.log_density)
+    return np.array(found)
+
+
+def _ratio(
+    with_it: Float[np.ndarray, "unknown"], without: Float[np.ndarray, "unknown"]
+) -> Float[np.ndarray, "unknown"]:
+    return np.maximum(with_it / np.maximum(without, 1e-300), 1.0)

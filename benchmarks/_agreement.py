@@ -61,7 +61,10 @@ def agreement(scenes: int, names: Sequence[str]) -> Iterator[SceneAgreement]:
     accepted = ((seed, scene) for seed in count() if (scene := prior_scene(seed)) is not None)
     for seed, scene in islice(accepted, scenes):
         fit = fit_map(scene.tracks, default_model(), np.random.default_rng(seed))
-        reported, start = Reported.of(fit.likelihood.coordinates, fit.contacts), start_of(fit)
+        reported, start = (
+            Reported.of(fit.likelihood.coordinates, fit.contacts, fit.likelihood.tracks.bodies),
+            start_of(fit),
+        )
         moments, verdicts, seconds = {}, {}, {}
         for name in names:
             begin = processor_seconds()

@@ -83,7 +83,7 @@ def samplers(videos: Sequence[Tracks], names: Sequence[str]) -> list[Check]:
     print("video        unknowns  sampler  cpu s  ESS bulk  tail  ESS/s  densities  gradients  converged")
     for tracks in videos:
         fit = fit_map(tracks, default_model(), np.random.default_rng(0))
-        reported = Reported.of(fit.likelihood.coordinates, fit.contacts)
+        reported = Reported.of(fit.likelihood.coordinates, fit.contacts, fit.likelihood.tracks.bodies)
         for key in names:
             begin = processor_seconds()
             samples = SAMPLERS[key](
@@ -125,7 +125,7 @@ def peer(most_gradients: int) -> list[Check]:
     """Pyro's NUTS on our simulator and on the fixed-step one, for the same tracks of three discs."""
     scene = random_scene(np.random.default_rng(500), bodies=3, squares=False)
     fit = fit_map(observe(scene, noise=0.01, seed=0), PhysicsModel.base(), np.random.default_rng(0))
-    reported, start = Reported.of(fit.likelihood.coordinates, fit.contacts), start_of(fit)
+    reported, start = Reported.of(fit.likelihood.coordinates, fit.contacts, fit.likelihood.tracks.bodies), start_of(fit)
     begin = processor_seconds()
     generator = np.random.default_rng(1)
     samples = SAMPLERS["nuts"](

@@ -271,7 +271,7 @@ def _scores(rows: Mapping[str, Sequence[Judgement]], name: str, best_fit: str) -
         ours, plain = ([one for one in rows[row] if one.kind is kind] for row in (name, best_fit))
         score, (gain, interval) = Scores.of(ours), brier_gain(ours, plain)
         shares = [_with_interval(score, f"accuracy_per_{unit}") for unit in ("question", "option")]
-        lower = f"{gain:.4f} ({interval.low:.4f} to {interval.high:.4f})"
+        lower = f"{gain:.4f}" + ("" if interval is None else f" ({interval.low:.4f} to {interval.high:.4f})")
         lines.append(_row(f"{_title(kind)} ({score.questions})", *shares, _number(score.brier), lower, *_ece(score)))
     return lines
 

@@ -56,6 +56,7 @@ from vrdp_prob.reasoning import ask, infer
 from vrdp_prob.reasoning.adaptive import check_mc_error
 from vrdp_prob.reasoning.checking import check_question
 from vrdp_prob.report.answer_lines import answer_lines
+from vrdp_prob.report.wording import with_names
 from vrdp_prob.report.pipeline import Report
 from vrdp_prob.report.pipeline import report as write_report
 from vrdp_prob.scene import Choice, Question
@@ -208,7 +209,9 @@ def ask_question(
         told = {} if explanation is None else {"explanation": explanation.to_document()}
         print(json.dumps({**answer.to_document(), **told}, allow_nan=False))
     else:
-        print("\n".join([*answer_lines(answer), *(explanation.sentences if explanation is not None else ())]))
+        reasons = explanation.sentences if explanation is not None else ()
+        lines = answer_lines(answer, tracks.bodies, posterior.warnings)
+        print("\n".join([*lines, *(with_names(reason, tracks.bodies) for reason in reasons)]))
 
 
 @app.command(name="discover")
@@ -294,7 +297,7 @@ def evaluate_answers(
     files = write_evaluation(evaluation, out)
     if as_json:
         print(json.dumps(to_document(evaluation), allow_nan=False))
-    else:
+    elif not quiet:
         print("\n".join([*table(evaluation), *(str(file) for file in files)]))
 
 

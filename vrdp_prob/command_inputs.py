@@ -35,7 +35,11 @@ def check_concepts(concepts: Concepts | None, questions: Iterable[Question], wor
     """Refuse questions with a word that the concepts never learned."""
     if concepts is not None:
         for question in questions:
-            concepts.check_question(question, Vocabulary.of(words))
+            try:
+                concepts.check_question(question, Vocabulary.of(words))
+            except InputError as error:
+                place = "" if question.source is None else f"{question.source}, question {question.question_id}: "
+                raise InputError(f"{place}{error}") from error
 
 
 def model_at(path: Path | None) -> PhysicsModel | None:
@@ -57,10 +61,7 @@ def questions_of(path: Path, names: list[str], words: Sequence[ChangeWord] = ())
                 f"{path}: there is no question about {name}; "
                 "the stem of a scene's 'video_filename' must be the name of the video."
             )
-        try:
-            check_questions(asked[name], words=words)
-        except InputError as error:
-            raise InputError(f"{path}, {name}, {error}") from error
+        check_questions(asked[name], words=words)
     return asked
 
 

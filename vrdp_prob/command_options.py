@@ -14,7 +14,13 @@ Model = Annotated[
         metavar="FILE.toml", help="Physics model; by default the base model with a friction of its own for every body."
     ),
 ]
-Sampler = Annotated[str, typer.Option(metavar="|".join(OPTIONS["sampler"]), help="How the posterior is drawn.")]
+Sampler = Annotated[
+    str,
+    typer.Option(
+        metavar="|".join(OPTIONS["sampler"]),
+        help="How the posterior is drawn; laplace takes seconds, and emcee goes on where it cannot be trusted.",
+    ),
+]
 Noise = Annotated[
     str,
     typer.Option(

@@ -5,6 +5,7 @@ import json
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from types import SimpleNamespace
 
 import jsonschema
 import pytest
@@ -102,10 +103,11 @@ def test_an_answer_is_printed_with_its_error(
     given: Answer,
     lines: list[str],
 ) -> None:
-    monkeypatch.setattr(cli, "infer", lambda *_arguments, **_options: None)
+    posterior = SimpleNamespace(warnings=("The draws have not converged.",))
+    monkeypatch.setattr(cli, "infer", lambda *_arguments, **_options: posterior)
     monkeypatch.setattr(cli, "ask", lambda *_arguments, **_options: given)
     assert cli.run(["ask", str(folder), given.question]) == 0
-    assert capsys.readouterr().out.splitlines() == lines
+    assert capsys.readouterr().out.splitlines() == [*lines, "note: The draws have not converged."]
 
 
 def test_the_same_seed_gives_the_same_answer(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:

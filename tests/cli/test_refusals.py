@@ -177,7 +177,7 @@ def test_an_error_that_cannot_be_reached_is_refused_before_the_video_is_read(
     [
         ("Why does the moon shine?", [], "why"),
         ("What will happen next?", [], "needs choices"),
-        ("What will happen next?", ["The moon shines"], "moon"),
+        ("What will happen next?", ["The moon shines"], "choice 'the moon shines' is not understood at 'moon'"),
         ("How many collisions happen?", ["two"], "without choices"),
     ],
 )
@@ -219,6 +219,7 @@ def test_objects_are_looked_up_before_inference(
     (folder / "questions.json").write_text(json.dumps(document))
     line = refused(capsys, "report", folder, "--questions", folder / "questions.json")
     assert message in line.replace("two objects", "2 objects")
+    assert f"{folder / 'questions.json'}, v, question 1: " in line
 
 
 def test_positions_are_no_videos_to_calibrate_with(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -97,15 +97,80 @@ def test_questions_are_found_by_the_stem_of_their_video(tmp_path: Path) -> None:
         ("", "not a JSON file"),
         ("[]", "holds no question"),
         ('[{"video_filename": "a.mp4", "questions": []}]', "holds no question"),
-        ('[{"questions": []}]', "needs 'video_filename' and 'questions'"),
-        ('[{"video_filename": "a.mp4", "questions": [{"question_id": 4}]}]', "question 4: KeyError 'question'"),
-        ('[{"video_filename": "a.mp4", "questions": ["why?"]}]', r"question \?: "),
+        ('[{"questions": []}]', "scene 1 has no 'video_filename'"),
+        ('[{"video_filename": 5, "questions": []}]', "scene 1 has 5 for 'video_filename'"),
+        ('[{"video_filename": "a.mp4"}]', "scene 1 has no 'questions'"),
+        ('[{"video_filename": "a.mp4", "questions": null}]', "scene 1 has null for 'questions'"),
+        ('[{"video_filename": "a.mp4", "questions": 5}]', "scene 1 has 5 for 'questions'"),
+        ('[{"video_filename": "a.mp4", "questions": {"a": 1}}]', "scene 1 has {\"a\": 1} for 'questions'"),
+        ("5", "scene 1 is 5"),
+        ('[{"video_filename": "a.mp4", "questions": [{"question_id": 4}]}]', "a, question 4: there is no 'question'"),
+        ('[{"video_filename": "a.mp4", "questions": ["why?"]}]', r"question \?: \"why\?\" is no question"),
     ],
 )
 def test_question_file_mistakes(tmp_path: Path, text: str, message: str) -> None:
     path = tmp_path / "questions.json"
     path.write_text(text)
     with pytest.raises(InputError, match=message):
+        read_questions(path)
+
+
+def question_file(path: Path, *entries: dict[str, Any]) -> Path:
+    """A question file about one video; every entry has a text and a name unless it says otherwise."""
+    questions = [{"question": "Why?", "question_id": 4 + place} | entry for place, entry in enumerate(entries)]
+    path.write_text(json.dumps([{"video_filename": "a.mp4", "questions": questions}]))
+    return path
+
+
+@pytest.mark.parametrize(
+    ("entry", "message"),
+    [
+        ({"question": None}, "'question' is null; give a text"),
+        ({"question": 7}, "'question' is 7; give a text"),
+        ({"question_type": "foo"}, 'is "foo"; use one of descriptive, explanatory, predictive, counterfactual'),
+        ({"question_type": ["descriptive"]}, "'question_type' is .*; use one of descriptive"),
+        ({"question_id": [1]}, "'question_id' is .*; give a whole number or a text"),
+        ({"question_subtype": 3}, "'question_subtype' is 3; give a text"),
+        ({"answer": {"a": 1}}, "'answer' is .*; give a text or a number"),
+        ({"program": "objects count"}, "'program' is \"objects count\"; a program is a list of tokens"),
+        ({"program": [["objects"], "count"]}, "a program is a list of tokens"),
+        ({"choices": "abc"}, "'choices' is \"abc\"; give a list"),
+        ({"choices": ["abc"]}, "entry 1 of 'choices' is \"abc\"; each needs at least 'choice'"),
+        ({"choices": [{"choice": "a"}, {"choice": 5}]}, "entry 2 of 'choices': 'choice' is 5; give a text"),
+        ({"choices": [{"choice_id": 0}]}, "entry 1 of 'choices': there is no 'choice'"),
+        ({"choices": [{"choice": "a", "answer": "maybe"}]}, "is judged 'maybe'; judge it 'correct' or 'wrong'"),
+        ({"choices": [{"choice": "a", "answer": True}]}, "'answer' is true; judge it 'correct' or 'wrong'"),
+        (
+            {"choices": [{"choice": "a", "choice_id": "1"}, {"choice": "b", "choice_id": 1}]},
+            "choice_id 1 is there twice",
+        ),
+    ],
+)
+def test_mistakes_in_a_question_are_told_by_its_field(tmp_path: Path, entry: dict[str, Any], message: str) -> None:
+    path = question_file(tmp_path / "questions.json", entry)
+    with pytest.raises(InputError, match=rf"questions.json, a, question .*: .*{message}"):
+        read_questions(path)
+
+
+def test_questions_of_a_scene_are_named_apart(tmp_path: Path) -> None:
+    twice = question_file(tmp_path / "questions.json", {"question_id": 3}, {"question_id": "3"})
+    with pytest.raises(InputError, match=r"questions.json, a: the question_id 3 is there twice; name them apart"):
+        read_questions(twice)
+    nameless = question_file(tmp_path / "questions.json", {"question_id": None}, {"question_id": None})
+    assert [question.question_id for question in read_questions(nameless)["a"]] == [None, None]
+
+
+def test_a_question_knows_its_file_but_is_what_it_asks(tmp_path: Path) -> None:
+    first, second = (question_file(tmp_path / name, {}) for name in ("a.json", "b.json"))
+    (one,), (other,) = (read_questions(path)["a"] for path in (first, second))
+    assert (one.source, other.source) == (f"{first}, a", f"{second}, a")
+    assert (one, repr(one)) == (other, repr(other))
+
+
+def test_a_file_that_is_no_text(tmp_path: Path) -> None:
+    path = tmp_path / "questions.json"
+    path.write_bytes(b"\x80\x00\xff")
+    with pytest.raises(InputError, match=r"not a JSON file \(it is not text\)"):
         read_questions(path)
 
 

@@ -6,6 +6,7 @@ import signal
 import subprocess
 import sys
 import time
+from dataclasses import replace
 from importlib import resources
 from pathlib import Path
 
@@ -13,10 +14,11 @@ import jsonschema
 import pytest
 from videos import SPEEDS, write_videos
 
-from vrdp_prob import InputError
+from vrdp_prob import InputError, cli
 from vrdp_prob.evaluation import evaluate
 from vrdp_prob.evaluation.document import table, to_document, write_evaluation
 from vrdp_prob.evaluation.evaluate import Evaluation
+from vrdp_prob.evaluation.page import render
 
 DRAWS = 100
 
@@ -120,6 +122,59 @@ def test_results_of_other_settings_are_not_mixed(folder: Path, tmp_path: Path) -
     evaluate(folder, folder / "questions.json", scenes=(10, 11), draws=DRAWS, out=tmp_path, processes=1)
     with pytest.raises(InputError, match=r"another run \(other seed\)"):
         evaluate(folder, folder / "questions.json", scenes=(10, 11), draws=DRAWS, seed=1, out=tmp_path)
+
+
+def test_a_refused_evaluation_leaves_the_folder_to_the_next(
+    folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("vrdp_prob.workers.PATIENCE", 1)
+    pytest.importorskip("distributed", reason="the optional library distributed is not installed")
+    call = {"scenes": (10, 11), "draws": DRAWS, "out": tmp_path / "out"}
+    with pytest.raises(InputError, match="no Dask scheduler answers"):
+        evaluate(folder, folder / "questions.json", **call, seed=5, dask="tcp://127.0.0.1:1")
+    assert not (tmp_path / "out").exists()
+    evaluate(folder, folder / "questions.json", **call, seed=6, processes=1)
+    with pytest.raises(InputError, match=r"another run \(other seed\)"):
+        evaluate(folder, folder / "questions.json", **call, seed=5)
+
+
+def test_one_video_gives_no_intervals(folder: Path, tmp_path: Path) -> None:
+    alone = evaluate(folder, folder / "questions.json", scenes=(10, 11), draws=DRAWS, processes=1)
+    document = to_document(alone)
+    assert document["posterior"]["descriptive"]["intervals"] == {}
+    gain = document["brier_gain_over_map"]["descriptive"]
+    assert (gain["low"], gain["high"]) == (None, None)
+    schema = json.loads((resources.files("vrdp_prob.report") / "schemas" / "evaluation.schema.json").read_text())
+    jsonschema.validate(json.loads(json.dumps(document)), schema)
+    page = write_evaluation(alone, tmp_path)[0].read_text()
+    assert "<title>Evaluation of 1 video</title>" in page
+    assert "5 questions about 1 video" in page
+    assert "One video alone gives no intervals" in page
+    assert "Intervals in brackets" not in page
+    assert " to " not in "".join(line for line in page.splitlines() if line.startswith("<tr><td>"))
+    assert 'class="good"' not in page
+    assert any(line.startswith("1 video, ") for line in table(alone))
+
+
+def test_a_quiet_evaluation_prints_nothing(folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    command = ["evaluate", str(folder), "--questions", str(folder / "questions.json"), "--scenes", "10:11"]
+    command += ["--processes", "1", "--out", str(tmp_path)]
+    assert cli.run([*command, "--quiet"]) == 0
+    assert capsys.readouterr() == ("", "")
+    assert cli.run(command) == 0
+    files = [str(tmp_path / name) for name in ("evaluation.html", "evaluation.json")]
+    assert capsys.readouterr().out.splitlines()[-2:] == files
+
+
+def test_wrong_answers_are_told_with_the_texts_of_their_choices(evaluation: Evaluation) -> None:
+    pairs = (("0", "The red cylinder and the blue cylinder collide"), ("1", "The <green> one and the red one meet"))
+    (result, *_), (judged, *_) = evaluation.results, evaluation.judgements("posterior", "predictive")
+    wrong = replace(judged, answer="0,1", truth="", right=False, texts=pairs)
+    judgements = dict.fromkeys(result.judgements, (wrong,))
+    page = render(Evaluation((replace(result, judgements=judgements),)))
+    told = "0: The red cylinder and the blue cylinder collide<br>1: The &lt;green&gt; one and the red one meet"
+    assert told in page
+    assert "none of the choices" in page
 
 
 @pytest.mark.filterwarnings("ignore")  # of the cluster's own libraries

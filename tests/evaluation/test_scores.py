@@ -119,6 +119,16 @@ def test_the_bootstrap_draws_scenes_not_questions() -> None:
     assert narrow.high - narrow.low == pytest.approx(2 * 1.96 * 0.5 / 20, rel=0.15)
 
 
+def test_one_scene_gives_no_interval() -> None:
+    alone = [open_answer(0.9, number % 2 == 0) for number in range(10)]
+    assert Scores.of(alone).intervals == {}
+    gain, interval = brier_gain(alone, alone)
+    assert (gain, interval) == (0.0, None)
+    # options of one scene alone, whatever else was asked about the other
+    scores = Scores.of([choices_of((0.9, True), scene="a"), open_answer(0.9, True, scene="b")])
+    assert set(scores.intervals) == {"accuracy_per_question", "brier"}
+
+
 def test_the_gain_is_the_difference_of_brier_scores() -> None:
     generator = np.random.default_rng(1)
     ours, other = [], []
@@ -131,4 +141,5 @@ def test_the_gain_is_the_difference_of_brier_scores() -> None:
     assert brier[0] is not None
     assert brier[1] is not None
     assert gain == pytest.approx(brier[1] - brier[0])
+    assert interval is not None
     assert interval.low < gain < interval.high

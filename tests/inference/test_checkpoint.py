@@ -55,6 +55,19 @@ def test_a_folder_belongs_to_the_first_run_that_keeps_something_in_it(tmp_path: 
     assert Checkpoint(tmp_path, {"seed": "4"}).arrays("part") is not None
 
 
+def test_reading_does_not_claim_a_folder(tmp_path: Path) -> None:
+    first = Checkpoint(tmp_path / "kept", {"seed": "3"})
+    assert (first.text("result.json"), first.arrays("part")) == (None, None)
+    assert not (tmp_path / "kept").exists()
+    other = Checkpoint(tmp_path / "kept", {"seed": "4"})
+    other.path("result.json").write_text("done")
+    assert other.text("result.json") == "done"
+    (tmp_path / "kept" / "result.json").write_bytes(b"\xff")
+    assert other.text("result.json") is None
+    with pytest.raises(InputError, match="belongs to another run"):
+        Checkpoint(tmp_path / "kept", {"seed": "3"})
+
+
 @pytest.mark.parametrize("name", ENOUGH)
 def test_a_run_that_was_killed_ends_with_the_same_numbers(name: str, tmp_path: Path) -> None:
     folder = tmp_path / "checkpoint"

@@ -99,13 +99,14 @@ def test_what_is_reported_of_a_video_holds_its_ratios_and_products() -> None:
     tracks = Tracks.from_arrays("seen", bodies, np.arange(5.0), positions)
     everything = frozenset(range(3))
     coordinates = unknowns(tracks, default_model(), Structure(moving=everything, colliding=everything))
-    reported = Reported.of(coordinates, [(0, 1), (1, 2), (0, 1)])
+    reported = Reported.of(coordinates, [(0, 1), (1, 2), (0, 1)], bodies)
     # The third body was weighed, so its ratio to another is that one's mass, which is there already.
     assert reported.names[len(coordinates) :] == (
-        "mass ratio of pair 0, 1",
-        "restitution of pair 0, 1",
-        "restitution of pair 1, 2",
+        "the mass ratio of objects 0 and 1",
+        "the restitution of objects 0 and 1",
+        "the restitution of objects 1 and 2",
     )
+    assert {"the restitution of object 1", "the velocity along x of object 2", "the noise scale"} <= set(reported.names)
     point = np.random.default_rng(1).standard_normal(len(coordinates))
     mass, restitution = ([point[coordinates.places[name, body]] for body in (0, 1)] for name in ("mass", "restitution"))
     values = reported.values(point)[len(coordinates) :]

@@ -69,6 +69,7 @@ def test_status_names_the_partners() -> None:
     assert posterior.status["1"].mass.status is Status.RATIO_ONLY
     assert posterior.status["1"].mass.partners == ("0", "2")
     assert posterior.object_summary("0").restitution.status == "product_only"
+    assert posterior.object_summary(0) == posterior.object_summary("0")
 
 
 def test_draws_are_worlds_that_reproduce_what_was_seen() -> None:

@@ -138,7 +138,7 @@ def test_doubt_of_parameters_and_of_motion_are_told_apart(part: Part) -> None:
     assert part.shares is not None
     assert part.shares.parameters > 0.8
     assert part.shares.chaos < 0.05
-    sum_of_shares = part.shares.parameters + part.shares.events + part.shares.motion + part.shares.chaos
+    sum_of_shares = sum(getattr(part.shares, name) for name in ("parameters", "events", "model", "motion", "chaos"))
     assert sum_of_shares == pytest.approx(1)
 
 

@@ -125,11 +125,35 @@ def test_choices(choice: str, kind: QuestionType, program: str) -> None:
         ("What is the shape of the red red cube?", "is not understood at 'red' (word 8)"),
         ("How many collisions happen before the cube?", "ends too early, after 'cube'"),
         ("Bonjour", "is not understood at 'bonjour' (word 1)"),
+        ("Isn't the red cube moving?", "is not understood at 'isn't' (word 1)"),
+        ("Can't the cube enter the scene?", "is not understood at 'can't' (word 1)"),
+        ("What ain't red?", "is not understood at 'ain't' (word 2)"),
+        ("Does the cube's exit fly?", "is not understood at 'fly' (word 5)"),
+        ("What would happen if the cube were times heavier?", "is not understood at 'times' (word 8)"),
+        ("What would happen if the cube were three times heavier?", "is not understood at 'three' (word 8)"),
     ],
 )
 def test_refusals_name_the_word(question: str, message: str) -> None:
     with pytest.raises(InputError, match=re.escape(message)):
         parse_question(question)
+
+
+@pytest.mark.parametrize(
+    ("contracted", "in_full"),
+    [
+        ("What's the color of the red cube?", "What is the color of the red cube?"),
+        ("What color is the cube that\u2019s moving?", "What color is the cube that is moving?"),
+        ("Which event won't happen next?", "Which event will not happen next?"),
+        (
+            "Which of these isn't responsible for the first collision?",
+            "Which of these is not responsible for the first collision?",
+        ),
+        ("What wouldn't happen if the cube weren't there?", "What would not happen if the cube were not there?"),
+        ("What is responsible for the red cube's exit?", "What is responsible for the red cube 's exit?"),
+    ],
+)
+def test_contractions_are_read_in_full(contracted: str, in_full: str) -> None:
+    assert parse_question(contracted) == parse_question(in_full)
 
 
 def test_choices_that_cannot_be_judged_are_refused() -> None:

@@ -92,6 +92,13 @@ def test_filters_of_objects(program: str, expected: set[str]) -> None:
         ("events objects filter_collision", {"01", "03", "23"}),
         (f"events {RED_CUBE} filter_collision", {"01", "03"}),
         (f"events {RED_CUBE} filter_collision {SPHERE} filter_collision", {"01"}),
+        ("events objects cube filter_shape filter_collision", {"01", "03", "23"}),
+        ("events objects cube filter_shape filter_collision objects cube filter_shape filter_collision", {"03"}),
+        (f"events {RED_CUBE} filter_collision objects metal filter_material filter_collision", set()),
+        (f"events {RED_CUBE} filter_collision objects blue filter_color filter_collision", {"01", "03"}),
+        (f"events objects filter_collision {RED_CUBE} filter_collision {SPHERE} filter_collision", {"01"}),
+        (f"events {RED_CUBE} filter_collision start filter_after {RED_CUBE[:-7]} filter_collision", set()),
+        (f"all_events {BLUE_CUBE} filter_collision objects cube filter_shape filter_collision", {"03"}),
         (f"events events {CYLINDER} filter_in unique filter_before", {"start", "in1", "01"}),
         (f"events events {CYLINDER} filter_in unique filter_after", {"03", "23", "out3", "end"}),
         ("events start filter_before", set()),
@@ -112,6 +119,62 @@ def test_order(order: str, expected: str) -> None:
     facts = video(STORY)
     program = f"events {RED_CUBE} filter_collision {order} filter_order {RED_CUBE} get_col_partner query_shape"
     assert answer(facts, program) == expected
+
+
+@pytest.mark.parametrize(
+    ("question", "expected"),
+    [
+        ("How many cubes collide with the red cube?", 1),
+        ("How many red cubes collide with the red cube?", 0),
+        ("How many metal objects collide with the red cube?", 0),
+        ("How many objects collide with the red cube?", 2),
+        ("Do any metal cubes collide with the red cube?", "no"),
+        ("What color is the first cube that collides with the red cube?", "blue"),
+    ],
+)
+def test_a_named_object_is_not_what_it_collides_with(question: str, expected: str | int) -> None:
+    assert answer_question(video(STORY), question).answer == expected
+
+
+def test_an_object_that_collides_with_none_of_a_kind_has_no_first_one() -> None:
+    with pytest.raises(InputError, match="no first collision of the sphere with the blue object in the video"):
+        answer_question(video(STORY), "What shape is the first blue object that collides with the sphere?")
+
+
+def test_an_object_does_not_collide_with_itself() -> None:
+    facts = video(STORY)
+    with pytest.raises(InputError, match=r"^the red cube is named twice, and an object cannot collide with itself; "):
+        answer_question(facts, "Does the red cube collide with the red cube?")
+    with pytest.raises(
+        InputError, match=r"^the sphere and the rubber sphere are the same object, and an object cannot"
+    ):
+        answer_question(facts, "What happens next?", choices=["The sphere collides with the rubber sphere"])
+
+
+def test_draws_in_which_two_names_are_of_one_object_are_left_out() -> None:
+    unsure = {"color": {"red": 0.5, "brown": 0.5}}
+    cube = Body("0", Shape.CUBE, 0.2, color="red", attribute_probabilities=unsure)
+    other = Body("3", Shape.CYLINDER, 0.2, color="brown", attribute_probabilities=unsure)
+    facts = video(*[STORY] * 200, bodies=(cube, BODIES[1], BODIES[2], other))
+    given = answer_question(facts, "Does the cube collide with the red object?")
+    assert given.distribution == {"yes": 1.0}
+    assert "the cube and the red object are the same object" in given.notes[0]
+
+
+def test_no_change_is_simulated_after_the_video() -> None:
+    facts = video(STORY, future=[[collision(150, "1", "2")]])
+    for what_if in ("get_counterfact", "counterfact_heavier", "apply_lighter get_counterfact"):
+        with pytest.raises(
+            InputError, match=r"after the video is not known with the red cube .* instead of unseen_events"
+        ):
+            answer(facts, f"unseen_events objects filter_collision {RED_CUBE} {what_if} count")
+
+
+@pytest.mark.parametrize("second", ["apply_lighter get_counterfact", "counterfact_lighter"])
+def test_an_object_is_changed_in_one_way(second: str) -> None:
+    for events in ("", "all_events "):
+        with pytest.raises(InputError, match="the red cube cannot be heavier and lighter in one question"):
+            answer(video(STORY), f"{events}{RED_CUBE} apply_heavier {second} count")
 
 
 def test_an_order_that_is_not_reached_is_refused() -> None:

@@ -13,7 +13,7 @@ from vrdp_prob.report.content import AnswerContent
 from vrdp_prob.report.document import schema, to_document
 
 OBSERVATION = Observation("looking up the color of object 0", 0.1, 0.02, 0.6)
-PART = Part(1, "A and B collide", "yes", 0.4, 0.6, (), Shares(0.7, 0.0, 0.2, 0.1, 0.03), (OBSERVATION,))
+PART = Part(1, "A and B collide", "yes", 0.4, 0.6, (), Shares(0.7, 0.0, 0.0, 0.2, 0.1, 0.03), (OBSERVATION,))
 EXPLANATION = Explanation("What will happen next?", (PART,))
 
 

@@ -102,12 +102,13 @@ def test_lists_and_counts():
 
 
 def test_sentences_name_objects():
-    bodies = (body("3", "cyan"), body("4", "red"), body("13", "blue"), body("left puck"))
+    bodies = (body("0", "gray"), body("3", "cyan"), body("4", "red"), body("13", "blue"), body("left puck"))
     assert with_names("Objects 3, 4 never collide.", bodies) == "The cyan sphere and the red sphere never collide."
     assert with_names("Object 13 stops at 3 s.", bodies) == "The blue sphere stops at 3 s."
     assert (
         with_names("as if objects 4 and left puck met", bodies) == "as if the red sphere and the sphere “left puck” met"
     )
+    assert with_names("most for object 4, 0.014 m", bodies) == "most for the red sphere, 0.014 m"
     assert with_names("The objects 5 and 134 are others.", bodies) == "The objects 5 and 134 are others."
 
 

@@ -5,14 +5,15 @@ positions out of view stay for scoring.
 """
 
 import json
-from collections.abc import Mapping, Sequence, Sized
+from collections.abc import Mapping, Sized
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from vrdp_prob.datasets.question_entry import check_ids, in_short, question_of
 from vrdp_prob.errors import InputError
-from vrdp_prob.scene import Body, Camera, Choice, Question, QuestionType, Shape, Tracks
+from vrdp_prob.scene import Body, Camera, Question, Shape, Tracks
 from vrdp_prob.scene.camera import REST_HEIGHT
 
 FRAME_RATE = 25.0
@@ -33,6 +34,10 @@ def read_json(path: Path | str) -> Any:
         return json.loads(Path(path).read_text(encoding="utf-8"))
     except OSError as error:
         raise InputError(f"{path}: the file cannot be read ({error.strerror}); check the path.") from error
+    except UnicodeDecodeError as error:
+        raise InputError(f"{path}: not a JSON file (it is not text); check that it is the right one.") from error
+    except RecursionError as error:
+        raise InputError(f"{path}: not a JSON file of this tool (it is nested too deeply); check it.") from error
     except ValueError as error:
         raise InputError(f"{path}: not a JSON file ({error}); check that it is whole.") from error
 
@@ -79,8 +84,9 @@ def read_annotation(path: Path | str, *, camera: Camera | None = None) -> Tracks
     except (KeyError, TypeError, IndexError, ValueError) as error:
         if isinstance(error, InputError):
             raise
+        reason = f"there is no {error}" if isinstance(error, KeyError) else "a field is of another form"
         raise InputError(
-            f"{path}: not a CLEVRER annotation ({type(error).__name__}: {error}); "
+            f"{path}: not a CLEVRER annotation ({reason}); "
             "it needs 'object_property', 'motion_trajectory' and 'video_filename'."
         ) from error
     seen_twice = np.isfinite(positions[..., 0]).sum(axis=0) >= 2
@@ -107,8 +113,9 @@ def read_questions(path: Path | str) -> dict[str, list[Question]]:
     """
     questions: dict[str, list[Question]] = {}
     for name, scene in _scenes(path):
-        entries = scene["questions"]
-        questions.setdefault(name, []).extend(_question(f"{path}, {name}", entry) for entry in entries)
+        several = [question_of(f"{path}, {name}", entry) for entry in scene["questions"]]
+        check_ids(f"{path}, {name}", "question_id", [question.question_id for question in several])
+        questions.setdefault(name, []).extend(several)
     if not any(questions.values()):
         raise InputError(f"{path}: the file holds no question; give at least one.")
     return questions
@@ -170,15 +177,27 @@ def _scenes(path: Path | str) -> list[tuple[str, Document]]:
     """Entries of a question file with the stems of their videos."""
     document = read_json(path)
     found = []
-    for scene in document if isinstance(document, list) else [document]:
-        try:
-            found.append((Path(scene["video_filename"]).stem, scene))
-            scene["questions"]
-        except (KeyError, TypeError) as error:
+    for number, scene in enumerate(document if isinstance(document, list) else [document], start=1):
+        problem = _problem_of_scene(scene)
+        if problem is not None:
             raise InputError(
-                f"{path}: not a CLEVRER question file ({error}); every scene needs 'video_filename' and 'questions'."
-            ) from error
+                f"{path}: not a CLEVRER question file (scene {number} {problem}); "
+                "every scene needs 'video_filename', a text, and 'questions', a list."
+            )
+        found.append((Path(scene["video_filename"]).stem, scene))
     return found
+
+
+def _problem_of_scene(scene: object) -> str | None:
+    """What is wrong with an entry of a question file; None where nothing is."""
+    if not isinstance(scene, dict):
+        return f"is {in_short(scene)}"
+    for name, kind in (("video_filename", str), ("questions", list)):
+        if name not in scene:
+            return f"has no '{name}'"
+        if not isinstance(scene[name], kind):
+            return f"has {in_short(scene[name])} for '{name}'"
+    return None
 
 
 def _body(path: Path | str, entry: Document) -> Body:
@@ -199,40 +218,3 @@ def _unwrapped(angles: np.ndarray) -> np.ndarray:
         measured = np.isfinite(column)
         column[measured] = np.unwrap(column[measured])
     return result
-
-
-def _question(place: str, entry: Any) -> Question:
-    try:
-        text = entry["question"]
-        kind = entry.get("question_type")
-        choices = tuple(
-            Choice(
-                choice.get("choice_id", number),
-                choice["choice"],
-                _program(choice.get("program")),
-                choice.get("answer"),
-            )
-            for number, choice in enumerate(entry.get("choices") or ())
-        )
-        answer = entry.get("answer")
-        return Question(
-            text=text,
-            program=_program(entry.get("program")),
-            choices=choices,
-            question_type=None if kind is None else QuestionType(kind),
-            question_id=entry.get("question_id"),
-            answer=None if answer is None else str(answer),
-            labels={"question_subtype": entry["question_subtype"]} if "question_subtype" in entry else None,
-        )
-    except InputError as error:
-        raise InputError(f"{place}, question {entry.get('question_id', '?')}: {error}") from error
-    except (KeyError, TypeError, AttributeError, ValueError) as error:
-        name = entry.get("question_id", "?") if isinstance(entry, Mapping) else "?"
-        raise InputError(
-            f"{place}, question {name}: {type(error).__name__} {error}; "
-            "a question needs 'question', and each of its choices 'choice'."
-        ) from error
-
-
-def _program(tokens: Sequence[str] | None) -> tuple[str, ...] | None:
-    return None if tokens is None else tuple(str(token) for token in tokens)

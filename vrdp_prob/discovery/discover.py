@@ -172,7 +172,10 @@ def _gain(before: Trial, after: Trial, overdispersion: Float[np.ndarray, "video"
 def _bounds(found: Search) -> list[UpperBound]:
     named = set(found.best.names)
     return [
-        bound for score in found.steps[-1].scores if score.effect.name not in named for bound in upper_bounds(score)
+        bound
+        for score in found.steps[-1].beside_chance
+        if score.effect.name not in named
+        for bound in upper_bounds(score)
     ]
 
 

@@ -73,8 +73,6 @@ class CauseScore:
         Standard deviations of the strengths, by the name of the parameter.
     places
         Number of bodies or videos among which the sites were chosen.
-    promised
-        Gain (nats) in log density that the cause promises if it leaves nothing unexplained.
     """
 
     effect: Effect
@@ -85,7 +83,6 @@ class CauseScore:
     p_value: float
     sd: Mapping[str, float]
     places: int = 1
-    promised: float = 0.0
 
     @property
     def size(self) -> float:

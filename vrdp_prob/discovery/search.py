@@ -45,7 +45,9 @@ class Step:
     Parameters
     ----------
     scores
-        Scores of all causes before the step, the least probable by chance first.
+        Scores of all causes before the step, the least probable by chance first, where all that is left is noise.
+    beside_chance
+        The same beside what the model leaves to chance.
     tried
         Refits with one more cause, the best first.
     overdispersion
@@ -53,6 +55,7 @@ class Step:
     """
 
     scores: tuple[CauseScore, ...]
+    beside_chance: tuple[CauseScore, ...]
     tried: tuple[Trial, ...]
     overdispersion: Float[np.ndarray, "video"]
 
@@ -145,20 +148,12 @@ class _Searcher:
         """A step in which nothing was tried yet; a trial that is asked for again is not scored again."""
         if trial not in self._known:
             left = [effect for effect in self.catalogue if effect.name not in trial.names]
-            residuals = trial.unexplained.model
-            scores = self._scores(trial, left)
-            self._known[trial] = Step(tuple(scores), (), overdispersion(residuals, seed=self.seed))
+            found = trial.unexplained
+            scores = beside = score_causes(trial.fit, found.plain, left, seed=self.seed)
+            if found.model is not found.plain:
+                beside = score_causes(trial.fit, found.model, left, seed=self.seed)
+            self._known[trial] = Step(tuple(scores), tuple(beside), (), overdispersion(found.model, seed=self.seed))
         return self._known[trial]
-
-    def _scores(self, trial: Trial, left: Sequence[Effect]) -> list[CauseScore]:
-        """Scores beside what the trial leaves to chance; a cause may explain that, too, and so promises more."""
-        found = trial.unexplained
-        scores = score_causes(trial.fit, found.model, left, seed=self.seed)
-        alone = scores
-        if found.model is not found.plain:
-            alone = score_causes(trial.fit, found.plain, left, seed=self.seed)
-        most = {one.effect.name: one.size / 2 - float(found.gains.sum()) for one in alone}
-        return [replace(one, promised=max(one.size / 2, most.get(one.effect.name, 0.0))) for one in scores]
 
     def tried(self, trial: Trial, step: Step) -> Step:
         """The step with the causes tried that may be the best one.
@@ -187,7 +182,7 @@ class _Searcher:
         cause = found[0].causes[-1]
         if happens_once(cause) and found[0].acting(cause) > 1:
             return False
-        left = self.first(found[0]).scores
+        left = self.first(found[0]).beside_chance
         return min((one.p_value for one in left), default=1.0) * len(left) > SHORTLIST_LEVEL
 
     def _lost(self, trial: Trial, found: Sequence[Trial]) -> list[Trial]:
@@ -294,13 +289,13 @@ class _Searcher:
         lost their course of events on the way to it, and are searched anew.
         """
         found = self._all(trial.with_cause, scores)
-        promised = {one.effect.name: one.promised for one in scores if not happens_once(one.effect)}
+        promised = {one.effect.name: one.size / 2 for one in scores if not happens_once(one.effect)}
         for _ in range(MENDINGS):
-            most = max((gain(one, trial)[0] for one in found), default=0.0)
+            most = max((one.brought(trial) for one in found), default=0.0)
             short = [
                 one
                 for one in found
-                if promised.get(one.causes[-1].name, 0.0) > max(most, gain(one, trial)[0] / SHORT, 0.0)
+                if promised.get(one.causes[-1].name, 0.0) > max(most, one.brought(trial) / SHORT, 0.0)
                 and one.fallen_from(trial)
             ]
             if not short:
@@ -310,8 +305,8 @@ class _Searcher:
             if mended is hopeful:
                 promised.pop(hopeful.causes[-1].name)
             found = [mended if one is hopeful else one for one in found]
-        most = max((gain(one, trial)[0] for one in found), default=0.0)
-        found = [one.continued() if gain(one, trial)[0] > SHORT * most > 0 else one for one in found]
+        most = max((one.brought(trial) for one in found), default=0.0)
+        found = [one.continued() if one.brought(trial) > SHORT * most > 0 else one for one in found]
         return sorted(found, key=_merit, reverse=True)
 
     def _all(self, refit: Callable[[CauseScore], Trial | None], scores: Sequence[CauseScore]) -> list[Trial]:

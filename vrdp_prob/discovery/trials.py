@@ -71,8 +71,20 @@ class Trial:
         What it leaves unexplained is chance as it is most probable. An effect that happens once may have happened to
         any body of any video, which counts against it.
         """
-        density = np.array([one.log_density for one in self.cavities.values()]) + self.unexplained.gains
+        return self.fitted_density + self.unexplained.gains
+
+    @property
+    def fitted_density(self) -> Float[np.ndarray, "video"]:
+        """The same where all that it leaves unexplained is noise."""
+        density = np.array([one.log_density for one in self.cavities.values()])
         return density - sum(self.choices.values(), np.zeros(len(density)))
+
+    def brought(self, base: "Trial") -> float:
+        """Gain (nats) over a model with less where all that both leave unexplained is noise.
+
+        A fit is judged by this: what it has lost, chance would cover.
+        """
+        return float((self.fitted_density - base.fitted_density).sum())
 
     @property
     def log_prior(self) -> float:
@@ -93,7 +105,7 @@ class Trial:
 
     def fallen_from(self, base: "Trial") -> list[int]:
         """Videos that are less probable than under a model with less, the worst first: they have lost their course."""
-        gained = gains(self, base)
+        gained = self.fitted_density - base.fitted_density
         return [int(k) for k in np.argsort(gained) if gained[k] < -FELL][: max(len(gained) // MOST, 1)]
 
     def with_cause_in_place(self, score: CauseScore, least: float) -> "Trial | None":

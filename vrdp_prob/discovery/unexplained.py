@@ -147,9 +147,12 @@ class _Search:
             for noise in (fast, others[axis].noise)
         ]
         best = min(starts, key=cost)
+        before = self._gain(others)
+        if -cost(best) < before:
+            return others
         options = {"initial_simplex": best + SIMPLEX, "maxfev": EVALUATIONS, "xatol": 0.05, "fatol": 0.5}
         found = minimize(cost, best, method="Nelder-Mead", options=options)
-        return with_logs(found.x) if -found.fun > self._gain(others) else others
+        return with_logs(found.x) if -found.fun > before else others
 
     def _gain(self, straying: tuple[Straying, ...]) -> float:
         whitening = self.whitening(straying)

@@ -7,9 +7,10 @@ from typing import Any
 
 from vrdp_prob.evaluation.evaluate import GROUPS, Evaluation
 from vrdp_prob.evaluation.one_scene import VARIANTS
-from vrdp_prob.evaluation.page import render
+from vrdp_prob.evaluation.page import absence, render
 from vrdp_prob.evaluation.scores import COVERAGES, Interval
 from vrdp_prob.files import write_atomically
+from vrdp_prob.plural import several
 
 
 def to_document(evaluation: Evaluation) -> dict[str, Any]:
@@ -57,18 +58,20 @@ def table(evaluation: Evaluation) -> list[str]:
             f"{_percent(ours.accuracy_per_option):>12}{ours.brier or 0.0:8.3f}{map_scores.brier or 0.0:9.3f}"
             f"{ours.ece or 0.0:7.3f}{ours.ece_if_calibrated_q95 or 0.0:21.3f}"
         )
-    lines.append(f"{len(evaluation.results)} videos, {evaluation.seconds_per_video:.1f} s each")
+    each = "" if len(evaluation.results) == 1 else " each"
+    lines.append(f"{several(len(evaluation.results), 'video')}, {evaluation.seconds_per_video:.1f} s{each}")
     lines += [f"{result.scene} failed: {result.failed}" for result in evaluation.failed]
     if evaluation.absent:
-        lines.append(f"{evaluation.absent} videos of the question file are not in the folder.")
+        lines.append(absence(evaluation.absent))
     return lines
 
 
-def _gain(found: tuple[float, Interval] | None) -> dict[str, float] | None:
+def _gain(found: tuple[float, Interval | None] | None) -> dict[str, float | None] | None:
     if found is None:
         return None
     gain, interval = found
-    return {"gain": gain, "low": interval.low, "high": interval.high}
+    low, high = (None, None) if interval is None else (interval.low, interval.high)
+    return {"gain": gain, "low": low, "high": high}
 
 
 def _percent(share: float | None) -> str:

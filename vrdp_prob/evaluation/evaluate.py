@@ -84,8 +84,8 @@ class Evaluation:
         }
 
     @cached_property
-    def gains(self) -> dict[str, tuple[float, Interval] | None]:
-        """How much lower the Brier score of the posterior is than that of the best fit, by group."""
+    def gains(self) -> dict[str, tuple[float, Interval | None] | None]:
+        """How much lower the Brier score of the posterior is than that of the best fit, by group; see `brier_gain`."""
         return {
             group: brier_gain(ours, self.judgements(BEST_FIT, group), seed=self.seed) if ours else None
             for group in GROUPS
@@ -183,6 +183,9 @@ def evaluate(
     with (progress or SilentProgress()).stage("Evaluating", total=len(tasks)) as advance:
         advance(len(done))
         with cluster(dask) if dask is not None else local_workers(processes, tasks=len(waiting)) as workers:
+            for task in waiting:
+                if task.scene in kept:
+                    kept[task.scene].claim()
             for future in as_completed([workers.submit(evaluate_scene, task) for task in waiting]):
                 result = future.result()
                 done[result.scene] = result
@@ -270,10 +273,12 @@ def _checkpoint(out: Path, task: Task, concepts: str) -> Checkpoint:
 
 def _done(kept: Checkpoint) -> SceneResult | None:
     """A result that is there already; that of a video that failed, and a file that cannot be read, is made anew."""
+    text = kept.text(RESULT)
+    if text is None:
+        return None
     try:
-        document = json.loads(kept.path(RESULT).read_text(encoding="utf-8"))
-        result = SceneResult.of_document(document)
-    except (OSError, ValueError, KeyError, TypeError):
+        result = SceneResult.of_document(json.loads(text))
+    except (ValueError, KeyError, TypeError, AttributeError):
         return None
     return result if result.failed is None else None
 

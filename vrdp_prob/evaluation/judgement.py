@@ -65,6 +65,8 @@ class Judgement:
         Probability and truth of each choice.
     refused
         Why there is no answer; None where there is one. A question without an answer counts as wrong.
+    texts
+        Id and text of each choice.
     """
 
     scene: str
@@ -79,6 +81,7 @@ class Judgement:
     squared_error: float
     choices: tuple[tuple[float, bool], ...] = ()
     refused: str | None = None
+    texts: tuple[tuple[str, str], ...] = ()
 
     def to_document(self) -> dict[str, Any]:
         """The judgement as JSON values."""
@@ -88,7 +91,8 @@ class Judgement:
     def of_document(cls, document: Mapping[str, Any]) -> "Judgement":
         """What `to_document` made a document of."""
         choices = tuple((float(probability), bool(right)) for probability, right in document["choices"])
-        return cls(**{**document, "kind": Kind(document["kind"]), "choices": choices})
+        texts = tuple((str(name), str(text)) for name, text in document.get("texts", ()))
+        return cls(**{**document, "kind": Kind(document["kind"]), "choices": choices, "texts": texts})
 
 
 def judge(scene: str, facts: Facts, question: Question, words: Sequence[ChangeWord] = ()) -> Judgement:
@@ -114,6 +118,7 @@ def judge(scene: str, facts: Facts, question: Question, words: Sequence[ChangeWo
         probability=probability,
         squared_error=(squares - 2 * probability + 1) / 2,
         choices=tuple((choice.probability, right) for choice, right in zip(answer.choices, rights, strict=True)),
+        texts=_texts(question),
     )
 
 
@@ -132,6 +137,7 @@ def unanswered(scene: str, question: Question, reason: str, words: Sequence[Chan
         squared_error=1.0,
         choices=tuple((0.5, choice.answer == RIGHT) for choice in question.choices),
         refused=reason,
+        texts=_texts(question),
     )
 
 
@@ -153,6 +159,10 @@ def kind_of(question: Question, words: Sequence[ChangeWord] = ()) -> Kind:
     if not changing:
         return Kind.REMOVAL
     return Kind.MASS if changing <= MASS_TOKENS else Kind.WORD
+
+
+def _texts(question: Question) -> tuple[tuple[str, str], ...]:
+    return tuple((str(choice.choice_id), choice.text) for choice in question.choices)
 
 
 def _truth(question: Question) -> str:

@@ -6,6 +6,7 @@ from vrdp_prob.evaluation.evaluate import GROUPS, Evaluation
 from vrdp_prob.evaluation.judgement import Judgement
 from vrdp_prob.evaluation.one_scene import BEST_FIT, POSTERIOR, PRIOR_DEFAULTS
 from vrdp_prob.evaluation.scores import COVERAGES, Bin, Interval, Scores
+from vrdp_prob.plural import several
 from vrdp_prob.report.templating import asset, environment
 
 TITLES = {
@@ -30,10 +31,11 @@ def render(evaluation: Evaluation) -> str:
         .get_template("evaluation.html.j2")
         .render(
             css=asset("page.css"),
-            scenes=len(evaluation.results),
+            videos=several(len(evaluation.results), "video"),
+            alone=len(evaluation.results) == 1,
             seconds=f"{evaluation.seconds_per_video:.1f}",
-            questions=len(evaluation.judgements()),
-            absent=evaluation.absent,
+            questions=several(len(evaluation.judgements()), "question"),
+            absent=absence(evaluation.absent) if evaluation.absent else "",
             failed=[{"scene": result.scene, "reason": result.failed} for result in evaluation.failed],
             unconverged=sum("has not converged" in result.convergence for result in evaluation.results),
             groups=[_group(evaluation, group) for group in asked],
@@ -42,6 +44,11 @@ def render(evaluation: Evaluation) -> str:
             wrong=[_wrong(one) for one in wrong],
         )
     )
+
+
+def absence(count: int) -> str:
+    """That some videos are asked about and not there, in a sentence."""
+    return f"{several(count, 'video')} of the question file {'is' if count == 1 else 'are'} not in the folder."
 
 
 def _group(evaluation: Evaluation, group: str) -> dict[str, Any]:
@@ -56,8 +63,8 @@ def _group(evaluation: Evaluation, group: str) -> dict[str, Any]:
         "brier": _number(ours.brier),
         "brier_prior": _number(prior.brier),
         "brier_map": _number(best.brier),
-        "gain": "" if gain is None else f"{gain[0]:+.3f} ({gain[1].low:+.3f} to {gain[1].high:+.3f})",
-        "gain_is_sure": gain is not None and gain[1].low > 0,
+        "gain": "" if gain is None else _gain(*gain),
+        "gain_is_sure": gain is not None and gain[1] is not None and gain[1].low > 0,
         "log_score": _number(ours.log_score),
         "ece": _number(ours.ece),
         "ece_q95": _number(ours.ece_if_calibrated_q95),
@@ -72,6 +79,10 @@ def _share(scores: Scores, name: str) -> str:
     if value is None:
         return ""
     return _percent(value) + ("" if interval is None else f" ({100 * interval.low:.0f} to {100 * interval.high:.0f})")
+
+
+def _gain(gain: float, interval: Interval | None) -> str:
+    return f"{gain:+.3f}" + ("" if interval is None else f" ({interval.low:+.3f} to {interval.high:+.3f})")
 
 
 def _percent(value: float | None) -> str:
@@ -115,13 +126,21 @@ def _height(share: float) -> float:
     return SIDE * (1 - share)
 
 
-def _wrong(one: Judgement) -> dict[str, str]:
+def _wrong(one: Judgement) -> dict[str, Any]:
     return {
         "scene": one.scene,
         "id": one.question_id,
         "question": one.question,
-        "answer": one.refused or one.answer or "none of the choices",
-        "truth": one.truth or "none of the choices",
+        "answer": [one.refused] if one.refused is not None else _told(one, one.answer),
+        "truth": _told(one, one.truth),
         "confidence": f"{one.confidence:.2f}",
         "probability": f"{one.probability:.2f}",
     }
+
+
+def _told(one: Judgement, answer: str) -> list[str]:
+    """An answer as lines: of choices each with its id and text."""
+    if not one.texts:
+        return [answer or "none of the choices"]
+    chosen = answer.split(",")
+    return [f"{name}: {text}" for name, text in one.texts if name in chosen] or ["none of the choices"]

@@ -81,7 +81,7 @@ class Scores:
     ece_if_calibrated_q95
         Its 95 % quantile for outcomes drawn independently with these very probabilities.
     intervals
-        Bootstrap intervals over scenes of accuracies and the Brier score, by their names.
+        Bootstrap intervals over scenes of accuracies and the Brier score, by their names; none of a single scene.
     reliability
         The bins of the expected calibration error that hold anything.
     abstention
@@ -137,8 +137,12 @@ class Scores:
         )
 
 
-def brier_gain(ours: Sequence[Judgement], other: Sequence[Judgement], *, seed: int = 0) -> tuple[float, Interval]:
+def brier_gain(
+    ours: Sequence[Judgement], other: Sequence[Judgement], *, seed: int = 0
+) -> tuple[float, Interval | None]:
     """How much lower the Brier score of one set of judgements is than that of another on the same questions.
+
+    The interval is None where all questions are about a single scene.
 
     Parameters
     ----------
@@ -151,8 +155,8 @@ def brier_gain(ours: Sequence[Judgement], other: Sequence[Judgement], *, seed: i
         (mine.scene, [b - a for a, b in zip(_brier(mine), _brier(its), strict=True)])
         for mine, its in zip(ours, other, strict=True)
     ]
-    mean, interval = _mean(gains), bootstrap(gains, np.random.default_rng(seed))
-    return np.nan if mean is None else mean, interval or Interval(np.nan, np.nan)
+    mean = _mean(gains)
+    return np.nan if mean is None else mean, bootstrap(gains, np.random.default_rng(seed))
 
 
 def calibration_error(forecast: Float[np.ndarray, "forecast"], outcome: Bool[np.ndarray, "forecast"]) -> float:
@@ -163,16 +167,16 @@ def calibration_error(forecast: Float[np.ndarray, "forecast"], outcome: Bool[np.
 
 
 def bootstrap(values: OfScenes, generator: np.random.Generator) -> Interval | None:
-    """Interval of the mean of values of scenes when scenes are drawn anew; None without any value.
+    """Interval of the mean of values of scenes when scenes are drawn anew; None without values of two scenes at least.
 
-    Questions about one scene share its posterior, so scenes are what is independent.
+    Questions about one scene share its posterior, so scenes are what is independent: one alone tells no spread.
     """
     by_scene: dict[str, list[float]] = {}
     for scene, given in values:
         by_scene.setdefault(scene, []).extend(given)
     sums = np.array([sum(given) for given in by_scene.values()])
     counts = np.array([len(given) for given in by_scene.values()])
-    if not counts.sum():
+    if (counts > 0).sum() < 2:
         return None
     chosen = generator.integers(len(sums), size=(REPLICATIONS, len(sums)))
     total = counts[chosen].sum(axis=1)

@@ -120,6 +120,15 @@ class Checkpoint:
         except (OSError, ValueError, EOFError, KeyError, zipfile.BadZipFile):
             return None
 
+    def text(self, name: str) -> str | None:
+        """Text of a file that was kept; None where there is none. Reading does not claim the folder."""
+        if self._owner() is None:
+            return None
+        try:
+            return (self.folder / name).read_text(encoding="utf-8")
+        except (OSError, ValueError):
+            return None
+
     def keep(self, name: str, arrays: Arrays) -> None:
         """Keep arrays under a name, whole or not at all."""
         with write_atomically(self.path(f"{name}.npz")) as temporary, temporary.open("wb") as stream:

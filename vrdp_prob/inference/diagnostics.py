@@ -5,16 +5,24 @@ R-hat, Bayesian Analysis 16 (2021); Elvira, Martino and Robert, Rethinking the e
 Statistical Review 90 (2022).
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from arviz_stats.base.array import array_stats
 from jaxtyping import Float
 
-from vrdp_prob.models.coordinates import Coordinates
-from vrdp_prob.models.parameters import MASS, RESTITUTION
+from vrdp_prob.models.coordinates import Coordinate, Coordinates
+from vrdp_prob.models.parameters import MASS, RESTITUTION, WALL_RESTITUTION
+from vrdp_prob.scene import Body
 
+RELEASE_WORDS = {
+    "x": "place along x",
+    "y": "place along y",
+    "velocity_x": "velocity along x",
+    "velocity_y": "velocity along y",
+}
+"""What the states at release are called in sentences; other quantities are called by their names."""
 TAILS = (0.05, 0.95)
 """Quantiles whose effective sample size is that of the tails."""
 
@@ -35,9 +43,9 @@ class Reported:
     combinations: Float[np.ndarray, "quantity dimension"]
 
     @classmethod
-    def of(cls, coordinates: Coordinates, pairs: Iterable[tuple[int, int]]) -> "Reported":
+    def of(cls, coordinates: Coordinates, pairs: Iterable[tuple[int, int]], bodies: Sequence[Body]) -> "Reported":
         """All coordinates; log mass ratio and log restitution product of pairs, as far as they are sampled."""
-        names, rows = list(coordinates.names), list(np.eye(len(coordinates)))
+        names, rows = [_words(entry, bodies) for entry in coordinates.entries], list(np.eye(len(coordinates)))
         for first, second in dict.fromkeys(pairs):
             for field, sign, name in ((MASS.name, -1.0, "mass ratio"), (RESTITUTION.name, 1.0, "restitution")):
                 row = np.zeros(len(coordinates))
@@ -46,7 +54,7 @@ class Reported:
                     if place is not None:
                         row[place] += share
                 if np.count_nonzero(row) == 2:
-                    names.append(f"{name} of pair {first}, {second}")
+                    names.append(f"the {name} of objects {bodies[first].id} and {bodies[second].id}")
                     rows.append(row)
         return cls(tuple(names), np.array(rows))
 
@@ -58,6 +66,16 @@ class Reported:
     def values(self, points: Float[np.ndarray, "*batch dimension"]) -> Float[np.ndarray, "*batch quantity"]:
         """The quantities of some points."""
         return points @ self.combinations.T
+
+
+def _words(entry: Coordinate, bodies: Sequence[Body]) -> str:
+    """A coordinate for sentences: 'the restitution of object 3'."""
+    quantity = RELEASE_WORDS.get(entry.field, entry.field.replace("_", " "))
+    if entry.owner is None:
+        return f"the {quantity}"
+    if entry.field == WALL_RESTITUTION.name:
+        return f"the restitution of wall {entry.owner + 1}"
+    return f"the {quantity} of {entry.group or f'object {bodies[entry.owner].id}'}"
 
 
 @dataclass(frozen=True)

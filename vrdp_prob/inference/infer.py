@@ -96,9 +96,11 @@ def infer(
     Raises
     ------
     InputError
-        If the sampler or an option is unknown, fewer than 4 draws are asked for, the seed is negative, no object
-        moves, or the checkpoint belongs to another run.
+        If the tracks are none, the sampler or an option is unknown, fewer than 4 draws are asked for, the seed is
+        negative, no object moves, or the checkpoint belongs to another run.
     """
+    if not isinstance(tracks, Tracks):
+        raise InputError(f"tracks is {_given(tracks)}; give the tracks of one video, which vrdp_prob.load reads.")
     check_options(sampler=sampler, noise=noise, defaults=defaults, motion=motion)
     if draws < 4:
         raise InputError(f"draws is {draws}; ask for at least 4.")
@@ -114,7 +116,7 @@ def infer(
     fit = fit_map(tracks, physics, generator, progress, noise=None if noise == "auto" else NoiseFamily(noise))
     if motion == "fixed":
         fit = fit.given_motion()
-    reported = Reported.of(fit.likelihood.coordinates, fit.contacts)
+    reported = Reported.of(fit.likelihood.coordinates, fit.contacts, tracks.bodies)
     samples = SAMPLERS[sampler](
         fit.likelihood.log_density,
         proposals(fit.modes, fit.likelihood.residuals, Rates.of(tracks, fit.likelihood.coordinates)),
@@ -134,6 +136,11 @@ def infer(
         generator=generator,
         draw_defaults=defaults == "prior",
     )
+
+
+def _given(value: object) -> str:
+    """What was given in place of tracks: a text as it stands, anything else by its kind."""
+    return f"'{value}'" if isinstance(value, str | Path) else f"a {type(value).__name__}"
 
 
 def check_options(**options: str) -> None:

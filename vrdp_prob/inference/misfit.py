@@ -84,11 +84,19 @@ class Misfit:
         return replace(self, error_acceleration=acceleration, error_duration=error.duration)
 
     def _misfit_sentence(self) -> str:
-        text = (
-            f"The model does not explain this motion: after the best fit positions are off by {self.residual_sd:.2g} m "
-            f"where measurement noise is {self.noise_sd:.2g} m (most for object {self.worst}, {self.worst_sd:.2g} m), "
-            f"and neighbouring errors are alike (correlation {self.correlation:.2f})."
-        )
+        if self.large:
+            text = (
+                "The model does not explain this motion: after the best fit positions are off by "
+                f"{self.residual_sd:.2g} m where measurement noise is {self.noise_sd:.2g} m (most for object "
+                f"{self.worst}, {self.worst_sd:.2g} m), and neighbouring errors are alike (correlation "
+                f"{self.correlation:.2f})."
+            )
+        else:
+            text = (
+                "The model does not quite explain this motion: after the best fit positions are off by no more than "
+                f"measurement noise ({self.residual_sd:.2g} m), but smoothly, as noise would not be (correlation of "
+                f"neighbouring errors {self.correlation:.2f}; most for object {self.worst})."
+            )
         if self.error_acceleration is not None:
             text += (
                 f" The intervals allow for an unknown acceleration of {self.error_acceleration:.2g} m/s^2 that lasts "

@@ -96,14 +96,15 @@ class Posterior:
         """The most probable world, as a batch of one."""
         return self._worlds(self.data["map_estimate"].to_dataset().expand_dims("world"))
 
-    def object_summary(self, body: str) -> ObjectSummary:
-        """Mass and restitution of a body with their intervals and status.
+    def object_summary(self, body: str | int) -> ObjectSummary:
+        """Mass and restitution of a body, by its id, with their intervals and status.
 
         Raises
         ------
         InputError
             If no object has that id.
         """
+        body = str(body)
         index, status = self.tracks.index(body), self.status[body]
         mass, restitution = (Summary.of(self._draws(name)[..., index]) for name in ("mass", "restitution"))
         return ObjectSummary(

@@ -1,6 +1,7 @@
 """A posterior as one netCDF file, written to a temporary name first, and read back without anything else."""
 
 import json
+import os
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -91,8 +92,15 @@ def reading(path: Path) -> Iterator[None]:
     """
     try:
         yield
+    except FileNotFoundError as error:
+        raise InputError(f"{path}: the posterior cannot be read (no such file); check the path.") from error
     except OSError as error:
-        reason = error.strerror or error
+        if path.is_file() and os.access(path, os.R_OK):
+            raise InputError(
+                f"{path}: not a posterior of this tool, or not a whole one; give a posterior.nc, or run the inference "
+                "again."
+            ) from error
+        reason = "a folder has its name" if path.is_dir() else "no permission"
         raise InputError(f"{path}: the posterior cannot be read ({reason}); check the path.") from error
     except InputError as error:
         raise InputError(f"{path}: {error}") from error

@@ -60,13 +60,16 @@ def ask(
     Raises
     ------
     InputError
-        If the question is not understood, names an object that is not there or that two objects fit, or needs choices
-        and has none.
+        If `known` is no posterior, or the question is not understood, names an object that is not there or that two
+        objects fit, or needs choices and has none.
     """
     if isinstance(known, AskablePosterior) and (draws, defaults) == (DRAWS, "fixed"):
         facts: Facts = known.all_worlds
     elif isinstance(known, PosteriorLike):
         facts = PosteriorWorlds(known, draws=draws, defaults=defaults, progress=progress)
+    elif not callable(getattr(known, "counterfactual_events", None)):
+        given = type(known).__name__
+        raise InputError(f"a {given} cannot be asked; give a posterior, which vrdp_prob.infer makes of tracks.")
     else:
         facts = known
     return _answer(facts, question, choices, mc_error, words)

@@ -1,8 +1,11 @@
 """Operations on events: the worlds' event lists, filters by kind, object, order and cause, and what an event tells."""
 
+from dataclasses import replace
+
 import numpy as np
 from jaxtyping import Bool
 
+from vrdp_prob.errors import InputError
 from vrdp_prob.reasoning.changes import Change
 from vrdp_prob.reasoning.events import EventTable, EventUniverse
 from vrdp_prob.reasoning.operations import operation
@@ -12,7 +15,6 @@ from vrdp_prob.reasoning.values import EventRef, EventSet, Moment, ObjectRef, Ob
 
 FUTURE = "future"
 _PLACES = {"first": 0, "second": 1, "third": 2}
-_PHRASES = {"collision": "collision", "in": "entrance", "out": "exit"}
 
 
 @operation("events", gives=EventSet)
@@ -27,7 +29,7 @@ def unseen_events(run: Run) -> EventSet:
     """What happens after the video."""
     run.looked_at.add(FUTURE)
     table = run.facts.unseen_events()
-    return EventSet(table.happens, table.time)
+    return EventSet(table.happens, table.time, follows_video=True)
 
 
 @operation("all_events", gives=EventSet)
@@ -65,33 +67,46 @@ def filter_end(run: Run, chosen: EventSet) -> EventRef:
 @operation("filter_in", EventSet, (ObjectSet, ObjectRef), gives=EventSet)
 def filter_in(run: Run, chosen: EventSet, who: ObjectSet | ObjectRef) -> EventSet:
     """The entrances of the objects."""
-    return _of_kind(run, chosen, who, "in", _universe(run).entrances)
+    return _crossings(run, chosen, who, "entrance", _universe(run).entrances)
 
 
 @operation("filter_out", EventSet, (ObjectSet, ObjectRef), gives=EventSet)
 def filter_out(run: Run, chosen: EventSet, who: ObjectSet | ObjectRef) -> EventSet:
     """The exits of the objects."""
-    return _of_kind(run, chosen, who, "out", _universe(run).exits)
+    return _crossings(run, chosen, who, "exit", _universe(run).exits)
 
 
 @operation("filter_collision", EventSet, (ObjectSet, ObjectRef), gives=EventSet)
 def filter_collision(run: Run, chosen: EventSet, who: ObjectSet | ObjectRef) -> EventSet:
-    """The collisions in which any of the objects takes part."""
-    return _of_kind(run, chosen, who, "collision", _universe(run).collisions)
+    """The collisions of any of the objects; of collisions of others, those of them with any of the objects."""
+    universe = _universe(run)
+    first, second = _colliding(run, who)
+    fits = first | second
+    for party in chosen.parties:
+        _require_two(run, party, who)
+        one, other = _colliding(run, party)
+        fits &= (first & other) | (second & one)
+    mask = chosen.mask & universe.mask(universe.collisions)
+    mask[:, universe.collisions] &= fits
+    name = noun_phrase(who.words)
+    phrase = f"{chosen.phrase} with the {name}" if chosen.parties else f"collision of the {name}"
+    return replace(chosen, mask=mask, phrase=phrase, parties=(*chosen.parties, who))
 
 
 @operation("filter_before", EventSet, EventRef, gives=EventSet)
 def filter_before(run: Run, chosen: EventSet, event: EventRef) -> EventSet:
     """The events before an event."""
     _require_present(run, event)
-    return EventSet(chosen.mask & (chosen.time < event.time[:, None]), chosen.time, f"{chosen.phrase} before it")
+    earlier = chosen.mask & (chosen.time < event.time[:, None])
+    return replace(chosen, mask=earlier, phrase=f"{chosen.phrase} before it")
 
 
 @operation("filter_after", EventSet, EventRef, gives=EventSet)
 def filter_after(run: Run, chosen: EventSet, event: EventRef) -> EventSet:
     """The events after an event."""
     _require_present(run, event)
-    return EventSet(chosen.mask & (chosen.time > event.time[:, None]), chosen.time, f"{chosen.phrase} after it")
+    later = chosen.mask & (chosen.time > event.time[:, None])
+    return replace(chosen, mask=later, phrase=f"{chosen.phrase} after it")
 
 
 @operation("filter_order", EventSet, Word, gives=EventRef, words=ORDERS)
@@ -111,7 +126,7 @@ def filter_ancestor(run: Run, chosen: EventSet, event: EventRef) -> EventSet:
     """The events that lie on the way back from an event, object by object, to the previous event."""
     _require_present(run, event)
     reached = run.facts.events().ancestors()[np.arange(run.facts.draws), event.index]
-    return EventSet(chosen.mask & reached, chosen.time, f"cause of the {event.phrase}")
+    return replace(chosen, mask=chosen.mask & reached, phrase=f"cause of the {event.phrase}")
 
 
 @operation("unique", EventSet, gives=EventRef)
@@ -164,7 +179,18 @@ def counterfactual_events(run: Run, who: ObjectRef) -> EventSet:
 
 
 def changed_events(run: Run, chosen: EventSet | None, who: ObjectRef, change: Change) -> EventSet:
-    """Those of the events (without events: all) that happen with a change of one object."""
+    """Those of the events (without events: all) that happen with a change of one object.
+
+    Raises
+    ------
+    InputError
+        If the events are of the time after the video, which no change is simulated for.
+    """
+    if chosen is not None and chosen.follows_video:
+        raise InputError(
+            f"what happens after the video is not known with {who.phrase} {change}, only what happens in the video; "
+            "take all_events or events instead of unseen_events."
+        )
     universe = _universe(run)
     happens = np.zeros((run.facts.draws, universe.size), dtype=bool)
     time = np.full(happens.shape, np.nan)
@@ -174,7 +200,9 @@ def changed_events(run: Run, chosen: EventSet | None, who: ObjectRef, change: Ch
         draws = who.index == body
         happens[draws], time[draws] = table.happens[draws], table.time[draws]
     phrase = f"event with {who.phrase} {change}"
-    return EventSet(happens if chosen is None else happens & chosen.mask, time, phrase)
+    if chosen is None:
+        return EventSet(happens, time, phrase)
+    return EventSet(happens & chosen.mask, time, phrase, chosen.parties)
 
 
 def _universe(run: Run) -> EventUniverse:
@@ -202,16 +230,27 @@ def _members(run: Run, who: ObjectSet | ObjectRef) -> Bool[np.ndarray, "draw bod
     return np.arange(len(run.facts.bodies)) == who.index[:, None]
 
 
-def _of_kind(run: Run, chosen: EventSet, who: ObjectSet | ObjectRef, kind: str, part: slice) -> EventSet:
-    universe = _universe(run)
-    involved = (_members(run, who).astype(np.int64) @ universe.takes_part.T.astype(np.int64)) > 0
-    mask = chosen.mask & universe.mask(part) & involved
-    name = noun_phrase(who.words)
-    if kind == "collision" and chosen.phrase.startswith("collision of the"):
-        phrase = f"{chosen.phrase} with the {name}"
-    else:
-        phrase = f"{_PHRASES[kind]} of the {name}"
-    return EventSet(mask, chosen.time, phrase)
+def _colliding(
+    run: Run, who: ObjectSet | ObjectRef
+) -> tuple[Bool[np.ndarray, "draw pair"], Bool[np.ndarray, "draw pair"]]:
+    """Whether the first, and whether the second body of each pair is one of the objects."""
+    members, pairs = _members(run, who), np.array(_universe(run).pairs, dtype=np.int64).reshape(-1, 2)
+    return members[:, pairs[:, 0]], members[:, pairs[:, 1]]
+
+
+def _crossings(run: Run, chosen: EventSet, who: ObjectSet | ObjectRef, name: str, part: slice) -> EventSet:
+    mask = chosen.mask & _universe(run).mask(part)
+    mask[:, part] &= _members(run, who)
+    return replace(chosen, mask=mask, phrase=f"{name} of the {noun_phrase(who.words)}")
+
+
+def _require_two(run: Run, first: ObjectSet | ObjectRef, second: ObjectSet | ObjectRef) -> None:
+    """Draws in which two names are of one object leave the question."""
+    if isinstance(first, ObjectRef) and isinstance(second, ObjectRef):
+        same = first.index == second.index
+        named_twice = first.phrase == second.phrase
+        clause = f"{first.phrase} {'is named twice' if named_twice else f'and {second.phrase} are the same object'}"
+        run.require(~same, f"{clause}, and an object cannot collide with itself; name two objects.", [(same, clause)])
 
 
 def _require_present(run: Run, event: EventRef) -> None:

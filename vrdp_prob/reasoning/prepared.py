@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 from vrdp_prob.errors import InputError
 from vrdp_prob.reasoning.language import Reading, read_choice, read_question
+from vrdp_prob.reasoning.language.reader import NotUnderstoodError
 from vrdp_prob.reasoning.program import ENTRIES, Program, check, needs_choices, question_type
 from vrdp_prob.reasoning.values import Count, Truth
 from vrdp_prob.reasoning.vocabulary import PLAIN, Vocabulary
@@ -41,6 +42,8 @@ def prepare(
 ) -> PreparedQuestion:
     """Understand a question and its choices; raises `InputError` as `answer_question` does."""
     stated = _as_question(question)
+    if isinstance(choices, str) or not isinstance(choices, Sequence):
+        raise InputError(f"choices is {choices!r:.80}; give a list, even of one choice.")
     reading = (
         Reading(stated.program) if stated.program is not None else read_question(stated.text, vocabulary.comparatives)
     )
@@ -53,9 +56,7 @@ def prepare(
         return PreparedQuestion(stated, kind, check(program, vocabulary=vocabulary), (), _how_read(reading))
     if not given:
         raise InputError(f"'{stated.text}' needs choices to judge; give at least one (--choice TEXT).")
-    readings = [
-        Reading(choice.program) if choice.program is not None else read_choice(choice.text, kind) for choice in given
-    ]
+    readings = [_read_choice(choice, kind) for choice in given]
     options = tuple(
         (choice, _judged(choice, option.program, program, vocabulary))
         for choice, option in zip(given, readings, strict=True)
@@ -84,6 +85,15 @@ def _how_read(*readings: Reading) -> tuple[str, ...]:
     return tuple(dict.fromkeys(reading.note for reading in readings if reading.note is not None))
 
 
+def _read_choice(choice: Choice, kind: QuestionType) -> Reading:
+    if choice.program is not None:
+        return Reading(choice.program)
+    try:
+        return read_choice(choice.text, kind)
+    except NotUnderstoodError as error:
+        raise InputError(f"choice {error}") from error
+
+
 def _judged(choice: Choice, program: Sequence[str], question_program: Sequence[str], vocabulary: Vocabulary) -> Program:
     """The program of a choice followed by that of its question."""
     try:
@@ -98,7 +108,7 @@ def _as_question(question: str | Sequence[str] | Question) -> Question:
         return question
     if isinstance(question, str):
         return Question(text=question)
-    program = tuple(question)
+    program = _tokens(question, "question")
     return Question(text=" ".join(program), program=program)
 
 
@@ -107,5 +117,14 @@ def _as_choice(number: int, choice: ChoiceInput) -> Choice:
         return choice
     if isinstance(choice, str):
         return Choice(number, choice)
-    program = tuple(choice)
+    program = _tokens(choice, "choice")
     return Choice(number, " ".join(program), program)
+
+
+def _tokens(program: Sequence[str], kind: str) -> tuple[str, ...]:
+    """The tokens of a program, which has to be a list of texts."""
+    if not isinstance(program, Sequence) or not all(isinstance(token, str) for token in program):
+        raise InputError(
+            f"the {kind} is {program!r:.80}; give a text in English, or a program: a list of tokens, each a text."
+        )
+    return tuple(program)

@@ -40,11 +40,27 @@ class ObjectRef:
 
 @dataclass(frozen=True)
 class EventSet:
-    """A set of events in each draw, with times in s (NaN where an event has no time, as in `all_events`)."""
+    """A set of events in each draw.
+
+    Parameters
+    ----------
+    mask
+        The events.
+    time
+        Their times in s, NaN where an event has no time (as in `all_events`).
+    phrase
+        What they are, for messages.
+    parties
+        Whom the collisions are of: what `filter_collision` took, one entry for each time that it was used.
+    follows_video
+        Whether they are of the time after the video.
+    """
 
     mask: Bool[np.ndarray, "draw event"]
     time: Float[np.ndarray, "draw event"]
     phrase: str = "event"
+    parties: tuple[ObjectSet | ObjectRef, ...] = ()
+    follows_video: bool = False
 
 
 @dataclass(frozen=True)

@@ -41,8 +41,13 @@ class Vocabulary:
         Raises
         ------
         InputError
-            If two of them are the same word.
+            If they are no list of learned words, or two of them are the same word.
         """
+        if isinstance(words, ChangeWord | str) or not isinstance(words, Sequence):
+            raise InputError(f"words is {_named(words)}; give a list of learned words, even of one.")
+        for word in words:
+            if not isinstance(word, ChangeWord):
+                raise InputError(f"among the words is {_named(word)}; open the file of a word with LearnedWord.read.")
         changes = {word.change.word: word.change for word in words}
         if len(changes) < len(words):
             names = [word.change.word for word in words]
@@ -60,6 +65,11 @@ class Vocabulary:
     def comparatives(self) -> Mapping[str, str]:
         """The token of every word that can follow 'if the cube were'."""
         return {**COMPARATIVES, **{word: f"{COUNTERFACT}{word}" for word in self.changes}}
+
+
+def _named(value: object) -> str:
+    """What was given in place of words, for messages."""
+    return f"the word '{value.change.word}'" if isinstance(value, ChangeWord) else f"{value!r:.80}"
 
 
 PLAIN = Vocabulary()

@@ -1,24 +1,36 @@
 """An answer as lines of text, in the report's words."""
 
 import math
+from collections.abc import Sequence
 
 from vrdp_prob.reasoning import Answer
-from vrdp_prob.report.wording import listed, percent, percent_error
+from vrdp_prob.report.wording import listed, percent, percent_error, with_names
+from vrdp_prob.scene import Body
 
 
-def answer_lines(answer: Answer) -> list[str]:
-    """One line for each choice or value, then what limits the answer."""
+def answer_lines(answer: Answer, bodies: Sequence[Body], limits: Sequence[str] = ()) -> list[str]:
+    """One line for each choice or value, then what limits the answer and the draws that it comes from.
+
+    Parameters
+    ----------
+    answer
+        The answer.
+    bodies
+        The objects, by whose names sentences call them.
+    limits
+        What limits the draws.
+    """
     if answer.choices:
         shares = [(choice.probability, choice.mc_error, choice.choice) for choice in answer.choices]
     else:
         ordered = sorted(answer.distribution.items(), key=lambda item: -item[1])
         shares = [(share, _error_of(share, answer), value) for value, share in ordered]
     lines = [f"{percent(share, error):>6} {percent_error(share, error):<7} {text}" for share, error, text in shares]
-    notes = list(answer.notes)
+    notes = [*answer.notes, *limits]
     if answer.relies_on_default:
         who = f"object{'s' * (len(answer.relies_on_default) > 1)} {listed(answer.relies_on_default)}"
         notes.insert(0, f"Rests on default values of {who}, which this video does not determine.")
-    return lines + [f"note: {note}" for note in notes]
+    return lines + [f"note: {with_names(note, bodies)}" for note in notes]
 
 
 def _error_of(share: float, answer: Answer) -> float:

@@ -1,6 +1,7 @@
 """The main job in one call: infer, answer, and write the report."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -88,6 +89,10 @@ def report(
         If the folder cannot be written, the video file is not there, or a question cannot be answered (see
         `vrdp_prob.reasoning.ask`). What can be told without the posterior is told before the work.
     """
+    if not isinstance(source, Tracks | Posterior):
+        raise InputError(f"a {type(source).__name__} cannot be reported; give tracks, which vrdp_prob.load reads.")
+    if isinstance(questions, str | Question):
+        raise InputError("questions is a single question; give a list, even of one.")
     directory, progress = Path(directory), progress or SilentProgress()
     check_writable(directory)
     if video_file is not None and not Path(video_file).is_file():
@@ -109,8 +114,9 @@ def report(
     worlds = PosteriorWorlds(posterior)
     answers = []
     with progress.stage("Questions", total=len(questions)) as advance:
-        for question in questions:
-            answers.append(ask(worlds, question, words=words))
+        for number, question in enumerate(questions, start=1):
+            with _named(question, number):
+                answers.append(ask(worlds, question, words=words))
             advance(1)
     with progress.stage("Report") as advance:
         frames = None if video_file is None else read_frames(Path(video_file)).frames
@@ -139,11 +145,20 @@ def check_questions(
     Raises
     ------
     InputError
-        With the question's name or its place (counting from 1), if one cannot be answered.
+        With the file and the question's name, or its place (counting from 1), if one cannot be answered.
     """
     for number, question in enumerate(questions, start=1):
-        name = question.question_id if isinstance(question, Question) else None
-        try:
+        with _named(question, number):
             check_question(question, tracks=tracks, words=words)
-        except InputError as error:
-            raise InputError(f"question {number if name is None else name}: {error}") from error
+
+
+@contextmanager
+def _named(question: Question | str, number: int) -> Iterator[None]:
+    """Say in a refusal which question is refused, and where it was read from."""
+    try:
+        yield
+    except InputError as error:
+        stated = question if isinstance(question, Question) else Question(str(question))
+        source = "" if stated.source is None else f"{stated.source}, "
+        name = number if stated.question_id is None else stated.question_id
+        raise InputError(f"{source}question {name}: {error}") from error

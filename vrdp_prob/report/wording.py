@@ -29,7 +29,7 @@ def with_names(text: str, bodies: Sequence[Body]) -> str:
     """A sentence with 'object 3' or 'objects 3, 4' replaced by the names of these bodies."""
     name = names(bodies)
     one = "|".join(re.escape(identity) for identity in sorted(name, key=len, reverse=True))
-    many = re.compile(rf"\b([Oo])bjects? ((?:{one})(?:(?:, | and )(?:{one}))*)(?!\w)")
+    many = re.compile(rf"\b([Oo])bjects? ((?:{one})(?:(?:, | and )(?:{one})(?!\w|\.\d))*)(?!\w|\.\d)")
 
     def named(found: re.Match[str]) -> str:
         said = listed(f"the {name[identity]}" for identity in re.findall(rf"(?:{one})(?!\w)", found[2]))

@@ -1,7 +1,7 @@
 """A question about a video, as CLEVRER's question files state it."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import StrEnum
 
 from vrdp_prob.errors import InputError
@@ -37,7 +37,7 @@ class Choice:
     Raises
     ------
     InputError
-        If the judgement is another word.
+        If the text is none, or the judgement is another word.
     """
 
     choice_id: int | str
@@ -46,6 +46,8 @@ class Choice:
     answer: str | None = None
 
     def __post_init__(self) -> None:
+        if not isinstance(self.text, str):
+            raise InputError(f"the text of a choice is {self.text!r:.80}; give a text.")
         if self.answer not in (None, RIGHT, WRONG):
             raise InputError(f"choice '{self.text}' is judged '{self.answer}'; judge it '{RIGHT}' or '{WRONG}'.")
 
@@ -70,6 +72,13 @@ class Question:
         The true answer where it is known; for scoring alone.
     labels
         Further fields of the question file, for example `question_subtype`.
+    source
+        The file and the video that it was read from, for messages; two questions may be equal that differ in it.
+
+    Raises
+    ------
+    InputError
+        If the text is none.
     """
 
     text: str
@@ -79,6 +88,11 @@ class Question:
     question_id: int | str | None = None
     answer: str | None = None
     labels: Mapping[str, str] | None = None
+    source: str | None = field(default=None, compare=False, repr=False)
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.text, str):
+            raise InputError(f"the text of a question is {self.text!r:.80}; give a text.")
 
     @property
     def is_answered(self) -> bool:

@@ -104,9 +104,10 @@ def concepts() -> Concepts:
     return Concepts((network(TAUGHT).eval(),), Lessons(12, 100, 0, 0.5, 0.9, 0.7))
 
 
-def test_a_file_of_concepts_gives_them_back(concepts: Concepts, tmp_path: Path) -> None:
-    write_concepts(tmp_path / "a.concepts", concepts)
-    read = read_concepts(tmp_path / "a.concepts")
+@pytest.mark.parametrize("name", ["a.concepts", "CONCEPTS"])
+def test_a_file_of_concepts_gives_them_back(concepts: Concepts, tmp_path: Path, name: str) -> None:
+    write_concepts(tmp_path / name, concepts)
+    read = read_concepts(tmp_path / name)
     assert read.lessons == concepts.lessons
     assert read.vocabulary == concepts.vocabulary
     one = TAUGHT[0].observation

@@ -12,6 +12,7 @@ from vrdp_prob.concepts.perceived.concepts import Concepts, Lessons
 from vrdp_prob.concepts.perceived.network import ConceptNetwork
 from vrdp_prob.concepts.perceived.observation import Observation
 from vrdp_prob.concepts.perceived.vocabulary import Vocabulary, attribute_words
+from vrdp_prob.errors import InputError
 from vrdp_prob.perception import Crops, SeenObjects
 from vrdp_prob.reasoning.executor import answer_question
 from vrdp_prob.reasoning.facts import TableFacts
@@ -106,3 +107,11 @@ def test_draws_of_learned_events_follow_their_probabilities(seen: SeenObjects, c
     again = concepts.facts(seen, draws=4000, seed=1)
     np.testing.assert_array_equal(facts.events().happens, again.events().happens)
     assert facts.events().universe.bodies == ("0", "1", "2", "3")
+
+
+def test_what_concepts_do_not_see_is_refused(seen: SeenObjects, concepts: Concepts) -> None:
+    facts = concepts.facts(seen)
+    with pytest.raises(InputError, match="not what happens after it; infer the video"):
+        answer_question(facts, ("unseen_events", "count"))
+    with pytest.raises(InputError, match="not what would happen if object 0 were removed; infer the video"):
+        answer_question(facts, ("objects", "red", "filter_color", "unique", "get_counterfact", "count"))

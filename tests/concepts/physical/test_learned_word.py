@@ -1,7 +1,10 @@
 """A learned word as a file, in sentences, and in questions."""
 
+import ast
+import inspect
 import json
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,10 +16,14 @@ from tests.reasoning.hand_made import STORY, collision, video
 from tests.reasoning.sliding_discs import Disc, KnownPosterior, tracks_of
 from vrdp_prob.concepts.physical import LearnedWord
 from vrdp_prob.concepts.physical.belief import Belief
+from vrdp_prob.concepts.physical.hypotheses import HYPOTHESES
+from vrdp_prob.concepts.physical.naming import TAKEN, WORD
 from vrdp_prob.errors import InputError
 from vrdp_prob.reasoning import ask
 from vrdp_prob.reasoning.changes import Change, PhysicalParameter, Rule
 from vrdp_prob.reasoning.checking import check_question
+from vrdp_prob.reasoning.language import choices, questions
+from vrdp_prob.reasoning.language import phrases as grammar_phrases
 from vrdp_prob.scene import QuestionType
 
 QUESTION = "If the red cube were floppier, what would happen?"
@@ -51,7 +58,10 @@ def _set(*path: str | int, to: object) -> Callable[[Any], None]:
         (_set("beliefs", 1, "weights", to=[0.2, 0.2, 0.2]), "the probabilities of weights of mass factor do not add"),
         (_set("beliefs", 1, "amounts", to=[2.0, 1.0, 0.5]), "the amounts of mass factor are not ascending numbers"),
         (_set("beliefs", 1, "amounts", to=[1.0, 2.0]), "the amounts of mass factor are not ascending numbers"),
-        (_set("beliefs", 1, "parameter", to="colour"), "'colour' is not a valid PhysicalParameter"),
+        (
+            _set("beliefs", 1, "parameter", to="colour"),
+            "beliefs 2, parameter is 'colour', and none of mass, ",
+        ),
         (_set("beliefs", 0, "why", to="?"), "not a whole word"),
         (_set("evidence", "videos", to="many"), "not a whole word"),
         (_set("lapse", to={"mean": 0.1}), "not a whole word"),
@@ -61,6 +71,14 @@ def _set(*path: str | int, to: object) -> Callable[[Any], None]:
         (_set("beliefs", 1, "log_evidence", to=None), "not a whole word"),
         (_set("log_gain", to=float("nan")), "a number is not finite"),
         (_set("mc_errors", to={}), "mc_errors and beliefs are not about the same parameters"),
+        (_set("mc_errors", to=[]), "mc_errors is no JSON object"),
+        (_set("beliefs", to=5), "beliefs is no list"),
+        (_set("beliefs", 0, to=5), "beliefs 1 is no JSON object"),
+        (_set("beliefs", 1, "mc_error", to=-1.0), "the Monte Carlo error mc_error of mass factor is -1, below 0"),
+        (_set("log_gain", to="4"), "log_gain is '4', and no number"),
+        (_set("evidence", "answers", to=-1), "evidence.answers is -1, and no whole number from 0 on"),
+        (_set("lapse", "mean", to=7), "lapse.mean is 7, and no share between 0 and 1"),
+        (_set("lapse", "q05", to=0.9), "lapse.q05 is 0.9, above lapse.q95, 0.3"),
     ],
 )
 def test_files_that_are_no_words(tmp_path: Path, change: Callable[[Any], None], message: str) -> None:
@@ -73,6 +91,65 @@ def test_files_that_are_no_words(tmp_path: Path, change: Callable[[Any], None], 
         LearnedWord.read(path)
 
 
+@pytest.mark.parametrize(
+    ("parameter", "rule", "amounts", "message"),
+    [
+        ("mass", "factor", [0.5, 1.0, 1e300], r"mass factor from 0.5 to 1e\+300, but 0.0625 to 16 is considered"),
+        ("mass", "factor", [0.06, 1.0, 2.0], "mass factor from 0.06 to 2, but"),
+        ("mass", "factor", [-1.0, 1.0, 2.0], "mass factor from -1 to 2, but"),
+        ("friction", "factor", [0.5, 1.0, 1e200], r"friction factor from 0.5 to 1e\+200, but 0.0625 to 16"),
+        ("speed", "offset", [-1.0, 0.0, 1000.0], "speed offset from -1 to 1000, but -1.2 to 1.2 is considered"),
+        ("restitution", "offset", [-0.9, 0.0, 0.8], "restitution offset from -0.9 to 0.8, but -0.8 to 0.8"),
+        ("restitution", "factor", [0.5, 1.0, 4.1], "restitution factor from 0.5 to 4.1, but 0.25 to 4"),
+    ],
+)
+def test_amounts_beyond_those_that_are_considered(
+    tmp_path: Path, *, parameter: str, rule: str, amounts: list[float], message: str
+) -> None:
+    path = tmp_path / "floppier.json"
+    word(NOTHING, MASS).write(path)
+    document = json.loads(path.read_text())
+    document["beliefs"][0]["probability"] = 0.4
+    document["beliefs"][1] |= {"parameter": parameter, "rule": rule, "amounts": amounts}
+    document["mc_errors"] = {"nothing": 0.01, parameter: 0.01}
+    path.write_text(json.dumps(document))
+    with pytest.raises(InputError, match=f"floppier.json: not a whole word .beliefs 2, amounts: {message}"):
+        LearnedWord.read(path)
+
+
+def test_amounts_at_the_limits_are_read(tmp_path: Path) -> None:
+    every = [
+        Belief(one.parameter, one.rule, 1 / 8, 0.0, 0.0, tuple(one.amounts.tolist()), tuple(one.prior.tolist()))
+        for one in HYPOTHESES
+    ]
+    errors = {"nothing": 0.0, **{str(one.parameter): 0.0 for one in HYPOTHESES}}
+    whole = replace(word(replace(NOTHING, probability=1 / 4), *every), mc_errors=errors)
+    whole.write(tmp_path / "floppier.json")
+    assert LearnedWord.read(tmp_path / "floppier.json") == whole
+
+
+@pytest.mark.parametrize("name", ["would", "if", "happen", "there", "collides", "video", "red", "without"])
+def test_words_that_the_grammar_needs_are_refused(tmp_path: Path, name: str) -> None:
+    path = tmp_path / "word.json"
+    word(NOTHING, MASS, SPEED, name=name).write(path)
+    with pytest.raises(InputError, match=f"word.json: .*the word '{name}' means something else in questions"):
+        LearnedWord.read(path)
+
+
+def test_no_word_of_the_grammar_can_be_learned() -> None:
+    phrases = set()
+    for module in (questions, grammar_phrases, choices):
+        for node in ast.walk(ast.parse(inspect.getsource(module))):
+            if isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute):
+                read = node.args if node.func.attr in ("expect", "accept") else []
+            else:
+                read = node.value.elts if isinstance(node, ast.Assign) and isinstance(node.value, ast.Tuple) else []
+            phrases |= {one.value for one in read if isinstance(one, ast.Constant) and isinstance(one.value, str)}
+    spoken = {one for phrase in phrases for one in phrase.split() if WORD.fullmatch(one)}
+    assert {"would", "if", "happen", "there", "collide"} <= spoken
+    assert spoken <= TAKEN
+
+
 def test_files_that_cannot_be_read(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"floppier.json: the file cannot be read .*; check the path"):
         LearnedWord.read(tmp_path / "floppier.json")
@@ -81,6 +158,9 @@ def test_files_that_cannot_be_read(tmp_path: Path) -> None:
         LearnedWord.read(tmp_path / "floppier.json")
     (tmp_path / "floppier.json").write_text("[1, 2]")
     with pytest.raises(InputError, match="not a learned word"):
+        LearnedWord.read(tmp_path / "floppier.json")
+    (tmp_path / "floppier.json").write_bytes(b"PK\x03\x04\xff\xfe")
+    with pytest.raises(InputError, match=r"not a learned word; give a file that `vrdp-prob learn-word` wrote"):
         LearnedWord.read(tmp_path / "floppier.json")
 
 

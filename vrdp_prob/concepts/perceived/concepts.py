@@ -19,6 +19,7 @@ from vrdp_prob.concepts.perceived.soft_facts import SoftEvents, SoftMotion
 from vrdp_prob.concepts.perceived.vocabulary import Vocabulary
 from vrdp_prob.errors import InputError
 from vrdp_prob.perception.reading import CERTAIN, SeenObjects
+from vrdp_prob.reasoning.changes import Change
 from vrdp_prob.reasoning.events import EventTable
 from vrdp_prob.reasoning.facts import Motion, TableFacts
 from vrdp_prob.reasoning.prepared import prepare
@@ -98,7 +99,7 @@ class Concepts:
         bodies = tuple(self._body(body, place, attributes) for place, body in enumerate(seen.tracks.bodies))
         return replace(seen.tracks, bodies=bodies)
 
-    def facts(self, seen: SeenObjects, *, draws: int = 400, seed: int = 0) -> TableFacts:
+    def facts(self, seen: SeenObjects, *, draws: int = 400, seed: int = 0) -> "SeenFacts":
         """A video as the concepts alone see it, events and motion too, for descriptive and explanatory questions.
 
         Parameters
@@ -118,7 +119,7 @@ class Concepts:
         network = np.arange(draws) % len(self.networks)
         table = _drawn_events(seen.tracks, [events[place] for place in network], numbers)
         motion = _drawn_motion([motions[place] for place in network], numbers)
-        return TableFacts(self.recognise(seen).bodies, table, motion, effective_draws=draws, seed=seed)
+        return SeenFacts(self.recognise(seen).bodies, table, motion, effective_draws=draws, seed=seed)
 
     @cached_property
     def unlearned(self) -> frozenset[str]:
@@ -154,6 +155,38 @@ class Concepts:
             if values[best[name]] < CERTAIN or (name == "shape" and best[name] != body.shape)
         }
         return replace(body, color=best["color"], material=best["material"], attribute_probabilities=unsure)
+
+
+@dataclass(frozen=True)
+class SeenFacts(TableFacts):
+    """What concepts see of a video: nothing of what happens after it, or would happen with a change."""
+
+    def unseen_events(self) -> EventTable:
+        """Refused.
+
+        Raises
+        ------
+        InputError
+            Always.
+        """
+        raise _not_seen("happens after it")
+
+    def counterfactual_events(self, change: Change, body: int) -> EventTable:
+        """Refused.
+
+        Raises
+        ------
+        InputError
+            Always.
+        """
+        raise _not_seen(f"would happen if object {self.bodies[body].id} were {change}")
+
+
+def _not_seen(what: str) -> InputError:
+    return InputError(
+        f"concepts see what happens in the video, not what {what}; infer the video and ask its posterior "
+        "(vrdp_prob.infer)."
+    )
 
 
 def _drawn_events(tracks: Tracks, events: Sequence[SoftEvents], numbers: np.random.Generator) -> EventTable:

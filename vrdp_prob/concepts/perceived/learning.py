@@ -16,6 +16,7 @@ from vrdp_prob.concepts.perceived.training import train
 from vrdp_prob.concepts.perceived.vocabulary import Vocabulary
 from vrdp_prob.errors import InputError
 from vrdp_prob.inference.checkpoint import Checkpoint
+from vrdp_prob.plural import several
 from vrdp_prob.progress import ProgressDisplay, SilentProgress
 
 NETWORKS = 5
@@ -45,7 +46,8 @@ class Learned:
         lessons = self.concepts.lessons
         words = [word for known in self.concepts.vocabulary.values.values() for word in known]
         return [
-            f"Learned from {lessons.videos} videos and {lessons.examples} answers: {', '.join(words)}.",
+            f"Learned from {several(lessons.videos, 'video')} and {several(lessons.examples, 'answer')}: "
+            f"{', '.join(words)}.",
             _standing(lessons),
             *self.notes,
         ]

@@ -32,8 +32,9 @@ def write_concepts(path: Path | str, concepts: Concepts) -> None:
             for network in concepts.networks
         ],
     }
-    with write_atomically(path) as temporary:
-        torch.save(stored, temporary)
+    # Given a path, torch names the archive inside after it, and refuses a hidden file without a suffix.
+    with write_atomically(path) as temporary, temporary.open("wb") as stream:
+        torch.save(stored, stream)
 
 
 def read_concepts(path: Path | str) -> Concepts:

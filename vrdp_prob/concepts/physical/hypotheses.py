@@ -57,6 +57,11 @@ class Hypothesis:
         """Factors, or offsets."""
         return np.exp(self.scale) if self.rule is Rule.FACTOR else self.scale
 
+    @property
+    def range(self) -> tuple[float, float]:
+        """Smallest and largest amount that is considered."""
+        return float(self.amounts[0]), float(self.amounts[-1])
+
     @cached_property
     def prior(self) -> Float[np.ndarray, "amount"]:
         """Prior probability of the neighbourhood of every amount (trapezoidal rule), given that the word does this."""

@@ -63,8 +63,7 @@ def learn_concept(
     """
     check_name(name)
     check_draws(draws)
-    if not examples:
-        raise InputError(f"there is no example of the word '{name}'; give at least one question with its answer.")
+    _check_examples(name, examples)
     for example in examples:
         prepared(example.question, Change(name, (Meaning(1.0, None),)))
     videos = _by_video(examples)
@@ -73,6 +72,20 @@ def learn_concept(
         for posterior, questions in videos:
             found += agreements_of(name, posterior, [questions], draws=draws, seed=seed, advance=advance)
     return word_of(name, found, examples=len(examples), draws=draws, seed=seed)
+
+
+def _check_examples(name: str, examples: Sequence[Example]) -> None:
+    if isinstance(examples, Example):
+        raise InputError(f"examples is a single example of the word '{name}'; give a list, even of one.")
+    if not isinstance(examples, Sequence) or not all(isinstance(one, Example) for one in examples):
+        raise InputError(f"examples of the word '{name}' are no list of vrdp_prob.Example; make each by Example.of.")
+    if not examples:
+        raise InputError(f"there is no example of the word '{name}'; give at least one question with its answer.")
+    for number, one in enumerate(examples, start=1):
+        if not isinstance(one.posterior, PosteriorLike) or not isinstance(one.question, Question):
+            raise InputError(
+                f"example {number} of the word '{name}' is not a posterior with a question; make it by Example.of."
+            )
 
 
 def word_of(

@@ -2,10 +2,13 @@
 
 from vrdp_prob.concepts.physical.belief import Belief
 from vrdp_prob.concepts.physical.learned_word import LearnedWord
+from vrdp_prob.plural import several
 from vrdp_prob.reasoning.changes import Rule
 
 SETTLED = 0.95
 """Probability from which on a meaning is told as settled."""
+LIKELY = 0.5
+"""Probability from which on a meaning is told as the most probable one."""
 
 ALIKE = 1e-3
 """Difference of the logarithm of evidences below which answers do not tell meanings apart."""
@@ -23,7 +26,7 @@ def summary(word: LearnedWord) -> tuple[str, ...]:
 def _contradiction(word: LearnedWord) -> str:
     return (
         f"The answers about '{word.name}' contradict each other, or nothing that a word may mean here explains them: "
-        f"guessing explains the {_several(word.evidence.answers, 'answer')} better (by {-word.log_gain:.1f} nats)."
+        f"guessing explains the {several(word.evidence.answers, 'answer')} better (by {-word.log_gain:.1f} nats)."
     )
 
 
@@ -34,6 +37,8 @@ def _informed(word: LearnedWord) -> bool:
 
 def _meaning(word: LearnedWord) -> str:
     probability, error = word.probabilities[word.subject], word.mc_errors[word.subject]
+    if probability < LIKELY:
+        return f"It is not settled what '{word.name}' changes: {_ranked(word)}."
     surely = "" if probability >= SETTLED else "most probably "
     changes = "nothing" if word.best.parameter is None else f"the {word.subject}{_amount(word.best)}"
     return f"'{word.name}' {surely}changes {changes} (probability {probability:.3f} ± {error:.3f})."
@@ -49,19 +54,19 @@ def _amount(belief: Belief) -> str:
 
 def _rivals(word: LearnedWord) -> tuple[str, ...]:
     """The parameters that it may change, where that is not settled."""
-    ranked = sorted(word.probabilities.items(), key=lambda entry: -entry[1])
-    if ranked[0][1] >= SETTLED:
+    if not LIKELY <= word.probabilities[word.subject] < SETTLED:
         return ()
-    return ("That is not settled: " + ", ".join(f"{name} {share:.2f}" for name, share in ranked) + ".",)
+    return (f"That is not settled: {_ranked(word)}.",)
+
+
+def _ranked(word: LearnedWord) -> str:
+    ranked = sorted(word.probabilities.items(), key=lambda entry: -entry[1])
+    return ", ".join(f"{name} {share:.2f}" for name, share in ranked)
 
 
 def _lapse(word: LearnedWord) -> str:
     return (
-        f"Of the {_several(word.evidence.answers, 'answer')} to {_several(word.evidence.examples, 'question')} about "
-        f"{_several(word.evidence.videos, 'video')} about {100 * word.lapse.mean:.0f} % are no better than guessed "
+        f"Of the {several(word.evidence.answers, 'answer')} to {several(word.evidence.examples, 'question')} about "
+        f"{several(word.evidence.videos, 'video')} about {100 * word.lapse.mean:.0f} % are no better than guessed "
         f"(90 % interval {100 * word.lapse.q05:.0f} to {100 * word.lapse.q95:.0f} %)."
     )
-
-
-def _several(count: int, noun: str) -> str:
-    return f"{count} {noun}" if count == 1 else f"{count} {noun}s"

@@ -22,18 +22,22 @@ class Shares:
         Would go if masses, restitutions, friction and the turning of cubes were known, and what learned words mean.
     events
         Would then go if it were known which doubtful contacts and rests of the video happened, and who looks how.
+    model
+        Would then go if it were known what to believe where the simulation and the video differ: half of the draws
+        keep what was seen, half follow their own simulation.
     motion
         Would then go if the motion were measured `PRECISER` times as exactly.
     chaos
         Would remain even then: what is too small to be measured decides.
     error
-        Monte Carlo standard error of the sums: of `parameters`, of it with `events`, and of `chaos`.
+        Monte Carlo standard error of the sums: of `parameters`, of it with `events`, with `model`, and of `chaos`.
     words
         Learned words of the question that may mean several things.
     """
 
     parameters: float
     events: float
+    model: float
     motion: float
     chaos: float
     error: float
@@ -46,6 +50,7 @@ class Shares:
         parts = (
             (self.parameters, f"comes from masses, restitutions, friction and the turning of cubes{meaning}"),
             (self.events, "comes from doubtful contacts, rests and attributes"),
+            (self.model, "comes from where the simulation and the video differ"),
             (self.motion, f"would go if the motion were measured {PRECISER:.0f} times as exactly"),
             (self.chaos, "would remain even then (chaos)"),
         )

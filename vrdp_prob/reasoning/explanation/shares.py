@@ -1,4 +1,4 @@
-"""How much of an answer's doubt comes from where: parameters, doubtful events, the measured motion, or chaos."""
+"""How much of an answer's doubt comes from where: parameters, doubtful events, the model, the motion, or chaos."""
 
 from collections.abc import Mapping, Sequence
 
@@ -22,13 +22,13 @@ _PARAMETERS: Mapping[Purpose, float] = {
 _EVENTS: Mapping[Purpose, float] = {
     **_PARAMETERS,
     Purpose.CONTACTS: 1.0,
-    Purpose.COURSES: 1.0,
     Purpose.RESTS: 1.0,
     Purpose.ATTRIBUTES: 1.0,
 }
+_MODEL: Mapping[Purpose, float] = {**_EVENTS, Purpose.COURSES: 1.0}
 _NEAR = 1 - PRECISER**-2
 _MOTION: Mapping[Purpose, float] = {
-    **_EVENTS,
+    **_MODEL,
     **dict.fromkeys((Purpose.CONTACT_TIMES, Purpose.MOTION, Purpose.LAST_FLIGHT), _NEAR),
 }
 """What twins share, more and more of it. Two draws of a normal quantity that is known k times as exactly as now have a
@@ -53,7 +53,7 @@ class Twins:
     def __init__(self, worlds: PosteriorWorlds, asked: PreparedQuestion) -> None:
         self._draws = worlds.effective_draws
         self._verdicts: list[Sequence[Verdict]] = [
-            _verdicts(worlds.coupled(kept), asked) for kept in (_PARAMETERS, _EVENTS, _MOTION)
+            _verdicts(worlds.coupled(kept), asked) for kept in (_PARAMETERS, _EVENTS, _MODEL, _MOTION)
         ]
 
     def shares(self, place: int, codes: Int[np.ndarray, "draw"], valid: Bool[np.ndarray, "draw"]) -> Shares | None:
@@ -85,8 +85,8 @@ class Twins:
         shared = np.maximum.accumulate(kappa)
         scale = np.sqrt(max(len(codes) / self._draws, 1.0))
         error = scale * max(error for _, error in found)
-        parameters, events, motion, chaos = np.diff(shared, prepend=0.0, append=1.0).tolist()
-        return Shares(parameters, events, motion, chaos, error, tuple(sorted(words)))
+        parameters, events, model, motion, chaos = np.diff(shared, prepend=0.0, append=1.0).tolist()
+        return Shares(parameters, events, model, motion, chaos, error, tuple(sorted(words)))
 
 
 def _verdicts(worlds: PosteriorWorlds, asked: PreparedQuestion) -> Sequence[Verdict]:

@@ -277,7 +277,7 @@ def _change(reader: Reader) -> Tokens:
     reader.expect("is", "are", "was", "were", "had been")
     if reader.accept("removed", "taken away", "gone", "not there", "absent"):
         return (*changed, "get_counterfact")
-    if reader.accept("five times", "5 times", "times"):
+    if reader.accept("five times", "5 times"):
         return (*changed, reader.one_of(COMPARATIVES))
     reader.accept("much")
     return (*changed, reader.one_of(reader.comparatives))

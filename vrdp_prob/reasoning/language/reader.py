@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping
 from typing import TypeVar
 
 from vrdp_prob.errors import InputError
-from vrdp_prob.reasoning.language.words import COMPARATIVES, split
+from vrdp_prob.reasoning.language.words import COMPARATIVES, as_written, split
 
 Result = TypeVar("Result")
 
@@ -19,9 +19,10 @@ class NotUnderstoodError(InputError):
     """No reading reaches the end of the words; the message names the first one that nothing fits."""
 
 
-def not_understood(text: str, words: tuple[str, ...], place: int) -> NotUnderstoodError:
-    """The refusal of a text at a word, counted from 0."""
-    return NotUnderstoodError(f"'{text}' is not understood at '{words[place]}' (word {place + 1}); {KNOWN_HINT}.")
+def not_understood(text: str, place: int) -> NotUnderstoodError:
+    """The refusal of a text at one of the words that `split` makes of it, counted from 0."""
+    word, number = as_written(text, place)
+    return NotUnderstoodError(f"'{text}' is not understood at '{word}' (word {number}); {KNOWN_HINT}.")
 
 
 class Reader:
@@ -124,5 +125,6 @@ class Reader:
 
     def _refusal(self) -> NotUnderstoodError:
         if self._furthest >= len(self.words):
-            return NotUnderstoodError(f"'{self.text}' ends too early, after '{self.words[-1]}'; {KNOWN_HINT}.")
-        return not_understood(self.text, self.words, self._furthest)
+            last, _ = as_written(self.text, len(self.words) - 1)
+            return NotUnderstoodError(f"'{self.text}' ends too early, after '{last}'; {KNOWN_HINT}.")
+        return not_understood(self.text, self._furthest)

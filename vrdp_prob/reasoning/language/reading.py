@@ -84,13 +84,17 @@ def parse_choice(text: str, kind: QuestionType) -> Tokens:
 
 
 def _learned(kind: str, text: str, refusal: NotUnderstoodError) -> Reading:
-    """What the learned parser reads; where it does not, the grammar's refusal or one that names the unknown word."""
+    """What the learned parser reads.
+
+    Where it does not, the grammar's refusal, or one that names the unknown word or the negation that nothing is said
+    with.
+    """
     from vrdp_prob.reasoning.language.learned.parser import learned_parser  # noqa: PLC0415 - loaded only when needed
 
     parser, words = learned_parser(), split(text)
-    unknown = parser.unknown(words)
-    if unknown is not None:
-        raise not_understood(text, words, unknown) from refusal
+    place = parser.unreadable(words)
+    if place is not None:
+        raise not_understood(text, place) from refusal
     reading = parser.read(kind, words)
     if reading is None:
         raise refusal

@@ -25,10 +25,38 @@ COMPARATIVES = {"heavier": "counterfact_heavier", "lighter": "counterfact_lighte
 
 STATES = {"moving": "filter_moving", "stationary": "filter_stationary"}
 
-_WORD = re.compile(r"[a-z]+|'s|[^\sa-z]+")
+_WORD = re.compile(r"[a-z]+(?:'[a-z]+)*|'s\b|[^\sa-z]+")
+_CONTRACTED = {"won't": ("will", "not"), "can't": ("can", "not")}
+_ENDINGS = {"n't": "not", "'re": "are", "'ll": "will"}
+_BEFORE_IS = ("what", "which", "that", "there")
+"""Words after which 's stands for 'is'; after others it is a possessive."""
 
 
 def split(text: str) -> tuple[str, ...]:
-    """Words of a text in lower case, a possessive 's apart, without punctuation between sentences' parts."""
+    """Words of a text in lower case, contractions in full, a possessive 's apart, without punctuation."""
+    return tuple(word for piece in _pieces(text) for word in _in_full(piece))
+
+
+def as_written(text: str, place: int) -> tuple[str, int]:
+    """The word of a text that a word of `split` is of, and its place among the text's words, counted from 1."""
+    pieces = _pieces(text)
+    owners = [number for number, piece in enumerate(pieces) for _ in _in_full(piece)]
+    return pieces[owners[place]], owners[place] + 1
+
+
+def _pieces(text: str) -> list[str]:
     lowered = text.lower().replace("\u2019", "'")
-    return tuple(word for word in _WORD.findall(lowered) if word.strip('?,.!;:"'))
+    return [piece for piece in _WORD.findall(lowered) if piece.strip("?,.!;:\"'")]
+
+
+def _in_full(piece: str) -> tuple[str, ...]:
+    """'what's' is 'what is', 'isn't' is 'is not', a possessive 's stands apart."""
+    if piece in _CONTRACTED:
+        return _CONTRACTED[piece]
+    for ending, word in _ENDINGS.items():
+        if piece.endswith(ending) and piece != ending:
+            return piece.removesuffix(ending), word
+    owner, apostrophe, end = piece.rpartition("'")
+    if (apostrophe, end) == ("'", "s") and owner:
+        return owner, "is" if owner in _BEFORE_IS else "'s"
+    return (piece,)

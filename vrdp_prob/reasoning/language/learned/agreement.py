@@ -1,13 +1,14 @@
 """Whether a reading speaks of what the text speaks of.
 
 A network is sure of too much. These rules look at the words alone: what was read must name the objects and orders that
-the text names; none of its parts may be made up; and no word of the text may be passed over. The words that belong to
-a part are those with which the training says it.
+the text names; none of its parts may be made up; and no word of the text may be passed over, least of all a negation.
+The words that belong to a part are those with which the training says it.
 """
 
 from collections import Counter
 from collections.abc import Iterator, Mapping
 from functools import cache
+from itertools import pairwise
 
 from vrdp_prob.reasoning.language.meaning import ANY, PRODUCTIONS, Meaning
 from vrdp_prob.reasoning.language.wording import wordings
@@ -40,6 +41,33 @@ _TOO_COMMON = frozenset(
 )
 """Words that tell nothing by themselves."""
 
+_NEGATING = ("not", "no", "never", "nothing", "without")
+"""Words that turn round what follows them; 'not' is known with 'there', and yet not with 'removed'."""
+
+_TURNING = (
+    *_NEGATING,
+    *("absence", "absent", "avoided", "delete", "deleted", "gone", "missing", "prevented", "removal", "remove"),
+    *("removed", "removing", "take", "taken", "took"),
+)
+"""Words of which a removal and a question turned round have one each; 'take place' has none."""
+
+_OPENING = ("after", "assuming", "had", "if", "in", "once", "suppose", "supposing", "were", "with", "without")
+"""Words with which a change begins."""
+
+_MEASURED = {
+    "five": (("five", "times"),),
+    "5": (("5", "times"),),
+    "fifth": (("fifth", "as"), ("fifth", "of")),
+    "times": (("five", "times"), ("5", "times"), ("many", "times")),
+}
+"""Words for how much or how often, and the pairs in which they say so."""
+
+_SLOT = "{"
+"""How the slots of a template begin."""
+
+_PHRASE = 3
+"""Words of a phrase that begins with a negation: 'not take place' is no 'not take away'."""
+
 
 def agrees(words: Words, meaning: Meaning) -> bool:
     """Whether a text and a meaning name the same things.
@@ -52,8 +80,18 @@ def agrees(words: Words, meaning: Meaning) -> bool:
         What it was read as.
     """
     parts = tuple(meaning.walk())
-    rules = (_same_objects, _same_orders, _nothing_made_up, _collisions_are_told, _nothing_passed_over)
+    rules = (
+        *(_same_objects, _same_orders, _nothing_made_up, _collisions_are_told, _collisions_are_counted),
+        *(_nothing_passed_over, _negations_are_told, _turned_as_often, _removals_are_not_negated, _measures_are_whole),
+    )
     return all(rule(words, parts) for rule in rules)
+
+
+def stray_negation(words: Words) -> int | None:
+    """Place of the first negation with which no wording says anything: 'not' in 'if the cube is not removed'."""
+    families = {(kind, _family(kind, name)) for kind, names in PRODUCTIONS.items() for name in names}
+    known = frozenset[Words]().union(*(_negations(kind, family) for kind, family in families))
+    return next((place for place in _negated_places(words) if not _says_one_of(words, place, known)), None)
 
 
 def _same_objects(words: Words, parts: Parts) -> bool:
@@ -91,6 +129,50 @@ def _collisions_are_told(words: Words, parts: Parts) -> bool:
     """A word for each collision that the reading speaks of."""
     meetings = sum("filter_collision" in PRODUCTIONS[part.kind][part.production] for part in parts)
     return sum(word in _meeting_words() for word in words) >= meetings
+
+
+def _collisions_are_counted(words: Words, parts: Parts) -> bool:
+    """Things are named in the plural only after 'times' or 'often' where their collisions are counted, not they."""
+    if not any((part.kind, part.production) == ("question", "number_of_collisions") for part in parts):
+        return True
+    things = [place for place, word in enumerate(words) if word in _words_of("shape", ANY, ("one",))]
+    often = [place for place, word in enumerate(words) if word in ("times", "often")]
+    return not things or (bool(often) and min(often) < min(things))
+
+
+def _negations_are_told(words: Words, parts: Parts) -> bool:
+    """Every negation begins a phrase with which some part is said."""
+    families = {(part.kind, _family(part.kind, part.production)) for part in parts}
+    known = frozenset[Words]().union(*(_negations(kind, family) for kind, family in families))
+    return all(_says_one_of(words, place, known) for place in _negated_places(words))
+
+
+def _turned_as_often(words: Words, parts: Parts) -> bool:
+    """One word for each removal and each question turned round, and at most one for a state: 'not moving'."""
+    turned = sum(
+        (part.kind, part.production) == ("change", "removed")
+        or (part.kind == "question" and part.production in _NEGATIONS)
+        for part in parts
+    )
+    said = sum(word in _TURNING and after != "place" for word, after in pairwise((*words, "")))
+    return turned <= said <= turned + sum(part.kind == "state" for part in parts)
+
+
+def _removals_are_not_negated(words: Words, parts: Parts) -> bool:
+    """A change begins between a negation and the removal that follows it: not so in 'is not going to be removed'."""
+    del parts
+    turning = [place for place, word in enumerate(words) if word in _TURNING and words[place + 1 :][:1] != ("place",)]
+    return all(
+        words[place] not in _NEGATING or not set(_OPENING).isdisjoint(words[place + 1 : after + 1])
+        for place, after in pairwise(turning)
+    )
+
+
+def _measures_are_whole(words: Words, parts: Parts) -> bool:
+    """Numbers and 'times' stand in pairs that say how much or how often."""
+    del parts
+    pairs = set(pairwise(words))
+    return all(pairs.intersection(_MEASURED[word]) for word in words if word in _MEASURED)
 
 
 def _nothing_passed_over(words: Words, parts: Parts) -> bool:
@@ -139,6 +221,49 @@ def _names(kinds: tuple[str, ...]) -> Mapping[str, str]:
 def _telling_words(kind: str, production: str, others: tuple[str, ...]) -> frozenset[str]:
     """Words that say a production and none of some others."""
     return _words_of(kind, production) - _TOO_COMMON.union(*(_words_of(kind, name) for name in others))
+
+
+def _negated_places(words: Words) -> Iterator[int]:
+    return (place for place, word in enumerate(words) if word in _NEGATING)
+
+
+def _says_one_of(words: Words, place: int, phrases: frozenset[Words]) -> bool:
+    """Whether one of the phrases begins at a place.
+
+    `_SLOT` fits any word and the end; after the negation only a word with which an object begins. Two words have to be
+    those of the phrase, and all of them where one of the text's turns round something else.
+    """
+    if len(words) > place + 1 and words[place + 1] not in _words_of_objects():
+        phrases = frozenset(phrase for phrase in phrases if phrase[1] != _SLOT)
+    said = (*words[place : place + _PHRASE], *[""] * _PHRASE)[:_PHRASE]
+    compared = said[:2] if set(_TURNING).isdisjoint(said[1:]) else said
+    return any(
+        all(wanted in (_SLOT, word) for word, wanted in zip(compared, phrase, strict=False)) for phrase in phrases
+    )
+
+
+@cache
+def _words_of_objects() -> frozenset[str]:
+    """'the', colors, materials, nouns."""
+    kinds = ("color", "material", "shape")
+    return frozenset(("the",)).union(*(_words_of(kind, name) for kind in kinds for name in PRODUCTIONS[kind]))
+
+
+@cache
+def _negations(kind: str, family: str) -> frozenset[Words]:
+    """Phrases of `_PHRASE` words, from a negation on, with which productions of a family are said."""
+    return frozenset(
+        tuple(
+            _SLOT if word.startswith(_SLOT) else word for word in (*said, *[_SLOT] * _PHRASE)[place : place + _PHRASE]
+        )
+        for name in _FILES
+        for (owner, _, production), templates in wordings(name).templates.items()
+        if (owner, _family(owner, production)) == (kind, family)
+        for template in templates
+        if not wordings(name).words_of(template).isdisjoint(_NEGATING)
+        for said in (tuple(variant.split()) for variant in wordings(name).variants(template))
+        for place in _negated_places(said)
+    )
 
 
 @cache

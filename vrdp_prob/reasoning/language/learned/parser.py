@@ -7,7 +7,7 @@ from pathlib import Path
 
 import torch
 
-from vrdp_prob.reasoning.language.learned.agreement import agrees
+from vrdp_prob.reasoning.language.learned.agreement import agrees, stray_negation
 from vrdp_prob.reasoning.language.learned.decoding import PartialProgram
 from vrdp_prob.reasoning.language.learned.examples import by_grammar
 from vrdp_prob.reasoning.language.learned.network import (
@@ -59,6 +59,11 @@ class LearnedParser:
     def unknown(self, words: tuple[str, ...]) -> int | None:
         """Place of the first word that is not in the vocabulary."""
         return next((place for place, word in enumerate(words) if word not in self.vocabulary.word_numbers), None)
+
+    def unreadable(self, words: tuple[str, ...]) -> int | None:
+        """Place of the first word that is not in the vocabulary, or of a negation that nothing is said with."""
+        unknown = self.unknown(words)
+        return stray_negation(words) if unknown is None else unknown
 
     def read(self, kind: str, words: tuple[str, ...], *, threshold: float = THRESHOLD) -> LearnedReading | None:
         """Read a text whose words are all in the vocabulary.

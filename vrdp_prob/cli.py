@@ -56,9 +56,9 @@ from vrdp_prob.reasoning import ask, infer
 from vrdp_prob.reasoning.adaptive import check_mc_error
 from vrdp_prob.reasoning.checking import check_question
 from vrdp_prob.report.answer_lines import answer_lines
-from vrdp_prob.report.wording import with_names
 from vrdp_prob.report.pipeline import Report
 from vrdp_prob.report.pipeline import report as write_report
+from vrdp_prob.report.wording import with_names
 from vrdp_prob.scene import Choice, Question
 
 UNUSABLE_INPUT = 2

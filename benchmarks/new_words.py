@@ -1,14 +1,15 @@
 """Words learned from questions and answers, and asked with: heavier, lighter, and a word that changes nothing.
 
-    python benchmarks/new_words.py [--json FILE] [--docs docs] [--teach 26] [--scenes 60] [--results DIR] [--model FILE]
+    python benchmarks/new_words.py [--json FILE] [--docs docs] [--teach 26] [--scenes 60] [--results DIR]
+                                   [--model FILE.toml] [--hand-on]
 
 The questions are those of ../shared/data/clevrer_bullet about heavier and lighter objects, one of each per video. The
 words are learned as if they were unknown from the first videos (`--teach`; one that has no posterior is left out), and
 the questions about the other videos are answered with the learned word and with the built-in one. The word that changes
 nothing comes from the questions about heavier objects with the answers of the unchanged video. Each video's posterior
 and results are written to `--results` as they come, so that a run that was interrupted goes on; those of another
-version of the code, or of another `--model`, are to be deleted by hand. `--docs` writes the table into `new-words.md`
-there and the figure beside it (needs matplotlib).
+version of the code, or of another `--model` or `--hand-on`, are to be deleted by hand. `--docs` writes the table into
+`new-words.md` there and the figure beside it (needs matplotlib).
 Without the data nothing is measured.
 """
 
@@ -17,7 +18,7 @@ import json
 import os
 import sys
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -58,9 +59,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if DATA.is_dir():
         model = default_model() if options.model is None else PhysicsModel.read(options.model)
         compile_model(model)
+        posteriors = Posteriors(options.results, model, options.hand_on)
         taught = measured(
             teach,
-            {scene: (scene, options.results, model) for scene in range(options.teach)},
+            {scene: (scene, posteriors) for scene in range(options.teach)},
             options.results / "taught.jsonl",
             field="scene",
             label="Teaching",
@@ -70,7 +72,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         words = {word: {count: learned(word, taught[:count]) for count in counts(taught)} for word in BUILT_IN}
         asked = measured(
             ask,
-            {scene: (scene, options.results, model, words) for scene in range(options.teach, options.scenes)},
+            {scene: (scene, posteriors, words) for scene in range(options.teach, options.scenes)},
             options.results / f"asked-{options.teach}.jsonl",
             field="scene",
             label="Asking",
@@ -97,6 +99,7 @@ def _options(arguments: Sequence[str] | None) -> argparse.Namespace:
     parser.add_argument("--teach", type=int, default=26, help="videos that the words are learned from")
     parser.add_argument("--scenes", type=int, default=60, help="all videos; those that teach not are asked about")
     parser.add_argument("--results", type=Path, default=RESULTS, help="folder of the results, which are gone on with")
+    parser.add_argument("--hand-on", action="store_true", help="emcee where Laplace draws cannot be trusted; hours")
     parser.add_argument("--model", type=Path, help="model in TOML that the videos are inferred with")
     parser.add_argument("--processes", type=int, default=os.cpu_count() or 1)
     return parser.parse_args(arguments)
@@ -107,12 +110,39 @@ def counts(taught: Sequence[Result]) -> list[int]:
     return [count for count in COUNTS if count <= len(taught)]
 
 
-def teach(task: tuple[int, Path, PhysicsModel]) -> Result:
+@dataclass(frozen=True)
+class Posteriors:
+    """The posteriors of the videos, each inferred once and kept.
+
+    Parameters
+    ----------
+    folder
+        Where they are kept.
+    model
+        With which physics.
+    hand_on
+        Whether emcee goes on where Laplace draws cannot be trusted.
+    """
+
+    folder: Path
+    model: PhysicsModel
+    hand_on: bool
+
+    def of(self, scene: int) -> AskablePosterior:
+        """That of a video."""
+        path = self.folder / f"{name_of(scene)}.nc"
+        if not path.exists():
+            tracks = load(DATA, video=name_of(scene))
+            infer(tracks, sampler="laplace", model=self.model, hand_on=self.hand_on, seed=0).write(path)
+        return AskablePosterior.read(path)
+
+
+def teach(task: tuple[int, Posteriors]) -> Result:
     """How far every meaning agrees with the answers about one video, word by word."""
-    scene, folder, model = task
+    scene, posteriors = task
     torch.set_num_threads(1)
     try:
-        posterior = posterior_of(scene, folder, model)
+        posterior = posteriors.of(scene)
     except Exception as error:  # one video must not take the others with it; the reason stands in the results
         return {"scene": scene, "failed": f"{type(error).__name__}: {error}"}
     found: dict[str, list[Any]] = {}
@@ -124,12 +154,12 @@ def teach(task: tuple[int, Path, PhysicsModel]) -> Result:
     return {"scene": scene, "agreements": found}
 
 
-def ask(task: tuple[int, Path, PhysicsModel, Mapping[str, Mapping[int, LearnedWord]]]) -> Result:
+def ask(task: tuple[int, Posteriors, Mapping[str, Mapping[int, LearnedWord]]]) -> Result:
     """Probability and truth of every choice about one video, with the built-in words and with the learned ones."""
-    scene, folder, model, words = task
+    scene, posteriors, words = task
     torch.set_num_threads(1)
     try:
-        worlds = PosteriorWorlds(posterior_of(scene, folder, model))
+        worlds = PosteriorWorlds(posteriors.of(scene))
     except Exception as error:  # likewise
         return {"scene": scene, "failed": f"{type(error).__name__}: {error}"}
     answers = {}
@@ -158,14 +188,6 @@ def in_random_orders(taught: Sequence[Result]) -> dict[str, dict[int, list[Learn
         }
         for word in (*BUILT_IN, UNCHANGED)
     }
-
-
-def posterior_of(scene: int, folder: Path, model: PhysicsModel) -> AskablePosterior:
-    """The posterior of a video, inferred once."""
-    path = folder / f"{name_of(scene)}.nc"
-    if not path.exists():
-        infer(load(DATA, video=name_of(scene)), sampler="laplace", model=model, hand_on=False, seed=0).write(path)
-    return AskablePosterior.read(path)
 
 
 def questions_with(word: str, scene: int) -> list[Question]:

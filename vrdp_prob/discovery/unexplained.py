@@ -139,7 +139,7 @@ class _Search:
 
         times = self.video.motion.times
         shortest = max(SHORTEST, LEAST_FRAMES * self.video.motion.frame_time)
-        longest = max(float(np.ptp(times)), shortest * np.e)
+        longest = max(float(np.ptp(times)), 2 * shortest)
         starts = [
             np.log([share * self.shown, min(max(duration, shortest), longest), noise])
             for share in SHARES

@@ -1,14 +1,16 @@
 """Numbers as a reader sees them."""
 
 import math
+from dataclasses import replace
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tests.discovery.findings import TILT
+from tests.discovery.findings import TILT, VIDEOS, named
 from vrdp_prob.discovery.finding import Estimate, UpperBound
 from vrdp_prob.discovery.gain_figure import HIGHEST, video_figure
+from vrdp_prob.discovery.summary import summary
 from vrdp_prob.discovery.wording import (
     MINUS,
     TIMES,
@@ -102,3 +104,11 @@ def test_a_hundred_equal_gains_fit_into_the_figure() -> None:
     assert not figure.in_rows
     assert len({dot.y for dot in figure.dots}) == 100
     assert max(dot.y for dot in figure.dots) <= HIGHEST
+
+
+def test_a_video_that_carries_a_gain_is_named() -> None:
+    assert not any("alone" in line for line in summary(named()))
+    by_video = {VIDEOS[0]: 220.0, **dict.fromkeys(VIDEOS[1:], 1.0)}
+    carried = replace(TILT, gain=replace(TILT.gain, by_video=by_video, elpd_difference=231.0))
+    told = summary(replace(named(), causes=(carried,)))
+    assert "The gain of surface tilt comes from run_00 alone and may be something of that video." in told

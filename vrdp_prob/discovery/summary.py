@@ -20,6 +20,8 @@ SURE = 0.9
 """Probability from which videos show a cause, and do not merely suggest it."""
 POSSIBLE = 0.05
 """Probability from which a cause that was not named is told of as possible."""
+CARRIED = 0.9
+"""Share of a gain from which a single video is said to carry it."""
 
 
 def verdict_sentence(finding: Finding) -> str:
@@ -40,7 +42,7 @@ def summary(finding: Finding) -> list[str]:
     told = [_gains(finding.named)] if finding.named else []
     if others := possible(finding):
         told.append(_others(others, beside=finding.named))
-    told += [f"{sentence(line)}." for line in (_checks(finding), _rest(finding)) if line]
+    told += [f"{sentence(line)}." for line in (*_carried(finding.named), _checks(finding), _rest(finding)) if line]
     if finding.verdict is Verdict.NONE:
         told.append("No cause of the catalogue predicts videos that are left out better.")
     return told
@@ -96,6 +98,16 @@ def _gains(causes: Sequence[FoundCause]) -> str:
         parts.append(f"{title(cause.name)}{what} from {before} to {after} {unit}")
     *_, noise, unit = errors_words(causes[-1].gain)
     return f"In videos that were left out, {listed(parts)}; the measurement noise is {noise} {unit}."
+
+
+def _carried(causes: Sequence[FoundCause]) -> list[str]:
+    """Causes that one video alone speaks for."""
+    told = []
+    for cause in causes:
+        video, most = max(cause.gain.by_video.items(), key=lambda item: item[1])
+        if most > CARRIED * cause.gain.elpd_difference:
+            told.append(f"the gain of {title(cause.name)} comes from {video} alone and may be something of that video")
+    return told
 
 
 def _gain_line(gain: Gain) -> str:

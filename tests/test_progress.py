@@ -16,6 +16,14 @@ def test_a_log_gets_a_line_now_and_then(capsys: pytest.CaptureFixture[str]) -> N
     ]
 
 
+def test_what_was_done_before_says_nothing_of_the_time_left(capsys: pytest.CaptureFixture[str]) -> None:
+    times = iter([0.0, 0.1, 40.0])
+    with LogProgress(every=30, clock=times.__next__).stage("Evaluating", total=1000) as advance:
+        advance(900)
+        advance(1)
+    assert capsys.readouterr().err == "Evaluating: 901 of 1000 in 40 s, about 3960 s left\n"
+
+
 def test_a_stage_of_unknown_length_counts_its_steps(capsys: pytest.CaptureFixture[str]) -> None:
     with LogProgress(every=0).stage("Trying causes") as advance:
         advance(2)

@@ -11,6 +11,9 @@ from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, T
 
 Advance = Callable[[float], None]
 
+AT_ONCE = 1.0
+"""Seconds within which steps are reported that were done before."""
+
 
 @runtime_checkable
 class ProgressDisplay(Protocol):
@@ -90,24 +93,27 @@ class LogProgress:
     def stage(self, description: str, total: float | None = None) -> Iterator[Advance]:
         """Open a stage told in lines."""
         begin = told = self._clock()
-        done = 0.0
+        done = kept = 0.0
 
         def advance(steps: float) -> None:
-            nonlocal done, told
+            nonlocal done, kept, told
             done += steps
             now = self._clock()
+            if now - begin < AT_ONCE:
+                kept = done
             if now - told >= self._every:
                 told = now
-                print(_line(description, done, total, now - begin), file=sys.stderr, flush=True)
+                print(_line(description, done, kept, total, now - begin), file=sys.stderr, flush=True)
 
         yield advance
 
 
-def _line(description: str, done: float, total: float | None, seconds: float) -> str:
+def _line(description: str, done: float, kept: float, total: float | None, seconds: float) -> str:
+    """How far a stage is; what was there when it began says nothing of the time that is left."""
     if not total:
-        return f"{description}: {done:g} steps in {seconds:.0f} s"
-    left = f", about {seconds * (total - done) / done:.0f} s left" if 0 < done < total else ""
-    return f"{description}: {done:g} of {total:g} in {seconds:.0f} s{left}"
+        return f"{description}: {done:.0f} steps in {seconds:.0f} s"
+    left = f", about {seconds * (total - done) / (done - kept):.0f} s left" if kept < done < total else ""
+    return f"{description}: {done:.0f} of {total:.0f} in {seconds:.0f} s{left}"
 
 
 def progress_display(*, quiet: bool) -> ProgressDisplay:

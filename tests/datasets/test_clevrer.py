@@ -190,3 +190,13 @@ def test_a_folder_of_annotations_is_read_as_its_videos(shared_data: Path) -> Non
     assert load(folder, video="video_00007").video == "video_00007"
     with pytest.raises(InputError, match="there is no video 'video_9'"):
         load(folder, video="video_9")
+
+
+def test_choices_without_an_id_take_one_that_is_free(tmp_path: Path) -> None:
+    choices = [{"choice": "a", "choice_id": None}, {"choice": "b", "choice_id": 0}, {"choice": "c"}]
+    scene = {"video_filename": "v.mp4", "questions": [{"question": "q", "choices": choices, "question_subtype": None}]}
+    file = tmp_path / "questions.json"
+    file.write_text(json.dumps([scene]))
+    (question,) = read_questions(file)["v"]
+    assert [choice.choice_id for choice in question.choices] == [1, 0, 2]
+    assert question.labels is None

@@ -3,6 +3,7 @@
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from itertools import count
 from typing import Any
 
 from vrdp_prob.errors import InputError
@@ -10,6 +11,7 @@ from vrdp_prob.scene import Choice, Question, QuestionType
 
 Entry = Mapping[str, Any]
 
+SUBTYPE = "question_subtype"
 LONGEST = 40
 """Letters of a wrong value that a message shows."""
 
@@ -62,27 +64,40 @@ def _read(entry: object) -> Question:
     choices = entry.get("choices")
     if choices is not None and not isinstance(choices, list):
         raise InputError(f"'choices' is {in_short(choices)}; give a list, in which each entry has a 'choice'.")
-    options = tuple(_choice(number, choice) for number, choice in enumerate(choices or ()))
-    check_ids("'choices'", "choice_id", [option.choice_id for option in options])
+    options = _with_ids([_choice(number, choice) for number, choice in enumerate(choices or ())])
     return Question(
         text=_text(entry, "question"),
         program=_program(entry),
         choices=options,
         question_type=_question_type(entry),
-        question_id=_identity(entry, "question_id", None),
+        question_id=_identity(entry, "question_id"),
         answer=_answer(entry),
-        labels={"question_subtype": _text(entry, "question_subtype")} if "question_subtype" in entry else None,
+        labels=None if entry.get(SUBTYPE) is None else {SUBTYPE: _text(entry, SUBTYPE)},
     )
 
 
-def _choice(number: int, entry: object) -> Choice:
+def _with_ids(choices: Sequence[tuple[str | int | None, Choice]]) -> tuple[Choice, ...]:
+    """Choices with the ids that are given, each other one with its place, or a number that is free."""
+    given = [identity for identity, _ in choices if identity is not None]
+    check_ids("'choices'", "choice_id", given)
+    taken = {str(identity) for identity in given}
+    found = []
+    for place, (identity, choice) in enumerate(choices):
+        free = next(number for number in count(place) if str(number) not in taken)
+        found.append(replace(choice, choice_id=free if identity is None else identity))
+        taken.add(str(found[-1].choice_id))
+    return tuple(found)
+
+
+def _choice(number: int, entry: object) -> tuple[str | int | None, Choice]:
+    """A choice and the id that its entry gives."""
     if not isinstance(entry, dict):
         raise InputError(
             f"entry {number + 1} of 'choices' is {in_short(entry)}; each needs at least 'choice', its text."
         )
     try:
-        identity = _identity(entry, "choice_id", number)
-        return Choice(number if identity is None else identity, _text(entry, "choice"), _program(entry), _judged(entry))
+        identity = _identity(entry, "choice_id")
+        return identity, Choice(number, _text(entry, "choice"), _program(entry), _judged(entry))
     except InputError as error:
         raise InputError(f"entry {number + 1} of 'choices': {error}") from error
 
@@ -115,8 +130,8 @@ def _question_type(entry: Entry) -> QuestionType | None:
     return QuestionType(kind)
 
 
-def _identity(entry: Entry, field: str, default: int | None) -> int | str | None:
-    identity = entry.get(field, default)
+def _identity(entry: Entry, field: str) -> int | str | None:
+    identity = entry.get(field)
     if identity is not None and not isinstance(identity, int | str):
         raise InputError(f"'{field}' is {in_short(identity)}; give a whole number or a text.")
     return identity

@@ -190,7 +190,7 @@ def _notes(found: Search) -> list[str]:
         "has as its limit, and its probability counts that."
         for name in _strange(found)
     ]
-    largest = [max(video, key=lambda one: one.size) for video in found.best.unexplained.straying if video]
+    largest = found.best.unexplained.accelerated
     if largest:
         sizes = [f"{one.size:.2g}" for one in sorted(largest, key=lambda one: one.size)]
         duration = float(np.median([one.duration for one in largest]))

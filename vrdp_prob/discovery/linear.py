@@ -106,9 +106,25 @@ class LinearVideo:
         """The video with further own unknowns of which nothing is known beforehand."""
         return replace(self, own=np.concatenate([self.own, self.padded(data)], axis=1))
 
-    def alone(self) -> "LinearVideo":
-        """The video where the shared unknowns are its own, too."""
-        return replace(self, own=np.concatenate([self.own, self.shared], axis=1), shared=self.shared[:, :0])
+    def alone(self, prior: Float[np.ndarray, "shared shared"] | None = None) -> "LinearVideo":
+        """The video where the shared unknowns are its own, too.
+
+        Parameters
+        ----------
+        prior
+            Curvature of their negative log prior; nothing is known of them beforehand where None.
+        """
+        if prior is None:
+            return replace(self, own=np.concatenate([self.own, self.shared], axis=1), shared=self.shared[:, :0])
+        values, vectors = np.linalg.eigh(prior)
+        rows = np.zeros((len(prior), self.own.shape[1] + len(prior)))
+        rows[:, self.own.shape[1] :] = np.sqrt(np.maximum(values, 0.0))[:, None] * vectors.T
+        return replace(
+            self,
+            residuals=np.concatenate([self.residuals, np.zeros(len(prior))]),
+            own=np.concatenate([np.concatenate([self.own, self.shared], axis=1), rows]),
+            shared=np.zeros((len(self.residuals) + len(prior), 0)),
+        )
 
     def padded(self, data: Float[np.ndarray, "data direction"]) -> Float[np.ndarray, "residual direction"]:
         """Directions of the data's residuals, independent where these stray, continued by zeros for the prior."""

@@ -150,7 +150,7 @@ class _Searcher:
             left = [effect for effect in self.catalogue if effect.name not in trial.names]
             found = trial.unexplained
             scores = beside = score_causes(trial.fit, found.plain, left, seed=self.seed)
-            if found.model is not found.plain:
+            if found.accelerated:
                 beside = score_causes(trial.fit, found.model, left, seed=self.seed)
             self._known[trial] = Step(tuple(scores), tuple(beside), (), overdispersion(found.model, seed=self.seed))
         return self._known[trial]

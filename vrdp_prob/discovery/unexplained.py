@@ -39,6 +39,8 @@ PARABOLA = 3
 SIMPLEX = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.5, 0.0], [0.0, 0.0, -0.5]])
 """Corners of the search's first simplex about its start: logarithms of size, duration and variance of the noise."""
 EVALUATIONS = 60
+LEAST_NOISE = 1e-6
+"""Smallest variance of the noise of an axis in units of the fit's."""
 FAR = 1e12
 """Cost of what is out of bounds."""
 
@@ -69,17 +71,23 @@ class Unexplained:
     Parameters
     ----------
     straying
-        How each video strays along its axes; None where noise explains what is left.
+        How each video strays along its axes; of size 0 where noise explains what is left.
     gains
         How much (nats) more probable each video is with them, given the others.
     plain, model
         Residuals of the fit without them, and with them made independent.
     """
 
-    straying: tuple[tuple[Straying, ...] | None, ...]
+    straying: tuple[tuple[Straying, ...], ...]
     gains: Float[np.ndarray, "video"]
     plain: ResidualModel
     model: ResidualModel
+
+    @property
+    def accelerated(self) -> tuple[Straying, ...]:
+        """The largest acceleration of each video that noise does not explain."""
+        largest = (max(video, key=lambda one: one.size) for video in self.straying)
+        return tuple(one for one in largest if one.size)
 
     @cached_property
     def shared_widening(self) -> Float[np.ndarray, "shared"]:
@@ -94,39 +102,50 @@ class Unexplained:
 def unexplained(fit: SharedFit) -> Unexplained:
     """Find the accelerations that make what a fit leaves most probable."""
     plain = ResidualModel.of(fit)
-    searches = [_Search(video, part.clues.acceleration) for video, part in zip(plain.videos, fit.fits, strict=True)]
-    straying = tuple(in_parallel(_Search.found, searches))
-    nothing = np.zeros(len(searches))
-    if not any(straying):
-        return Unexplained(straying, nothing, plain, plain)
-    whitenings = [
-        None if one is None else search.whitening(one) for search, one in zip(searches, straying, strict=True)
+    searches = [
+        _Search(video, part.clues.acceleration, plain.linear.prior)
+        for video, part in zip(plain.videos, fit.fits, strict=True)
     ]
+    straying = tuple(in_parallel(_Search.found, searches))
+    whitenings = [search.whitening(one) for search, one in zip(searches, straying, strict=True)]
     videos = tuple(
-        video if one is None else replace(video, linear=video.linear.straying(one))
-        for video, one in zip(plain.videos, whitenings, strict=True)
+        replace(video, linear=video.linear.straying(one)) for video, one in zip(plain.videos, whitenings, strict=True)
     )
     model = ResidualModel(replace(plain.linear, videos=tuple(one.linear for one in videos)), videos)
-    stretched = np.array([0.0 if one is None else _stretch(one) for one in whitenings])
-    gains = _log_densities(model.linear, stretched) - _log_densities(plain.linear, nothing)
+    gains = _log_densities(model.linear, [_stretch(one) for one in whitenings])
+    gains -= _log_densities(plain.linear, np.zeros(len(searches)))
     return Unexplained(straying, gains, plain, model)
 
 
 @dataclass(frozen=True)
 class _Search:
-    """The search for the unknown acceleration of one video, whose bodies show accelerations of a typical size."""
+    """The search for the unknown acceleration of one video.
+
+    Parameters
+    ----------
+    video
+        The video.
+    shown
+        Typical acceleration in m/s^2 of its bodies.
+    prior
+        Curvature of the negative log prior of the shared unknowns.
+    """
 
     video: VideoResiduals
     shown: float
+    prior: Float[np.ndarray, "shared shared"]
 
-    def found(self) -> tuple[Straying, ...] | None:
-        """The most probable straying; None where noise does as well, even if it is not that of the fit."""
-        noise = tuple(Straying(0.0, SHORTEST, float(one)) for one in self._variances(self._alone.left))
-        most = max(self._gain(noise), 0.0)
+    def found(self) -> tuple[Straying, ...]:
+        """The most probable straying; that of noise by itself where this does as well.
+
+        The noise of each axis is free in any case: otherwise a model that leaves something to chance would be credited
+        with it, and one that leaves nothing would not.
+        """
+        noise = tuple(Straying(0.0, SHORTEST, one) for one in self._variances(self._alone.left))
         best = noise
         for axis, fast in enumerate(self._fast_variances):
             best = self._along(axis, best, fast)
-        return best if self._gain(best) - most > NEEDED else None
+        return best if self._gain(best) - self._gain(noise) > NEEDED else noise
 
     def _along(self, axis: int, others: tuple[Straying, ...], fast: float) -> tuple[Straying, ...]:
         """The most probable straying along one axis, given that along the others."""
@@ -135,7 +154,12 @@ class _Search:
             return (*others[:axis], Straying(*np.exp(logs).tolist()), *others[axis + 1 :])
 
         def cost(logs: Float[np.ndarray, "3"]) -> float:
-            return -self._gain(with_logs(logs)) if shortest <= np.exp(logs[1]) <= longest else FAR
+            if not shortest <= np.exp(logs[1]) <= longest or np.exp(logs[2]) < LEAST_NOISE:
+                return FAR
+            try:
+                return -self._gain(with_logs(logs))
+            except np.linalg.LinAlgError:
+                return FAR
 
         times = self.video.motion.times
         shortest = max(SHORTEST, LEAST_FRAMES * self.video.motion.frame_time)
@@ -160,7 +184,7 @@ class _Search:
 
     @cached_property
     def _alone(self) -> LinearVideo:
-        return self.video.linear.alone()
+        return self.video.linear.alone(self.prior)
 
     def whitening(self, straying: tuple[Straying, ...]) -> Whitening:
         """What makes the residuals independent."""
@@ -182,8 +206,8 @@ class _Search:
         """Mean square of the residuals, axis by axis."""
         strands = self.video.likelihood.strands.positions
         return [
-            float(np.mean(np.concatenate([residuals[one.places] for one in strands if _axes(one) == axes]) ** 2))
-            for axes in self._axes
+            max(LEAST_NOISE, float(np.mean(residuals[np.concatenate(places)] ** 2)))
+            for places in ([one.places for one in strands if _axes(one) == axes] for axes in self._axes)
         ]
 
     @cached_property
@@ -196,7 +220,7 @@ class _Search:
         for strand in self.video.likelihood.strands.positions:
             values = self.video.linear.residuals[strand.places].reshape(len(strand.times), -1)
             several[self._axes.index(_axes(strand))].extend(_about_parabolas(values, strand.times))
-        return [float(np.median(some)) if some else 1.0 for some in several]
+        return [max(LEAST_NOISE, float(np.median(some))) if some else 1.0 for some in several]
 
 
 def _axes(strand: Strand) -> tuple[int, ...]:

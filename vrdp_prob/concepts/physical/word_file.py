@@ -58,7 +58,7 @@ def read_word(path: Path) -> LearnedWord:
         _check_sums(word)
         _check_amounts(word)
         _check_lapse(word)
-    except ValueError as error:
+    except (ValueError, OverflowError) as error:
         raise InputError(f"{path}: not a whole word ({error}); learn it anew.") from error
     return word
 

@@ -24,7 +24,8 @@ class Shares:
         Would then go if it were known which doubtful contacts and rests of the video happened, and who looks how.
     model
         Would then go if it were known what to believe where the simulation and the video differ: half of the draws
-        keep what was seen, half follow their own simulation.
+        keep what was seen, half follow their own simulation. Where an event of the video is in doubt, which the latter
+        decide by themselves, this is part of `events`.
     motion
         Would then go if the motion were measured `PRECISER` times as exactly.
     chaos

@@ -35,6 +35,8 @@ _MOTION: Mapping[Purpose, float] = {
 correlation of 1 - 1/k^2."""
 
 
+DOUBTFUL = 0.02
+"""An event of the video is in doubt if it happens in more than this share of the draws, and fails to in as many."""
 FEWEST = 20
 """Draws that both twins answer, at least."""
 
@@ -52,6 +54,8 @@ class Twins:
 
     def __init__(self, worlds: PosteriorWorlds, asked: PreparedQuestion) -> None:
         self._draws = worlds.effective_draws
+        happens = worlds.events().happens.mean(axis=0)
+        self._doubtful = bool(((happens > DOUBTFUL) & (happens < 1 - DOUBTFUL)).any())
         self._verdicts: list[Sequence[Verdict]] = [
             _verdicts(worlds.coupled(kept), asked) for kept in (_PARAMETERS, _EVENTS, _MODEL, _MOTION)
         ]
@@ -86,6 +90,9 @@ class Twins:
         scale = np.sqrt(max(len(codes) / self._draws, 1.0))
         error = scale * max(error for _, error in found)
         parameters, events, model, motion, chaos = np.diff(shared, prepend=0.0, append=1.0).tolist()
+        if self._doubtful:
+            # Draws on their own course decide the event themselves, so the two cannot be told apart.
+            events, model = events + model, 0.0
         return Shares(parameters, events, model, motion, chaos, error, tuple(sorted(words)))
 
 

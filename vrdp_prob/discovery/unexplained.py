@@ -15,17 +15,16 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Float
 from scipy.optimize import minimize
 from scipy.stats import chi2
-from torch import Tensor
 
 from vrdp_prob.discovery.held_out import left_out
 from vrdp_prob.discovery.linear import LinearFit, LinearVideo
 from vrdp_prob.discovery.residual_model import ResidualModel, VideoResiduals
 from vrdp_prob.inference.parallel import in_parallel
 from vrdp_prob.inference.several_videos.fitting import SharedFit
-from vrdp_prob.models.model_error import Strand, Whitening, factors
+from vrdp_prob.models.model_error import Factors, Strand, Whitening, factors
 
 NEEDED = 6.0
 """Gain (nats) in the probability of a video from which on something is said to be unexplained in it."""
@@ -113,7 +112,7 @@ def unexplained(fit: SharedFit) -> Unexplained:
     )
     model = ResidualModel(replace(plain.linear, videos=tuple(one.linear for one in videos)), videos)
     gains = _log_densities(model.linear, [_stretch(one) for one in whitenings])
-    gains -= _log_densities(plain.linear, np.zeros(len(searches)))
+    gains -= _log_densities(plain.linear, [0.0] * len(searches))
     return Unexplained(straying, gains, plain, model)
 
 
@@ -145,7 +144,7 @@ class _Search:
         best = noise
         for axis, fast in enumerate(self._fast_variances):
             best = self._along(axis, best, fast)
-        return best if self._gain(best) - self._gain(noise) > NEEDED else noise
+        return best if self._density(best) - self._density(noise) > NEEDED else noise
 
     def _along(self, axis: int, others: tuple[Straying, ...], fast: float) -> tuple[Straying, ...]:
         """The most probable straying along one axis, given that along the others."""
@@ -157,7 +156,7 @@ class _Search:
             if not shortest <= np.exp(logs[1]) <= longest or np.exp(logs[2]) < LEAST_NOISE:
                 return FAR
             try:
-                return -self._gain(with_logs(logs))
+                return -self._density(with_logs(logs))
             except np.linalg.LinAlgError:
                 return FAR
 
@@ -171,16 +170,17 @@ class _Search:
             for noise in (fast, others[axis].noise)
         ]
         best = min(starts, key=cost)
-        before = self._gain(others)
+        before = self._density(others)
         if -cost(best) < before:
             return others
         options = {"initial_simplex": best + SIMPLEX, "maxfev": EVALUATIONS, "xatol": 0.05, "fatol": 0.5}
         found = minimize(cost, best, method="Nelder-Mead", options=options)
         return with_logs(found.x) if -found.fun > before else others
 
-    def _gain(self, straying: tuple[Straying, ...]) -> float:
+    def _density(self, straying: tuple[Straying, ...]) -> float:
+        """Log density (nats, up to a constant) of the video by itself."""
         whitening = self.whitening(straying)
-        return _stretch(whitening) + _log_density(self._alone.straying(whitening)) - _log_density(self._alone)
+        return _stretch(whitening) + _log_density(self._alone.straying(whitening))
 
     @cached_property
     def _alone(self) -> LinearVideo:
@@ -189,13 +189,17 @@ class _Search:
     def whitening(self, straying: tuple[Straying, ...]) -> Whitening:
         """What makes the residuals independent."""
         video, unit = self.video, self.video.noise.slope(2) / self.video.noise_sd
-        strands = video.likelihood.strands
-        positions: list[tuple[Int[Tensor, "_"], Float[Tensor, "_ _"]]] = []
+        positions: Factors = ()
         for axes, one in zip(self._axes, straying, strict=True):
-            some = [strand for strand in strands.positions if _axes(strand) == axes]
+            some = [strand for strand in video.likelihood.strands.positions if _axes(strand) == axes]
             positions += factors(some, one.size * unit, one.duration, np.full(video.positions, one.noise))
-        angles = np.ones(video.linear.data - video.positions)
-        return Whitening(tuple(positions), factors(strands.angles, 0.0, 1.0, angles))
+        return Whitening(positions, self._angles)
+
+    @cached_property
+    def _angles(self) -> Factors:
+        """Angles do not stray."""
+        video = self.video
+        return factors(video.likelihood.strands.angles, 0.0, 1.0, np.ones(video.linear.data - video.positions))
 
     @cached_property
     def _axes(self) -> list[tuple[int, ...]]:
@@ -249,10 +253,11 @@ def _stretch(whitening: Whitening) -> float:
 
 def _log_density(video: LinearVideo) -> float:
     """Log density (nats, up to a constant) of a video by itself, its unknowns integrated out."""
-    return video.log_volume - float(video.left @ video.left) / 2
+    left = video.left
+    return video.log_volume - float(left @ left) / 2
 
 
-def _log_densities(linear: LinearFit, stretched: Sequence[float] | Float[np.ndarray, "video"]) -> np.ndarray:
+def _log_densities(linear: LinearFit, stretched: Sequence[float]) -> Float[np.ndarray, "video"]:
     """Log density (nats, up to constants of the tracks) of each video given the others.
 
     Parameters
@@ -266,7 +271,7 @@ def _log_densities(linear: LinearFit, stretched: Sequence[float] | Float[np.ndar
     found = []
     for video, left, log_factor in zip(linear.videos, linear.left, stretched, strict=True):
         shared = video.reduced_shared
-        own = video.log_volume + float(log_factor) - float(left @ left) / 2
+        own = video.log_volume + log_factor - float(left @ left) / 2
         cavity = left_out(own, total, shared.T @ left, shared.T @ shared, np.zeros(len(total)))
         found.append(cavity.log_density)
     return np.array(found)

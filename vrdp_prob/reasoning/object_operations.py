@@ -3,6 +3,8 @@
 import numpy as np
 from jaxtyping import Bool, Int
 
+from vrdp_prob.errors import InputError
+from vrdp_prob.reasoning.facts import NOT_STATED
 from vrdp_prob.reasoning.naming import likely_name, number_word, uncertainties
 from vrdp_prob.reasoning.operations import operation
 from vrdp_prob.reasoning.run import Run
@@ -80,6 +82,10 @@ def unique(run: Run, chosen: ObjectSet) -> ObjectRef:
 
 def _with_attribute(run: Run, chosen: ObjectSet, name: str, word: Word) -> ObjectSet:
     labels = run.facts.attribute(name)
+    for label in labels:
+        if word.text not in label.names:
+            told = ", ".join(value for value in label.names if value != NOT_STATED)
+            raise InputError(f"nothing here tells which objects are {word.text}; the {name}s told are: {told}.")
     mask = np.stack([label.index == label.names.index(word.text) for label in labels], axis=1)
     return ObjectSet(chosen.mask & mask, (*chosen.words, word.text))
 

@@ -92,6 +92,19 @@ def test_a_doubtful_metal_makes_the_metal_cube_ambiguous(seen: SeenObjects, conc
     assert any("material" in note and "uncertain" in note for note in cube.notes)
 
 
+def test_a_word_that_was_never_learned_is_refused(seen: SeenObjects) -> None:
+    torch.manual_seed(0)
+    learned = Vocabulary({**WORDS, "color": ("red", "blue", "green")})
+    facts = Concepts((ConceptNetwork(learned),) * 2, Lessons(1, 1, 0, 0.0, 1.0, 1.0)).facts(seen)
+    with pytest.raises(InputError, match="tells which objects are cyan; the colors told are: red, blue, green"):
+        answer_question(facts, ("objects", "cyan", "filter_color", "count"))
+    several = answer_question(facts, ("objects", "red", "filter_color", "count"))
+    assert sum(several.distribution.values()) == pytest.approx(1.0)
+    assert {label.names[place] for label in facts.attribute("color") for place in label.index} <= set(
+        learned.values["color"]
+    )
+
+
 def replace_shape(facts: TableFacts) -> TableFacts:
     """The same video with a body 2 that is no cube for sure."""
     bodies = tuple(replace(body, attribute_probabilities={}) if body.id == "2" else body for body in facts.bodies)

@@ -48,6 +48,9 @@ PROGRAMS = (
     "objects events filter_end get_frame filter_moving unique query_color",
     "events objects filter_collision count",
     "events objects blue filter_color filter_collision count",
+    "events objects cube filter_shape filter_collision objects blue filter_color filter_collision count",
+    f"events {BLUE_CUBE} filter_collision objects metal filter_material filter_collision count",
+    f"events objects rubber filter_material filter_collision {RED} filter_collision exist",
     "events objects filter_out unique get_object query_color",
     "events objects filter_in unique get_object query_color",
     "events objects filter_in first filter_order get_object query_shape",
@@ -191,6 +194,40 @@ def test_an_operation_on_independent_events_is_the_expectation_over_worlds(text:
         assert given.present.item() == pytest.approx(float(weight @ known.present))
         shares = np.bincount(known.index, weights=weight * known.present, minlength=len(given.probability))
         np.testing.assert_allclose(given.probability.numpy(), shares / shares.sum(), atol=1e-12)
+
+
+def with_attributes(facts: SoftFacts, **shares: tuple[str, list[float]]) -> SoftFacts:
+    """The same video, where the objects have one value of an attribute with these probabilities."""
+    attributes = dict(facts.attributes)
+    for name, (value, probabilities) in shares.items():
+        table = torch.zeros_like(attributes[name])
+        table[:, facts.values[name].index(value)] = torch.tensor(probabilities, dtype=table.dtype)
+        attributes[name] = table
+    return SoftFacts(attributes, facts.values, facts.events, facts.motion)
+
+
+def test_collisions_of_some_doubtful_objects_with_others_are_the_expectation() -> None:
+    blue, cube = [0.9, 0.3, 0.0, 0.5], [0.2, 1.0, 0.6, 0.7]
+    facts = with_attributes(SoftFacts.of(video(STORY)), color=("blue", blue), shape=("cube", cube))
+    text = "all_events objects blue filter_color filter_collision objects cube filter_shape filter_collision count"
+    pairs = [(first, second) for second in range(4) for first in range(second)]
+    expected = sum(1 - (1 - blue[i] * cube[j]) * (1 - blue[j] * cube[i]) for i, j in pairs)
+    assert number(run_softly(check(text.split()), SoftRun(facts))) == pytest.approx(expected)
+
+
+def test_collisions_of_one_doubtful_object_with_another_are_the_expectation() -> None:
+    odds = {"color": ("blue", [0.9, 0.3, 0.2, 0.5]), "shape": ("cube", [0.2, 0.9, 0.6, 0.7])}
+    facts = with_attributes(SoftFacts.of(video(STORY)), **odds)
+    blue, cube = (np.array(shares) / (1 - np.array(shares)) for _, shares in odds.values())
+    blue, cube = blue / blue.sum(), cube / cube.sum()  # the only one of its kind
+    text = "all_events objects blue filter_color unique filter_collision objects cube filter_shape unique"
+    run = SoftRun(facts)
+    together = run_softly(check(f"{text} filter_collision exist".split()), run)
+    different = 1 - blue @ cube
+    pairs = [(first, second) for second in range(4) for first in range(second)]
+    meeting = [(blue[i] * cube[j] + blue[j] * cube[i]) / different for i, j in pairs]
+    assert number(together) == pytest.approx(1 - np.prod(1 - np.array(meeting)))
+    assert run.makes_sense[-1].item() == pytest.approx(different)
 
 
 def test_causes_are_the_expectation_over_worlds_where_one_way_leads_back() -> None:

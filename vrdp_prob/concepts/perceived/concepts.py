@@ -5,7 +5,7 @@ probability is the mean over the networks.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property
 from itertools import chain
 
@@ -21,8 +21,9 @@ from vrdp_prob.errors import InputError
 from vrdp_prob.perception.reading import CERTAIN, SeenObjects
 from vrdp_prob.reasoning.changes import Change
 from vrdp_prob.reasoning.events import EventTable
-from vrdp_prob.reasoning.facts import Motion, TableFacts
+from vrdp_prob.reasoning.facts import NOT_STATED, Motion, TableFacts
 from vrdp_prob.reasoning.prepared import prepare
+from vrdp_prob.reasoning.values import Label
 from vrdp_prob.reasoning.vocabulary import PLAIN
 from vrdp_prob.reasoning.vocabulary import Vocabulary as QuestionVocabulary
 from vrdp_prob.scene import Body, Question, Tracks
@@ -119,7 +120,8 @@ class Concepts:
         network = np.arange(draws) % len(self.networks)
         table = _drawn_events(seen.tracks, [events[place] for place in network], numbers)
         motion = _drawn_motion([motions[place] for place in network], numbers)
-        return SeenFacts(self.recognise(seen).bodies, table, motion, effective_draws=draws, seed=seed)
+        bodies, learned = self.recognise(seen).bodies, self.vocabulary.values
+        return SeenFacts(bodies, table, motion, effective_draws=draws, seed=seed, learned=learned)
 
     @cached_property
     def unlearned(self) -> frozenset[str]:
@@ -159,7 +161,23 @@ class Concepts:
 
 @dataclass(frozen=True)
 class SeenFacts(TableFacts):
-    """What concepts see of a video: nothing of what happens after it, or would happen with a change."""
+    """What concepts see of a video: nothing of what happens after it, or would happen with a change.
+
+    Parameters
+    ----------
+    learned
+        The words that were learned, by attribute.
+    """
+
+    learned: Mapping[str, tuple[str, ...]] = field(kw_only=True)
+
+    def attribute(self, name: str) -> tuple[Label, ...]:
+        """Which of the learned words each object is described by, in each draw."""
+        told = (NOT_STATED, *self.learned[name])
+        return tuple(
+            Label(np.array([told.index(word) if word in told else 0 for word in label.names])[label.index], told)
+            for label in super().attribute(name)
+        )
 
     def unseen_events(self) -> EventTable:
         """Refused.

@@ -1,6 +1,7 @@
 """Soft forms of the operations on events."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import torch
 from jaxtyping import Float
@@ -75,8 +76,14 @@ def filter_out(run: SoftRun, chosen: SoftEventSet, who: SoftObjectSet | SoftObje
 
 @soft_form_of(event_operations.filter_collision)
 def filter_collision(run: SoftRun, chosen: SoftEventSet, who: SoftObjectSet | SoftObjectRef) -> SoftEventSet:
-    """The collisions in which any of the objects takes part."""
-    return _of_kind(run, chosen, who, _universe(run).collisions)
+    """The collisions of any of the objects; of collisions of others, those of them with any of the objects."""
+    if not chosen.parties:
+        return replace(_of_kind(run, chosen, who, _universe(run).collisions), parties=(who,))
+    first, *others = chosen.parties
+    meeting = torch.stack([_meeting(run, party, who) for party in (first, *others)]).prod(dim=0)
+    known = torch.ones_like(meeting) if others else _involved(run, first)  # what `chosen` holds of it already
+    share = meeting / known.clamp_min(torch.finfo(known.dtype).tiny)
+    return replace(chosen, probability=chosen.probability * share, parties=(*chosen.parties, who))
 
 
 @soft_form_of(event_operations.filter_before)
@@ -84,7 +91,7 @@ def filter_before(run: SoftRun, chosen: SoftEventSet, event: SoftEventRef) -> So
     """The events before an event."""
     run.require(event.present)
     earlier = (chosen.time[:, None] < event.time[None, :]).double() @ event.probability
-    return SoftEventSet(chosen.probability * earlier, chosen.time)
+    return replace(chosen, probability=chosen.probability * earlier)
 
 
 @soft_form_of(event_operations.filter_after)
@@ -92,7 +99,7 @@ def filter_after(run: SoftRun, chosen: SoftEventSet, event: SoftEventRef) -> Sof
     """The events after an event."""
     run.require(event.present)
     later = (chosen.time[:, None] > event.time[None, :]).double() @ event.probability
-    return SoftEventSet(chosen.probability * later, chosen.time)
+    return replace(chosen, probability=chosen.probability * later)
 
 
 @soft_form_of(event_operations.filter_order)
@@ -112,7 +119,8 @@ def filter_order(run: SoftRun, chosen: SoftEventSet, order: Word) -> SoftEventRe
 def filter_ancestor(run: SoftRun, chosen: SoftEventSet, event: SoftEventRef) -> SoftEventSet:
     """The events that lie on the way back from an event, object by object, to the previous event."""
     run.require(event.present)
-    return SoftEventSet(chosen.probability * (event.probability @ run.facts.events.ancestors), chosen.time)
+    reached = event.probability @ run.facts.events.ancestors
+    return replace(chosen, probability=chosen.probability * reached)
 
 
 @soft_form_of(event_operations.unique)
@@ -163,10 +171,36 @@ def _certain(run: SoftRun, place: int) -> SoftEventRef:
 
 
 def _of_kind(run: SoftRun, chosen: SoftEventSet, who: SoftObjectSet | SoftObjectRef, part: slice) -> SoftEventSet:
-    members = who.probability * run.facts.events.takes_part
-    involved = either(members) if isinstance(who, SoftObjectSet) else members.sum(dim=1)
     kind = torch.from_numpy(_universe(run).mask(part)).double()
-    return SoftEventSet(chosen.probability * kind * involved, chosen.time)
+    return replace(chosen, probability=chosen.probability * kind * _involved(run, who))
+
+
+def _involved(run: SoftRun, who: SoftObjectSet | SoftObjectRef) -> Float[Tensor, "event"]:
+    """Probability of each event to have any of the objects in it."""
+    members = who.probability * run.facts.events.takes_part
+    return either(members) if isinstance(who, SoftObjectSet) else members.sum(dim=1)
+
+
+def _meeting(
+    run: SoftRun, one: SoftObjectSet | SoftObjectRef, other: SoftObjectSet | SoftObjectRef
+) -> Float[Tensor, "event"]:
+    """Probability of each collision to be one of the first objects with one of the others."""
+    universe = _universe(run)
+    pairs = torch.tensor(universe.pairs).reshape(-1, 2)
+    ways = torch.stack(
+        [one.probability[pairs[:, side]] * other.probability[pairs[:, 1 - side]] for side in (0, 1)], dim=1
+    )
+    if isinstance(one, SoftObjectSet) and isinstance(other, SoftObjectSet):
+        met = either(ways)
+    elif isinstance(one, SoftObjectRef) and isinstance(other, SoftObjectRef):
+        different = 1 - one.probability @ other.probability
+        run.require(different)
+        met = ways.sum(dim=1) / different.clamp_min(torch.finfo(different.dtype).tiny)
+    else:
+        met = ways.sum(dim=1)
+    everything = torch.zeros(universe.size, dtype=met.dtype)
+    everything[universe.collisions] = met
+    return everything
 
 
 def _so_many_before(probability: Float[Tensor, "event"], number: int) -> Float[Tensor, "event"]:

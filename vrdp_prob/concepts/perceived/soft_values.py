@@ -25,10 +25,11 @@ class SoftObjectRef:
 
 @dataclass(frozen=True)
 class SoftEventSet:
-    """Probability of each event to be in a set, and the events' times in s (NaN where an event has none)."""
+    """Probability of each event to be in a set, their times in s (NaN where there is none), and whose they are."""
 
     probability: Float[Tensor, "event"]
     time: Float[Tensor, "event"]
+    parties: tuple[SoftObjectSet | SoftObjectRef, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -47,8 +47,11 @@ class Information:
     @cached_property
     def _root(self) -> Float[np.ndarray, "dimension dimension"]:
         """Root of the covariance of what the data and the Gaussian part of the prior say; a prior's edge is no data."""
-        point = torch.from_numpy(self.mode.point)
-        slopes = torch.func.jacrev(lambda values: self.coordinates.prior_residuals(values[None])[0])(point).numpy()
+        point = torch.from_numpy(self.mode.point)[None]
+        rows = point.repeat(self.coordinates.prior_residuals(point).shape[1], 1).requires_grad_()
+        # One row per residual, so one pass backward is enough (`torch.func` imports a compiler, which takes seconds).
+        (found,) = torch.autograd.grad(self.coordinates.prior_residuals(rows).diagonal().sum(), rows)
+        slopes = found.numpy()
         precision = self.mode.precision - slopes.T @ slopes + np.diag(self.coordinates.prior_sd**-2)
         return Gaussian.from_precision(self.mode.point, precision).root
 

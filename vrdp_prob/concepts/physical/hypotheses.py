@@ -76,7 +76,7 @@ class Hypothesis:
 
 HYPOTHESES = (
     # a factor, not an offset: a video tells masses only relative to each other
-    Hypothesis(PhysicalParameter.MASS, Rule.FACTOR, prior_sd=np.log(4), limit=np.log(16), points=17),
+    Hypothesis(PhysicalParameter.MASS, Rule.FACTOR, prior_sd=np.log(4), limit=np.log(16), points=33),
     # restitution lies between 0 and 1: beyond a factor of 4 every object is as dead or as bouncy as can be
     Hypothesis(PhysicalParameter.RESTITUTION, Rule.FACTOR, prior_sd=np.log(2), limit=np.log(4), points=9),
     Hypothesis(PhysicalParameter.RESTITUTION, Rule.OFFSET, prior_sd=0.3, limit=0.8, points=9),

@@ -29,6 +29,7 @@ from _page import write_between
 from _released_worlds import ReleasedWorlds
 from _resumable import Result, measured
 from _true_posterior import TruePosterior
+from _wrong_answers import wrong_answers
 from scipy.special import logsumexp
 
 from vrdp_prob.datasets import load, read_questions
@@ -70,6 +71,11 @@ class Task:
         """Name of its video."""
         return f"video_{self.scene:05d}"
 
+    @property
+    def models(self) -> dict[str, PhysicsModel]:
+        """The models that it is inferred with, by the name of the folder of their posteriors."""
+        return {"base": self.model} | ({} if self.extended is None else {"extended": self.extended})
+
 
 def main(arguments: Sequence[str] | None = None) -> int:
     options = _parser().parse_args(arguments)
@@ -93,7 +99,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     preferred: list[str] = []
     if extended is not None:
         preferred = _preference(_measured(preference, tasks, options, "models", "Comparing models"))
-    text = "\n".join([*_tables(rows), *preferred, "", *_fewer_table(list(fewer.values()))])
+    best, others = (EXTENDED, (FULL, TRUE)) if EXTENDED in rows else (FULL, (TRUE,))
+    wrong = wrong_answers(rows[best], {name: rows[name] for name in others}, DATA / "sensitivity.json")
+    text = "\n".join([*_tables(rows), *preferred, *_fewer_tables(_rows(list(fewer.values()))), "", *wrong])
     print(text)
     if options.docs:
         write_between(options.docs / "practice.md", text)
@@ -139,11 +147,10 @@ def posterior_of(task: Task, tracks: Tracks, name: str, model: PhysicsModel) -> 
 def deviations(task: Task) -> Result:
     """What a scene says of how motion deviates from the model, and the same under the extended one."""
     told = {}
-    for name, model in (("base", task.model), ("extended", task.extended)):
-        if model is not None:
-            posterior = posterior_of(task, load(DATA, video=task.video), name, model)
-            batch = PosteriorWorlds(posterior, draws=DRAWS).batches[0]
-            told[name] = {"impulse": turns(batch.deviations), "acceleration": list(batch.wandering)}
+    for name, model in task.models.items():
+        posterior = posterior_of(task, load(DATA, video=task.video), name, model)
+        batch = PosteriorWorlds(posterior, draws=DRAWS).batches[0]
+        told[name] = {"impulse": turns(batch.deviations), "acceleration": list(batch.wandering)}
     return {"scene": task.scene, **told}
 
 
@@ -191,9 +198,8 @@ def _worlds(task: Task, tracks: Tracks) -> dict[str, Facts]:
 
 def preference(task: Task) -> Result:
     """How much better than the base model the extended one is expected to predict new positions of a scene, in nats."""
-    assert task.extended is not None
-    tracks, models = load(DATA, video=task.video), {"base": task.model, "extended": task.extended}
-    waic = {name: expected_log_density(posterior_of(task, tracks, name, model)) for name, model in models.items()}
+    tracks = load(DATA, video=task.video)
+    waic = {name: expected_log_density(posterior_of(task, tracks, name, model)) for name, model in task.models.items()}
     return {"scene": task.scene, "gain": waic["extended"] - waic["base"]}
 
 
@@ -218,16 +224,20 @@ def _preference(found: Mapping[int, Result]) -> list[str]:
 
 
 def with_fewer_frames(task: Task) -> Result:
-    """Judgements of all answers where some of the frames were seen, evenly spaced, by their number."""
+    """Judgements of all answers where some of the frames were seen, evenly spaced, by the model and their number."""
     tracks = load(DATA, video=task.video)
     asked, rows = read_questions(DATA / "questions.json")[task.video], {}
-    for frames in FEWER_FRAMES:
-        thinner = thinned(tracks, frames)
-        name = "base" if frames >= len(tracks.times) else f"frames-{frames}"
-        posterior = posterior_of(task, thinner, name, task.model)
-        worlds = PosteriorWorlds(posterior, draws=DRAWS, deviating=task.deviating)
-        rows[str(frames)] = [_judged(task, worlds, one) for one in asked]
+    for name, model in task.models.items():
+        for frames in FEWER_FRAMES:
+            folder = name if frames >= len(tracks.times) else f"{name}-frames-{frames}"
+            posterior = posterior_of(task, thinned(tracks, frames), folder, model)
+            worlds = PosteriorWorlds(posterior, draws=DRAWS, deviating=task.deviating)
+            rows[_fewer(name, frames)] = [_judged(task, worlds, one) for one in asked]
     return {"scene": task.scene, "rows": rows}
+
+
+def _fewer(model: str, frames: int) -> str:
+    return f"{model}, {frames} frames"
 
 
 def thinned(tracks: Tracks, frames: int) -> Tracks:
@@ -276,14 +286,24 @@ def _scores(rows: Mapping[str, Sequence[Judgement]], name: str, best_fit: str) -
     return lines
 
 
-def _fewer_table(results: Sequence[Result]) -> list[str]:
+def _fewer_tables(rows: Mapping[str, Sequence[Judgement]]) -> list[str]:
+    titles = {"base": "With fewer frames:", "extended": "With fewer frames and the extended model:"}
+    return [
+        line
+        for model, title in titles.items()
+        if _fewer(model, FEWER_FRAMES[0]) in rows
+        for line in ("", title, "", *_fewer_table(rows, model))
+    ]
+
+
+def _fewer_table(rows: Mapping[str, Sequence[Judgement]], model: str) -> list[str]:
     head = ("frames seen", "questions", "options", "right, per question", "per option", "Brier", "entropy, nats")
     lines = [_row(*head, *CALIBRATION), _row(*["---"] * (len(head) + len(CALIBRATION)))]
     for kind in GOALS:
-        for frames in map(str, FEWER_FRAMES):
-            made = [Judgement.of_document(one) for result in results for one in result["rows"].get(frames, ())]
-            score = Scores.of([one for one in made if one.kind is kind])
-            doubts = [p for one in made if one.kind is kind for p in _forecasts(one)]
+        for frames in FEWER_FRAMES:
+            made = [one for one in rows[_fewer(model, frames)] if one.kind is kind]
+            score = Scores.of(made)
+            doubts = [p for one in made for p in _forecasts(one)]
             doubt = np.mean([entropy(np.array([p, 1 - p])) for p in doubts])
             shares = [_percent(score.accuracy_per_question), _percent(score.accuracy_per_option)]
             counts = str(score.questions), str(score.options)

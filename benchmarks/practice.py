@@ -101,7 +101,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         preferred = _preference(_measured(preference, tasks, options, "models", "Comparing models"))
     best, others = (EXTENDED, (FULL, TRUE)) if EXTENDED in rows else (FULL, (TRUE,))
     wrong = wrong_answers(rows[best], {name: rows[name] for name in others}, DATA / "sensitivity.json")
-    text = "\n".join([*_tables(rows), *preferred, *_fewer_tables(_rows(list(fewer.values()))), "", *wrong])
+    text = "\n".join([*_tables(rows), *preferred, "", *_fewer_table(_rows(list(fewer.values()))), "", *wrong])
     print(text)
     if options.docs:
         write_between(options.docs / "practice.md", text)
@@ -224,20 +224,15 @@ def _preference(found: Mapping[int, Result]) -> list[str]:
 
 
 def with_fewer_frames(task: Task) -> Result:
-    """Judgements of all answers where some of the frames were seen, evenly spaced, by the model and their number."""
+    """Judgements of all answers where some of the frames were seen, evenly spaced, by their number."""
     tracks = load(DATA, video=task.video)
     asked, rows = read_questions(DATA / "questions.json")[task.video], {}
-    for name, model in task.models.items():
-        for frames in FEWER_FRAMES:
-            folder = name if frames >= len(tracks.times) else f"{name}-frames-{frames}"
-            posterior = posterior_of(task, thinned(tracks, frames), folder, model)
-            worlds = PosteriorWorlds(posterior, draws=DRAWS, deviating=task.deviating)
-            rows[_fewer(name, frames)] = [_judged(task, worlds, one) for one in asked]
+    for frames in FEWER_FRAMES:
+        name = "base" if frames >= len(tracks.times) else f"frames-{frames}"
+        posterior = posterior_of(task, thinned(tracks, frames), name, task.model)
+        worlds = PosteriorWorlds(posterior, draws=DRAWS, deviating=task.deviating)
+        rows[str(frames)] = [_judged(task, worlds, one) for one in asked]
     return {"scene": task.scene, "rows": rows}
-
-
-def _fewer(model: str, frames: int) -> str:
-    return f"{model}, {frames} frames"
 
 
 def thinned(tracks: Tracks, frames: int) -> Tracks:
@@ -286,22 +281,12 @@ def _scores(rows: Mapping[str, Sequence[Judgement]], name: str, best_fit: str) -
     return lines
 
 
-def _fewer_tables(rows: Mapping[str, Sequence[Judgement]]) -> list[str]:
-    titles = {"base": "With fewer frames:", "extended": "With fewer frames and the extended model:"}
-    return [
-        line
-        for model, title in titles.items()
-        if _fewer(model, FEWER_FRAMES[0]) in rows
-        for line in ("", title, "", *_fewer_table(rows, model))
-    ]
-
-
-def _fewer_table(rows: Mapping[str, Sequence[Judgement]], model: str) -> list[str]:
+def _fewer_table(rows: Mapping[str, Sequence[Judgement]]) -> list[str]:
     head = ("frames seen", "questions", "options", "right, per question", "per option", "Brier", "entropy, nats")
     lines = [_row(*head, *CALIBRATION), _row(*["---"] * (len(head) + len(CALIBRATION)))]
     for kind in GOALS:
         for frames in FEWER_FRAMES:
-            made = [one for one in rows[_fewer(model, frames)] if one.kind is kind]
+            made = [one for one in rows[str(frames)] if one.kind is kind]
             score = Scores.of(made)
             doubts = [p for one in made for p in _forecasts(one)]
             doubt = np.mean([entropy(np.array([p, 1 - p])) for p in doubts])

@@ -10,3 +10,8 @@ GOALS = {
     Kind.MASS: (0.88, 0.76),
 }
 """Wanted accuracy per option and per question."""
+
+
+def title(kind: Kind) -> str:
+    """A kind of question in words."""
+    return kind.value.replace("_", ", ")

@@ -5,6 +5,11 @@ from pathlib import Path
 BEGIN, END = "<!-- measured: begin -->", "<!-- measured: end -->"
 
 
+def table_row(*cells: str) -> str:
+    """A row of a table."""
+    return f"| {' | '.join(cells)} |"
+
+
 def write_between(path: Path, text: str) -> None:
     """Replace what stands between the marks in a page."""
     before, rest = path.read_text(encoding="utf-8").split(BEGIN)

@@ -5,6 +5,9 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from _answer_goals import title
+from _page import table_row
+
 from vrdp_prob.evaluation.judgement import Judgement
 
 HEAD = ("scene", "question", "answered", "right is", "its probability", "holds in re-runs", "right with")
@@ -30,7 +33,7 @@ def wrong_answers(
     rows = [
         (
             str(_scene(one)),
-            f"{one.kind.value.replace('_', ', ')}: {one.question}",
+            f"{title(one.kind)}: {one.question}",
             _choices(one, one.answer),
             _choices(one, one.truth),
             f"{one.probability:.2f}",
@@ -46,7 +49,7 @@ def wrong_answers(
         f"probabilities of the answers. Of the {len(wrong)} right answers {shaky} change in the engine itself when it "
         "runs the scene again from velocities that are 0.5 % off.",
         "",
-        *(f"| {' | '.join(cells)} |" for cells in (HEAD, ["---"] * len(HEAD), *rows)),
+        *(table_row(*cells) for cells in (HEAD, ["---"] * len(HEAD), *rows)),
     ]
 
 

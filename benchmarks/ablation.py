@@ -17,6 +17,7 @@ from pathlib import Path
 import _project  # noqa: F401  the generator belongs to the tests, which lie beside the package
 import numpy as np
 import torch
+from _page import table_row
 from map import PLANS
 
 from tests.inference.generator import states
@@ -143,7 +144,7 @@ def table(rows: dict[str, Row]) -> str:
         again = f"{np.median(one.later_reoptimised):.4f} ({np.mean(one.later_reoptimised):.3f})"
         asked = f"{np.mean(one.right):.1%}" if one.right else "not asked"
         cells = [title, f"{np.mean(one.found):.0%}", *errors, again, asked]
-        lines.append(f"| {' | '.join(cells)} |")
+        lines.append(table_row(*cells))
     return "\n".join(lines) + "\n"
 
 

@@ -24,8 +24,8 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 import numpy as np
 import torch
-from _answer_goals import GOALS
-from _page import write_between
+from _answer_goals import GOALS, title
+from _page import table_row, write_between
 from _released_worlds import ReleasedWorlds
 from _resumable import Result, measured
 from _true_posterior import TruePosterior
@@ -33,7 +33,7 @@ from _wrong_answers import wrong_answers
 from scipy.special import logsumexp
 
 from vrdp_prob.datasets import load, read_questions
-from vrdp_prob.evaluation.judgement import Judgement, Kind, judge
+from vrdp_prob.evaluation.judgement import Judgement, judge
 from vrdp_prob.evaluation.scores import Scores, brier_gain
 from vrdp_prob.files import write_atomically
 from vrdp_prob.inference import default_model, infer
@@ -261,29 +261,33 @@ def _tables(rows: Mapping[str, Sequence[Judgement]]) -> list[str]:
             "",
             *_scores(rows, EXTENDED, EXTENDED_BEST_FIT),
         ]
-    lines += ["", _row("right per question, Brier", *map(_title, GOALS)), _row(*["---"] * (len(GOALS) + 1))]
+    lines += ["", table_row("right per question, Brier", *map(title, GOALS)), table_row(*["---"] * (len(GOALS) + 1))]
     for name, made in rows.items():
         scores = [Scores.of([one for one in made if one.kind is kind]) for kind in GOALS]
-        lines.append(_row(name, *(f"{_percent(one.accuracy_per_question)}, {_number(one.brier)}" for one in scores)))
+        lines.append(
+            table_row(name, *(f"{_percent(one.accuracy_per_question)}, {_number(one.brier)}" for one in scores))
+        )
     return lines
 
 
 def _scores(rows: Mapping[str, Sequence[Judgement]], name: str, best_fit: str) -> list[str]:
     """Scores of a row by kind, beside those of a best fit."""
     head = ("questions", "right, per question", "per option", "Brier", "lower than the best fit's by", *CALIBRATION)
-    lines = [_row(*head), _row(*["---"] * len(head))]
+    lines = [table_row(*head), table_row(*["---"] * len(head))]
     for kind in GOALS:
         ours, plain = ([one for one in rows[row] if one.kind is kind] for row in (name, best_fit))
         score, (gain, interval) = Scores.of(ours), brier_gain(ours, plain)
         shares = [_with_interval(score, f"accuracy_per_{unit}") for unit in ("question", "option")]
         lower = f"{gain:.4f}" + ("" if interval is None else f" ({interval.low:.4f} to {interval.high:.4f})")
-        lines.append(_row(f"{_title(kind)} ({score.questions})", *shares, _number(score.brier), lower, *_ece(score)))
+        lines.append(
+            table_row(f"{title(kind)} ({score.questions})", *shares, _number(score.brier), lower, *_ece(score))
+        )
     return lines
 
 
 def _fewer_table(rows: Mapping[str, Sequence[Judgement]]) -> list[str]:
     head = ("frames seen", "questions", "options", "right, per question", "per option", "Brier", "entropy, nats")
-    lines = [_row(*head, *CALIBRATION), _row(*["---"] * (len(head) + len(CALIBRATION)))]
+    lines = [table_row(*head, *CALIBRATION), table_row(*["---"] * (len(head) + len(CALIBRATION)))]
     for kind in GOALS:
         for frames in FEWER_FRAMES:
             made = [one for one in rows[str(frames)] if one.kind is kind]
@@ -292,22 +296,14 @@ def _fewer_table(rows: Mapping[str, Sequence[Judgement]]) -> list[str]:
             doubt = np.mean([entropy(np.array([p, 1 - p])) for p in doubts])
             shares = [_percent(score.accuracy_per_question), _percent(score.accuracy_per_option)]
             counts = str(score.questions), str(score.options)
-            cells = (f"{_title(kind)}, {frames}", *counts, *shares, _number(score.brier), f"{doubt:.3f}")
-            lines.append(_row(*cells, *_ece(score)))
+            cells = (f"{title(kind)}, {frames}", *counts, *shares, _number(score.brier), f"{doubt:.3f}")
+            lines.append(table_row(*cells, *_ece(score)))
     return lines
 
 
 def _forecasts(one: Judgement) -> list[float]:
     """Probabilities of the options, or of the answer to an open question."""
     return [p for p, _ in one.choices] or [one.confidence]
-
-
-def _row(*cells: str) -> str:
-    return f"| {' | '.join(cells)} |"
-
-
-def _title(kind: Kind) -> str:
-    return kind.value.replace("_", ", ")
 
 
 def _with_interval(score: Scores, name: str) -> str:

@@ -179,19 +179,21 @@ class _Searcher:
         """Whether the best cause leaves nothing to explain, and is not a kick in each of several videos."""
         if not found or gain(found[0], trial)[0] < self.needed:
             return False
-        cause = found[0].causes[-1]
-        if happens_once(cause) and found[0].acting(cause) > 1:
+        if _mends_several(found[0]):
             return False
         left = self.first(found[0]).beside_chance
         return min((one.p_value for one in left), default=1.0) * len(left) > SHORTLIST_LEVEL
 
     def _lost(self, trial: Trial, found: Sequence[Trial]) -> list[Trial]:
-        """Fits from the beginning, with causes that explain videos whose course of events nothing else explains."""
+        """Fits from the beginning, with causes that explain videos whose course of events nothing else explains.
+
+        What happens once in each of several videos explains none of them: kicks mend any course.
+        """
         if trial.choices:
             return []
         left = [effect for effect in self.catalogue if effect.name not in trial.names]
         reached = {one.causes[-1].name: gain(one, trial)[0] for one in reversed(found)}
-        best = found[0].fit if found else trial.fit
+        best = next((one.fit for one in found if not _mends_several(one)), trial.fit)
         still_lost = lost_videos(best)
         lost = [one for one in lost_videos(trial.fit) if one in still_lost]
         told = causes_of_lost_videos(trial.fit, lost, left, self.needed, seed=self.seed)
@@ -321,6 +323,12 @@ class _Searcher:
 def _merit(trial: Trial) -> float:
     """By which models are ordered: what they predict of left-out videos, less what their causes are believed less."""
     return float(trial.log_density.sum()) + trial.log_prior
+
+
+def _mends_several(trial: Trial) -> bool:
+    """Whether the last cause of a model happens once in each of several videos."""
+    cause = trial.causes[-1]
+    return happens_once(cause) and trial.acting(cause) > 1
 
 
 def _shortlist(scores: Sequence[CauseScore]) -> list[CauseScore]:

@@ -232,8 +232,7 @@ class Likelihood:
         states = self._measured(worlds, rollout)
         # index_select, because its derivative is many times faster than that of indexing with several arrays.
         place = states.index_select(1, observations.position_places).reshape(len(states), -1, 2)
-        difference = place - torch.from_numpy(observations.position)
-        position = (torch.from_numpy(observations.whitening) * difference[:, :, None]).sum(dim=-1)
+        position = observations.whitened(place - torch.from_numpy(observations.position))
         zero = quantities["angle_zero"].index_select(1, torch.from_numpy(observations.angle_body))
         turned = states.index_select(1, observations.angle_places) + zero - torch.from_numpy(observations.angle)
         angle = turned / observations.angle_reference

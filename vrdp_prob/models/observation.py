@@ -89,6 +89,22 @@ class Observations:
             self.body_count,
         )
 
+    def whitened(self, difference: Float[Tensor, "point observation 2"]) -> Float[Tensor, "point observation 2"]:
+        """Differences of positions (m) as independent numbers of unit variance at noise scale 1."""
+        along, across = self._whitening_diagonals
+        result = difference * along
+        return result if across is None else result + difference.flip(-1) * across
+
+    @cached_property
+    def _whitening_diagonals(self) -> tuple[Float[Tensor, "observation 2"], Float[Tensor, "observation 2"] | None]:
+        """The whitening's diagonal, and what multiplies the other coordinate; None where nothing does.
+
+        Two products are many times faster than so many products of small matrices.
+        """
+        matrices = torch.from_numpy(self.whitening)
+        across = torch.stack([matrices[:, 0, 1], matrices[:, 1, 0]], dim=1)
+        return matrices.diagonal(dim1=1, dim2=2).contiguous(), across if across.any() else None
+
     @cached_property
     def position_places(self) -> Int[Tensor, "coordinate"]:
         """Places of the seen coordinates (x and y in turn) in a flattened trajectory [time, body, (x, y, angle)]."""

@@ -183,11 +183,11 @@ def test_what_the_search_refuses_leaves_the_old_files(
     assert {path.name: path.read_text() for path in (tmp_path / "out").iterdir()} == old
 
 
-@pytest.mark.parametrize("failing", ["render", "model_text"])
+@pytest.mark.parametrize("failing", ["render", "to_document"])
 def test_a_finding_that_cannot_be_written_leaves_the_old_one(
     videos: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, failing: str
 ) -> None:
-    def fail(*_arguments: object) -> None:
+    def fail(*_arguments: object, **_options: object) -> None:
         raise OSError(errno.ENOSPC, "No space left on device")
 
     let_find(monkeypatch, named())

@@ -1,10 +1,14 @@
 """How far apart bodies are in their own friction, learned from all videos."""
 
+import math
+
 import pytest
 
 from tests.discovery.fitted import fitted
 from tests.discovery.scenes import Setting
+from vrdp_prob.inference.several_videos.learned import learned_model
 from vrdp_prob.inference.several_videos.population import with_learned_spreads
+from vrdp_prob.models.parameters import AIR_DRAG, MASS, RESTITUTION
 
 
 @pytest.mark.parametrize("spread", [0.05, 0.3])
@@ -20,3 +24,18 @@ def test_too_few_bodies_leave_the_prior() -> None:
     _, fit = fitted(seed=1, setting=Setting(videos=2, bodies=2, frames=60))
     prior = next(one for one in fit.model.parameters if one.name == "friction_ratio").prior
     assert with_learned_spreads(fit).beliefs["friction_ratio"].prior == prior
+
+
+@pytest.mark.parametrize("mass_spread", [0.05, 0.4])
+def test_a_learned_model_knows_the_bodies_and_the_table(mass_spread: float) -> None:
+    setting = Setting(videos=5, bodies=3, mass_spread=mass_spread)
+    _, fit = fitted(seed=1, setting=setting)
+    model = learned_model(fit)
+    # Only bodies that met another one tell their mass: ten or so.
+    assert mass_spread / 2.5 < model.believed(MASS).prior.sd < 2.5 * mass_spread
+    restitution = model.believed(RESTITUTION)
+    assert restitution.default == pytest.approx(0.88, abs=0.05)
+    assert 0.02 < restitution.prior.sd < 0.12
+    drag = model.believed(AIR_DRAG)
+    assert drag.prior.sd < 0.3 * AIR_DRAG.prior.sd
+    assert math.log(drag.default / 0.03) == pytest.approx(0.0, abs=4 * drag.prior.sd)

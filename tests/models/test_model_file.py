@@ -9,8 +9,9 @@ import pytest
 
 from vrdp_prob.errors import InputError
 from vrdp_prob.inference import default_model
+from vrdp_prob.models.effects.bowl import Bowl
 from vrdp_prob.models.model_file import known_effects
-from vrdp_prob.models.parameters import SLIDING_FRICTION
+from vrdp_prob.models.parameters import MASS, RESTITUTION, SLIDING_FRICTION
 from vrdp_prob.models.physics import PhysicsModel
 
 
@@ -23,6 +24,18 @@ def test_write_then_read_gives_the_same(tmp_path: Path) -> None:
     assert [effect.name for effect in again.effects] == [effect.name for effect in model.effects]
     assert again.parameters == model.parameters
     assert belief in again.parameters
+
+
+def test_a_model_may_believe_something_of_masses_and_restitutions(tmp_path: Path) -> None:
+    path = tmp_path / "model.toml"
+    path.write_text('name = "balls"\neffects = ["dry_friction"]\n[parameters.mass]\ndefault = 0.2\nprior_sd = 0.01\n')
+    model = PhysicsModel.read(path)
+    assert model.believed(MASS) == replace(MASS, default=0.2, prior=replace(MASS.prior, sd=0.01))
+    assert model.believed(RESTITUTION) == RESTITUTION
+    assert MASS.name not in [parameter.name for parameter in model.parameters]
+    model.write(path)
+    assert PhysicsModel.read(path).believed(MASS) == model.believed(MASS)
+    assert model.with_effect(Bowl()).without_effect(model.effects[0]).believed(MASS).default == 0.2
 
 
 def test_every_effect_of_the_catalogue_can_be_named(tmp_path: Path) -> None:
@@ -43,7 +56,7 @@ def test_every_effect_of_the_catalogue_can_be_named(tmp_path: Path) -> None:
         ('name = "a"\neffects = ["ether"]', "effect 'ether' is not known; the effects are air_drag"),
         ('name = "a"\neffects = ["air_drag", "air_drag"]', "an effect appears twice"),
         ('name = "a"\neffects = ["air_drag"]\ncolour = 1', "field 'colour' is not known"),
-        ('name = "a"\neffects = ["air_drag"]\n[parameters.mass]', "parameter 'mass' belongs to none of the effects"),
+        ('name = "a"\neffects = ["air_drag"]\n[parameters.tilt_x]', "parameter 'tilt_x' belongs to none of the effects"),
         ('name = "a"\neffects = ["air_drag"]\n[parameters.air_drag]\nprior_sd = "x"', "air_drag.prior_sd' is 'x'"),
         ('name = "a"\neffects = ["air_drag"]\n[parameters.air_drag]\nprior_sd = nan', "give a finite number"),
         ('name = "a"\neffects = ["air_drag"]\n[parameters.air_drag]\nprior_sd = -1', "sd positive"),

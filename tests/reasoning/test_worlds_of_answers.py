@@ -160,7 +160,7 @@ def test_restitutions_from_the_prior_give_no_energy() -> None:
     count = 20_000
     plain = np.exp(RESTITUTION.prior.sample(np.random.default_rng(3), (count,)))
     assert (plain > 1).any()
-    drawn = prior_restitutions(count, np.random.default_rng(3)).numpy()
+    drawn = prior_restitutions(PhysicsModel.base(), count, np.random.default_rng(3)).numpy()
     assert (drawn <= 1).all()
     assert drawn[plain <= 1] == pytest.approx(plain[plain <= 1])
 

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 from vrdp_prob import __version__
 from vrdp_prob.discovery.finding import Check, Finding, FoundCause, Gain
-from vrdp_prob.discovery.page import NO_FIGURES, model_text, render
+from vrdp_prob.discovery.page import NO_FIGURES, render
 from vrdp_prob.discovery.summary import verdict_sentence
 from vrdp_prob.files import write_atomically
 from vrdp_prob.models.physics import PhysicsModel
@@ -49,7 +49,7 @@ def to_document(finding: Finding, *, model: Path | None = None) -> dict[str, Any
         "description": None if finding.description is None else asdict(finding.description),
         "model": None if model is None else str(model.absolute()),
         "base_model": _model(finding.model),
-        "extended_model": {**_model(finding.extended), "toml": model_text(finding.extended)},
+        "extended_model": {**_model(finding.extended), "toml": finding.extended.text},
         "videos": list(finding.videos),
         "notes": list(finding.notes),
         "version": __version__,
@@ -78,7 +78,7 @@ def write_finding(finding: Finding, directory: Path | str, *, figures: Mapping[s
     texts = (
         render(finding, figures),
         json.dumps(to_document(finding, model=files.model), indent=1, allow_nan=False) + "\n",
-        model_text(finding.extended),
+        finding.extended.text,
     )
     with (
         write_atomically(files.page) as page,

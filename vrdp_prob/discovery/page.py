@@ -24,8 +24,6 @@ from vrdp_prob.discovery.wording import (
     title,
     with_unit,
 )
-from vrdp_prob.models import model_file
-from vrdp_prob.models.physics import PhysicsModel
 from vrdp_prob.report.templating import asset, environment
 from vrdp_prob.report.wording import counted, listed, sentence
 
@@ -67,11 +65,6 @@ def render(finding: Finding, figures: Mapping[str, str] = NO_FIGURES) -> str:
         **_model(finding),
     }
     return environment("vrdp_prob.discovery").get_template("finding.html.j2").render(values)
-
-
-def model_text(model: PhysicsModel) -> str:
-    """Content of a model's file."""
-    return model_file.text(model.name, model.effects, model.parameters)
 
 
 def _cause(cause: FoundCause, finding: Finding) -> dict[str, Any]:
@@ -203,7 +196,7 @@ def _model(finding: Finding) -> dict[str, Any]:
         "model_words": words,
         "effects": listed(title(effect.name) for effect in finding.model.effects),
         "videos": some(finding.videos),
-        "toml": model_text(finding.extended),
+        "toml": finding.extended.text,
         "version": __version__,
     }
 

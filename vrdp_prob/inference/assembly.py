@@ -17,7 +17,6 @@ from vrdp_prob.inference.samples import Convergence, Samples
 from vrdp_prob.inference.tree import posterior_tree
 from vrdp_prob.models.parameters import MASS, RESTITUTION
 from vrdp_prob.models.unknowns import mass_prior
-from vrdp_prob.scene import Tracks
 
 BATCH = 500
 """Worlds simulated at once when the draws are looked at again."""
@@ -65,7 +64,7 @@ def posterior_from(
     names = [body.id for body in tracks.bodies]
     tree = posterior_tree(fit, samples, changed, generator)
     if draw_defaults:
-        tree["posterior"] = xr.DataTree(_with_drawn_defaults(tree["posterior"].to_dataset(), tracks, status, generator))
+        tree["posterior"] = xr.DataTree(_with_drawn_defaults(tree["posterior"].to_dataset(), fit, status, generator))
     return Posterior(
         tracks=tracks,
         model=fit.likelihood.model,
@@ -87,14 +86,15 @@ def _telling(fit: MapFit) -> Pairs:
 
 
 def _with_drawn_defaults(
-    draws: xr.Dataset, tracks: Tracks, status: dict[str, BodyStatus], generator: np.random.Generator
+    draws: xr.Dataset, fit: MapFit, status: dict[str, BodyStatus], generator: np.random.Generator
 ) -> xr.Dataset:
     """Draws in which what the data say nothing about follows its prior."""
+    tracks, model = fit.likelihood.tracks, fit.likelihood.model
     drawn = draws.copy(deep=True)
     for index, body in enumerate(tracks.bodies):
         for name, prior, one in (
-            (MASS.name, mass_prior(tracks), status[body.id].mass),
-            (RESTITUTION.name, RESTITUTION.prior, status[body.id].restitution),
+            (MASS.name, mass_prior(tracks, model), status[body.id].mass),
+            (RESTITUTION.name, model.believed(RESTITUTION).prior, status[body.id].restitution),
         ):
             if one.status is Status.DEFAULT:
                 shape = (draws.sizes["chain"], draws.sizes["draw"])

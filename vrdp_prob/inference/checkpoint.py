@@ -15,7 +15,6 @@ import numpy as np
 
 from vrdp_prob.errors import InputError
 from vrdp_prob.files import check_writable, write_atomically
-from vrdp_prob.models import model_file
 from vrdp_prob.models.physics import PhysicsModel
 from vrdp_prob.scene import Camera, Tracks
 
@@ -49,7 +48,7 @@ def film_facts(file: Path, camera: Camera | None) -> dict[str, str]:
 
 def model_facts(model: PhysicsModel) -> dict[str, str]:
     """A physics model, in a short text."""
-    text = model_file.text(model.name, model.effects, model.parameters)
+    text = model.text
     return {"model": sha256(text.encode()).hexdigest()}
 
 

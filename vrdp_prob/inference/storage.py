@@ -124,7 +124,7 @@ def _document(posterior: Posterior) -> dict[str, Any]:
         "bodies": [asdict(body) for body in tracks.bodies],
         "walls": [asdict(wall) for wall in tracks.walls],
         "camera": None if tracks.camera is None else tracks.camera.to_document(),
-        "model": model_file.text(model.name, model.effects, model.parameters),
+        "model": model.text,
         "seed": posterior.seed,
         "status": {name: asdict(status) for name, status in posterior.status.items()},
         "convergence": asdict(posterior.convergence),

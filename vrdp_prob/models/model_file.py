@@ -24,7 +24,7 @@ from typing import Any
 from vrdp_prob.errors import InputError
 from vrdp_prob.models import effects as catalogue
 from vrdp_prob.models.effects.effect import Effect
-from vrdp_prob.models.parameters import Parameter
+from vrdp_prob.models.parameters import MATTER, Parameter
 
 _NUMBERS = ("default", "prior_mean", "prior_sd")
 
@@ -76,7 +76,7 @@ def parse(content: str) -> tuple[str, tuple[Effect, ...], dict[str, Parameter]]:
     if not isinstance(names, list) or not names:
         raise InputError("field 'effects' is missing; list the names of the model's effects.")
     effects = tuple(_effect(entry) for entry in names)
-    stated = {parameter.name: parameter for effect in effects for parameter in effect.parameters}
+    stated = MATTER | {parameter.name: parameter for effect in effects for parameter in effect.parameters}
     tables = document.get("parameters", {})
     if not isinstance(tables, dict):
         raise InputError("field 'parameters' must hold one table for each parameter.")

@@ -63,6 +63,10 @@ class Transform(StrEnum):
         """Coordinate that stands for a value of the parameter."""
         return math.log(value) if self is Transform.LOG else value
 
+    def to_value(self, coordinate: float) -> float:
+        """Value of the parameter that belongs to a coordinate."""
+        return math.exp(coordinate) if self is Transform.LOG else coordinate
+
     @property
     def support(self) -> tuple[float, float]:
         """Open interval of values the parameter can take."""
@@ -170,6 +174,8 @@ RESTITUTION = restitution_parameter(
     scope=Scope.BODY,
 )
 WALL_RESTITUTION = restitution_parameter("wall_restitution", "restitution factor of a wall")
+MATTER = {parameter.name: parameter for parameter in (MASS, RESTITUTION, WALL_RESTITUTION)}
+"""What bodies and walls of every model have."""
 SLIDING_FRICTION = _log_parameter(
     "sliding_friction",
     "1",

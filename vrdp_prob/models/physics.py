@@ -14,7 +14,7 @@ from vrdp_prob.models.effects.angular_drag import AngularDrag
 from vrdp_prob.models.effects.dry_friction import DryFriction
 from vrdp_prob.models.effects.effect import Effect
 from vrdp_prob.models.effects.normal_impact import NormalImpact
-from vrdp_prob.models.parameters import MASS, RESTITUTION, Parameter
+from vrdp_prob.models.parameters import MATTER, Parameter
 from vrdp_prob.models.simulator.kernel import Kernel, load
 from vrdp_prob.models.simulator.laws import CONSTANTS, STATE, Layout
 
@@ -30,13 +30,14 @@ class PhysicsModel:
     effects
         Its causes. The order matters where one changes what another has made (the restitution of a contact).
     beliefs
-        Parameters by name whose prior or default differs from what the effect states.
+        Parameters by name whose prior or default differs from what the effect states, or, for masses and restitutions,
+        from `vrdp_prob.models.parameters.MATTER`.
 
     Raises
     ------
     InputError
         If an effect appears twice, has no hook, or its parameters clash with others, or a belief is about a parameter
-        that no effect has.
+        that no effect has and that is none of these.
     """
 
     name: str
@@ -49,7 +50,7 @@ class PhysicsModel:
             raise InputError(f"model {self.name}: an effect appears twice ({', '.join(names)}); list each effect once.")
         for effect in self.effects:
             self._check_effect(effect)
-        strange = sorted(set(self.beliefs) - {parameter.name for parameter in self._stated_parameters()})
+        strange = sorted(set(self.beliefs) - {*MATTER, *(parameter.name for parameter in self._stated_parameters())})
         if strange:
             raise InputError(f"model {self.name}: no effect has a parameter '{strange[0]}'; leave it out.")
 
@@ -64,7 +65,7 @@ class PhysicsModel:
         own = {parameter.name for parameter in effect.parameters}
         if strange := sorted(set(effect.vanishes_at) - own):
             raise InputError(f"{where}: 'vanishes_at' names '{strange[0]}', which is none of its parameters.")
-        if taken := sorted(own & {*STATE, *CONSTANTS, MASS.name, RESTITUTION.name}):
+        if taken := sorted(own & {*STATE, *CONSTANTS, *MATTER}):
             raise InputError(f"{where}: every body has a '{taken[0]}' already; give the parameter another name.")
         stated = {parameter.name: parameter for parameter in self._stated_parameters()}
         for parameter in effect.parameters:
@@ -85,7 +86,7 @@ class PhysicsModel:
     def without_effect(self, effect: Effect) -> "PhysicsModel":
         """The model without one of its causes, and without what was believed of it alone."""
         effects = tuple(one for one in self.effects if one is not effect)
-        stated = {parameter.name for one in effects for parameter in one.parameters}
+        stated = {*MATTER, *(parameter.name for one in effects for parameter in one.parameters)}
         beliefs = {name: belief for name, belief in self.beliefs.items() if name in stated}
         name = "+".join(part for part in self.name.split("+") if part != effect.name)
         return PhysicsModel(name, effects, beliefs)
@@ -115,13 +116,23 @@ class PhysicsModel:
             If the file cannot be written.
         """
         with write_atomically(path) as temporary:
-            temporary.write_text(model_file.text(self.name, self.effects, self.parameters), encoding="utf-8")
+            temporary.write_text(self.text, encoding="utf-8")
+
+    @property
+    def text(self) -> str:
+        """Content of its model file."""
+        matter = [belief for name, belief in self.beliefs.items() if name in MATTER]
+        return model_file.text(self.name, self.effects, [*self.parameters, *matter])
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
         """Parameters of all effects, each once."""
         stated = {parameter.name: parameter for parameter in self._stated_parameters()}
-        return tuple({**stated, **self.beliefs}.values())
+        return tuple(self.believed(parameter) for parameter in stated.values())
+
+    def believed(self, parameter: Parameter) -> Parameter:
+        """A parameter with the prior and the default that this model believes."""
+        return self.beliefs.get(parameter.name, parameter)
 
     def _stated_parameters(self) -> Iterator[Parameter]:
         for effect in self.effects:

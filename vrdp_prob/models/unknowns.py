@@ -84,7 +84,7 @@ def unknowns(
     entries = [
         *_motion(tracks, structure),
         *_turning(tracks, model, structure),
-        *_matter(tracks, structure),
+        *_matter(tracks, model, structure),
         *_physics(tracks, model, structure),
         *(_measurement(tracks, noise) if model_error is None else ()),
     ]
@@ -131,17 +131,17 @@ def _turning(tracks: Tracks, model: PhysicsModel, structure: Structure) -> Itera
             yield Coordinate("angle_zero", body, Transform.IDENTITY, Prior(first, ANGLE_ZERO_SD), scale=0.1)
 
 
-def _matter(tracks: Tracks, structure: Structure) -> Iterator[Coordinate]:
+def _matter(tracks: Tracks, model: PhysicsModel, structure: Structure) -> Iterator[Coordinate]:
     """Mass, where nobody weighed it (expected near the weighed ones, if any), and restitution of bodies and walls."""
-    prior = mass_prior(tracks)
+    prior = mass_prior(tracks, model)
     for body in sorted(structure.colliding):
         if tracks.bodies[body].mass is None:
             yield Coordinate(MASS.name, body, MASS.transform, prior, scale=0.1)
     for body in sorted(structure.meeting):
-        yield Coordinate.of(RESTITUTION, body)
+        yield Coordinate.of(model.believed(RESTITUTION), body)
     for index, wall in enumerate(tracks.walls):
         if wall.restitution is None:
-            yield Coordinate.of(WALL_RESTITUTION, index)
+            yield Coordinate.of(model.believed(WALL_RESTITUTION), index)
 
 
 def _physics(tracks: Tracks, model: PhysicsModel, structure: Structure) -> Iterator[Coordinate]:
@@ -184,13 +184,14 @@ def _defaults(tracks: Tracks, model: PhysicsModel) -> dict[str, Float[np.ndarray
     count = len(tracks.bodies)
     first = first_positions(tracks)
     known = [wall.restitution for wall in tracks.walls]
+    mass, of_wall = _mass_default(tracks, model), model.believed(WALL_RESTITUTION).default
     defaults = {
         "x": first[:, 0],
         "y": first[:, 1],
         **{name: np.zeros(count) for name in ("velocity_x", "velocity_y", "angle", "spin", "angle_zero")},
-        MASS.name: np.array([_mass_default(tracks) if body.mass is None else body.mass for body in tracks.bodies]),
-        RESTITUTION.name: np.full(count, RESTITUTION.default),
-        WALL_RESTITUTION.name: np.array([WALL_RESTITUTION.default if value is None else value for value in known]),
+        MASS.name: np.array([mass if body.mass is None else body.mass for body in tracks.bodies]),
+        RESTITUTION.name: np.full(count, model.believed(RESTITUTION).default),
+        WALL_RESTITUTION.name: np.array([of_wall if value is None else value for value in known]),
         NOISE: np.ones(1),
         ANGLE_NOISE: np.ones(1),
         DEGREES_OF_FREEDOM: np.full(1, math.exp(DEGREES_PRIOR.mean)),
@@ -202,15 +203,22 @@ def _defaults(tracks: Tracks, model: PhysicsModel) -> dict[str, Float[np.ndarray
     return defaults
 
 
-def mass_prior(tracks: Tracks) -> Prior:
-    """Prior of the log mass of a body that nobody weighed."""
-    return Prior(math.log(_mass_default(tracks)), MASS.prior.sd)
+def mass_prior(tracks: Tracks, model: PhysicsModel) -> Prior:
+    """Prior of the log mass of a body that nobody weighed: around the weighed ones of the video, if any."""
+    prior, middle = model.believed(MASS).prior, _weighed(tracks)
+    return prior if middle is None else Prior(math.log(middle), prior.sd)
 
 
-def _mass_default(tracks: Tracks) -> float:
-    """Mass in kg of a body that nobody weighed: that of the weighed ones of the video, if any."""
+def _mass_default(tracks: Tracks, model: PhysicsModel) -> float:
+    """Mass in kg of a body that nobody weighed."""
+    middle = _weighed(tracks)
+    return model.believed(MASS).default if middle is None else middle
+
+
+def _weighed(tracks: Tracks) -> float | None:
+    """Middle mass in kg of the weighed bodies of a video; None where there are none."""
     weighed = [body.mass for body in tracks.bodies if body.mass is not None]
-    return float(np.exp(np.median(np.log(weighed)))) if weighed else MASS.default
+    return float(np.exp(np.median(np.log(weighed)))) if weighed else None
 
 
 def first_positions(tracks: Tracks) -> Float[np.ndarray, "body 2"]:

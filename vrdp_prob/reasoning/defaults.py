@@ -14,6 +14,7 @@ from torch import Tensor
 
 from vrdp_prob.errors import InputError
 from vrdp_prob.models.parameters import MASS, RESTITUTION
+from vrdp_prob.models.physics import PhysicsModel
 from vrdp_prob.models.simulator.worlds import Worlds
 
 Defaults = Literal["fixed", "prior"]
@@ -22,7 +23,11 @@ DEFAULT = "default"
 
 
 def with_defaults(
-    worlds: Worlds, statuses: list[tuple[str, str]], defaults: Defaults, generator: np.random.Generator
+    worlds: Worlds,
+    model: PhysicsModel,
+    statuses: list[tuple[str, str]],
+    defaults: Defaults,
+    generator: np.random.Generator,
 ) -> Worlds:
     """The same worlds with the constants of objects that never collided as asked.
 
@@ -30,6 +35,8 @@ def with_defaults(
     ----------
     worlds
         Posterior draws.
+    model
+        The physics, with what it believes of masses and restitutions.
     statuses
         Status of mass and restitution of each body.
     defaults
@@ -50,14 +57,14 @@ def with_defaults(
     mass, restitution = worlds.mass.clone(), worlds.restitution.clone()
     for body, (of_mass, of_restitution) in enumerate(statuses):
         if of_mass == DEFAULT:
-            spread = MASS.prior.sd * generator.standard_normal(len(worlds))
+            spread = model.believed(MASS).prior.sd * generator.standard_normal(len(worlds))
             mass[:, body] *= MASS.transform.from_coordinate(torch.from_numpy(spread)).to(mass)
         if of_restitution == DEFAULT:
-            restitution[:, body] = prior_restitutions(len(worlds), generator).to(restitution)
+            restitution[:, body] = prior_restitutions(model, len(worlds), generator).to(restitution)
     return replace(worlds, mass=mass, restitution=restitution)
 
 
-def prior_restitutions(count: int, generator: np.random.Generator) -> Float[Tensor, "draw"]:
+def prior_restitutions(model: PhysicsModel, count: int, generator: np.random.Generator) -> Float[Tensor, "draw"]:
     """Restitution factors from their prior, held to at most 1.
 
     The prior has a soft edge, for the sake of the samplers: about one draw in a thousand lies above 1, where collisions
@@ -65,6 +72,8 @@ def prior_restitutions(count: int, generator: np.random.Generator) -> Float[Tens
 
     Parameters
     ----------
+    model
+        The physics, whose prior it is.
     count
         How many.
     generator
@@ -72,7 +81,7 @@ def prior_restitutions(count: int, generator: np.random.Generator) -> Float[Tens
     """
 
     def draw(size: int) -> Float[Tensor, "draw"]:
-        coordinates = RESTITUTION.prior.sample(generator, (size,))
+        coordinates = model.believed(RESTITUTION).prior.sample(generator, (size,))
         return RESTITUTION.transform.from_coordinate(torch.from_numpy(coordinates))
 
     drawn = draw(count)

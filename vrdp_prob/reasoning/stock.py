@@ -85,7 +85,7 @@ class Stock:
         generator = Seeded(self.posterior.seed, number).numbers(Purpose.DEFAULTS)
         statuses = [self._status(body.id) for body in self.posterior.tracks.bodies]
         known = [(str(status.mass.status), str(status.restitution.status)) for status in statuses]
-        drawn = with_defaults(drawn, known, self._defaults, generator)
+        drawn = with_defaults(drawn, self.posterior.model, known, self._defaults, generator)
         released = Released(drawn, self.posterior.tracks.times, self.posterior.model)
         return Batch(self._common, released, self._chance.another(number))
 

@@ -4,22 +4,23 @@ Source: Robbins, An empirical Bayes approach to statistics, Proc. Third Berkeley
 single estimates: Morris, Parametric empirical Bayes inference, JASA 78 (1983).
 """
 
-from dataclasses import replace
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Float
 from scipy.optimize import minimize_scalar
 
 from vrdp_prob.inference.several_videos.fitting import SharedFit
-from vrdp_prob.models.parameters import Parameter, Scope
+from vrdp_prob.models.parameters import Parameter, Prior, Scope
 from vrdp_prob.models.physics import PhysicsModel
 
 FEWEST = 6
-"""Bodies of which the tracks must tell the quantity, for their spread to be estimated."""
+"""Bodies (or combinations of bodies) of which the tracks must tell the quantity, for their spread to be estimated."""
 SMALLEST, LARGEST = 0.02, 2.0
-"""Standard deviations that are looked at, as shares of the stated one (the smallest) and of itself."""
+"""Standard deviations that are looked at, as shares of the stated one."""
 TELLING = 0.5
-"""Share of the prior's variance below which the tracks tell a body's quantity."""
+"""Share of the prior's variance below which the tracks tell a quantity."""
 
 
 def with_learned_spreads(fit: SharedFit) -> PhysicsModel:
@@ -31,37 +32,94 @@ def with_learned_spreads(fit: SharedFit) -> PhysicsModel:
     beliefs = dict(model.beliefs)
     for parameter in model.parameters:
         if parameter.scope is Scope.BODY:
-            beliefs[parameter.name] = _learned(fit, parameter)
+            beliefs[parameter.name] = with_learned_spread(fit, parameter)
     return replace(model, beliefs=beliefs)
 
 
-def _learned(fit: SharedFit, parameter: Parameter) -> Parameter:
-    values, variances = _estimates(fit, parameter)
-    if len(values) < FEWEST:
-        return parameter
+def with_learned_spread(fit: SharedFit, parameter: Parameter, *, mean: bool = False) -> Parameter:
+    """A parameter of bodies whose prior is as wide as the bodies of all videos differ in it.
+
+    Parameters
+    ----------
+    fit
+        Fit of the videos.
+    parameter
+        The parameter, as the model believes it.
+    mean
+        Whether the middle of the bodies is learned, too.
+    """
+    told = [one for index in range(len(fit.joint.videos)) if (one := _Told.of(fit, index, parameter)) is not None]
     prior = parameter.prior
+    if sum(one.count for one in told) < FEWEST:
+        return parameter
 
     def cost(log_sd: float) -> float:
-        variance = np.exp(2 * log_sd) + variances
-        return float((np.log(variance) + (values - prior.mean) ** 2 / variance).sum() / 2)
+        middle = _middle(told, log_sd, prior) if mean else None
+        return -sum(one.log_evidence(middle, float(np.exp(log_sd))) for one in told)
 
     bounds = (float(np.log(SMALLEST * prior.sd)), float(np.log(LARGEST * prior.sd)))
-    found = minimize_scalar(cost, bounds=bounds, method="bounded").x
-    return replace(parameter, prior=replace(prior, sd=float(np.exp(found))))
+    log_sd = float(minimize_scalar(cost, bounds=bounds, method="bounded").x)
+    learned = replace(prior, sd=float(np.exp(log_sd)))
+    if not mean:
+        return replace(parameter, prior=learned)
+    middle = _middle(told, log_sd, prior)
+    return replace(parameter, prior=replace(learned, mean=middle), default=parameter.transform.to_value(middle))
 
 
-def _estimates(fit: SharedFit, parameter: Parameter) -> tuple[Float[np.ndarray, "body"], Float[np.ndarray, "body"]]:
-    """What the tracks alone say of each body's value (in the inferred coordinate), and the variance of that."""
-    values, variances = [], []
-    joint, prior = fit.joint, parameter.prior
-    for index, video in enumerate(joint.videos):
-        entries, local = video.likelihood.coordinates.entries, joint.gaussian.locals[index]
+@dataclass(frozen=True)
+class _Told:
+    """What the tracks of one video alone say of the values of its bodies (in the inferred coordinate).
+
+    Parameters
+    ----------
+    precision, pull
+        The log likelihood of values v is -v' precision v / 2 + pull' v.
+    expected
+        What the prior expects of each.
+    count
+        Number of combinations of bodies of which the tracks tell something.
+    """
+
+    precision: Float[np.ndarray, "body body"]
+    pull: Float[np.ndarray, "body"]
+    expected: Float[np.ndarray, "body"]
+    count: int
+
+    @classmethod
+    def of(cls, fit: SharedFit, index: int, parameter: Parameter) -> "_Told | None":
+        """None where the video has no body with that unknown."""
+        video, local = fit.joint.videos[index], fit.joint.gaussian.locals[index]
+        entries = [video.likelihood.coordinates.entries[place] for place in video.local_places]
+        chosen = [number for number, entry in enumerate(entries) if entry.field == parameter.name]
+        if not chosen:
+            return None
         # Given the shared numbers: a shared friction that is not sharp shifts all bodies alike, which is no spread.
-        own = (local.root**2).sum(axis=1)
-        for number, place in enumerate(video.local_places):
-            variance, value = float(own[number]), float(local.centre[number])
-            if entries[place].field == parameter.name and variance < TELLING * prior.sd**2:
-                alone = 1 / (1 / variance - prior.sd**-2)
-                values.append(alone * (value / variance - prior.mean * prior.sd**-2))
-                variances.append(alone)
-    return np.array(values), np.array(variances)
+        root = local.root[chosen]
+        both = np.linalg.inv(root @ root.T)
+        stated = np.array([1 / entries[number].prior.sd ** 2 for number in chosen])
+        expected = np.array([entries[number].prior.mean for number in chosen])
+        values, vectors = np.linalg.eigh(both - np.diag(stated))
+        alone = (vectors * np.maximum(values, 0.0)) @ vectors.T
+        count = int((values > (1 / TELLING - 1) * stated.min()).sum())
+        return cls(alone, both @ local.centre[chosen] - stated * expected, expected, count)
+
+    def log_evidence(self, middle: float | None, sd: float) -> float:
+        """Log probability (nats, up to a constant) of the tracks where values spread by `sd` around a middle."""
+        expected = self.expected if middle is None else np.full(len(self.expected), middle)
+        both = self.precision + np.eye(len(expected)) / sd**2
+        pull = self.pull + expected / sd**2
+        squares = float(expected @ expected) / sd**2 - float(pull @ np.linalg.solve(both, pull))
+        return -len(expected) * float(np.log(sd)) - float(np.linalg.slogdet(both)[1]) / 2 - squares / 2
+
+
+def _middle(told: Sequence[_Told], log_sd: float, prior: Prior) -> float:
+    """Most probable middle of bodies that spread by a standard deviation around it."""
+    variance = float(np.exp(2 * log_sd))
+    weight = variance / prior.sd**2
+    pull = weight * prior.mean
+    for one in told:
+        ones = np.ones(len(one.pull))
+        shares = np.linalg.solve(one.precision + np.eye(len(ones)) / variance, np.stack([ones, one.pull], axis=1))
+        weight += len(ones) - float(ones @ shares[:, 0]) / variance
+        pull += float(ones @ shares[:, 1])
+    return pull / weight

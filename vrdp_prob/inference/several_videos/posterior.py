@@ -174,7 +174,7 @@ class SharedPosterior:
     def _document(self) -> dict[str, Any]:
         """What the file holds beside the arrays."""
         return {
-            "model": model_file.text(self.model.name, self.model.effects, self.model.parameters),
+            "model": self.model.text,
             "seed": self.seed,
             "numbers": [
                 {

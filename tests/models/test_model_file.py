@@ -56,7 +56,7 @@ def test_every_effect_of_the_catalogue_can_be_named(tmp_path: Path) -> None:
         ('name = "a"\neffects = ["ether"]', "effect 'ether' is not known; the effects are air_drag"),
         ('name = "a"\neffects = ["air_drag", "air_drag"]', "an effect appears twice"),
         ('name = "a"\neffects = ["air_drag"]\ncolour = 1', "field 'colour' is not known"),
-        ('name = "a"\neffects = ["air_drag"]\n[parameters.tilt_x]', "parameter 'tilt_x' belongs to none of the effects"),
+        ('name = "a"\neffects = ["air_drag"]\n[parameters.tilt_x]', "parameter 'tilt_x' belongs to none"),
         ('name = "a"\neffects = ["air_drag"]\n[parameters.air_drag]\nprior_sd = "x"', "air_drag.prior_sd' is 'x'"),
         ('name = "a"\neffects = ["air_drag"]\n[parameters.air_drag]\nprior_sd = nan', "give a finite number"),
         ('name = "a"\neffects = ["air_drag"]\n[parameters.air_drag]\nprior_sd = -1', "sd positive"),

@@ -1,0 +1,175 @@
+"""What discovery finds in measured data: tracks of gliders and pucks, as they are and with a known effect added.
+
+    python benchmarks/measured.py [--json FILE] [--docs docs] [--only NAME,NAME] [--results FOLDER]
+
+Runs what `vrdp-prob discover FOLDER` runs, on each set of ../shared/data that motion capture has measured: whole runs
+are left out and predicted. Then an effect of known strength is added to the same tracks, so that noise and misfit are
+real and the truth is known. `finding.html` of each run is kept in `--results`, and a run that was interrupted goes on;
+delete that folder after a change of the code. `--docs` writes the tables into `measured-data.md` there.
+"""
+
+import argparse
+import json
+import os
+import sys
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+os.environ.setdefault("OMP_NUM_THREADS", "1")
+
+import torch
+from _injected import injected
+from _page import table_row, write_between
+from _resumable import Result, measured
+
+from vrdp_prob.datasets import load_all
+from vrdp_prob.discovery.discover import discover
+from vrdp_prob.discovery.document import to_document, write_finding
+from vrdp_prob.discovery.finding import Finding
+from vrdp_prob.files import write_atomically
+from vrdp_prob.inference import default_model
+from vrdp_prob.models.simulator.rollout import compile_model
+
+DATA = Path(__file__).parents[2] / "shared" / "data"
+RESULTS = Path("out") / "measured"
+FREE, GLIDERS, PUCKS = "glider_free_1d", "glider_collisions_1d_rubber", "puck_collisions_2d"
+TRUE_PARAMETER = {"surface_tilt": "tilt_x", "linear_drag": "linear_drag", "lens_distortion": "distortion"}
+
+
+@dataclass(frozen=True)
+class Task:
+    """A set of tracks, and what is added to it."""
+
+    tracks: str
+    way: str | None = None
+    strength: float = 0.0
+
+    @property
+    def name(self) -> str:
+        """A name, also of the folder of its finding."""
+        return self.tracks if self.way is None else f"{self.tracks}+{self.way}"
+
+
+TASKS = (
+    Task(FREE),
+    Task(FREE, "surface_tilt", 0.003),
+    Task(FREE, "linear_drag", 0.05),
+    Task(FREE, "lens_distortion", 0.02),
+    Task(GLIDERS),
+    Task(GLIDERS, "lens_distortion", 0.02),
+    Task(PUCKS),
+    Task(PUCKS, "lens_distortion", 0.2),
+)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    options = _parser().parse_args(arguments)
+    tasks = {task.name: task for task in TASKS if (DATA / task.tracks).is_dir()}
+    if options.only:
+        tasks = {name: tasks[name] for name in options.only.split(",")}
+    if not tasks:
+        print(f"no data at {DATA}: nothing measured")
+        return 0
+    compile_model(default_model())
+
+    results = measured(
+        _Searched(options.results),
+        tasks,
+        options.results / "results.jsonl",
+        field="name",
+        label="Measured data",
+        processes=options.processes,
+    )
+    text = "\n".join([*_findings(results, tasks), *_recovered(results, tasks)])
+    print(text)
+    if options.docs:
+        write_between(options.docs / "measured-data.md", text)
+    if options.json:
+        with write_atomically(options.json) as temporary:
+            temporary.write_text(json.dumps({"results": results}, indent=1) + "\n", encoding="utf-8")
+    return 0
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--json", type=Path, help="file for the results")
+    parser.add_argument("--docs", type=Path, help="folder of the documentation, whose page is written anew")
+    parser.add_argument("--only", help=f"names, separated by commas; of {', '.join(task.name for task in TASKS)}")
+    parser.add_argument("--results", type=Path, default=RESULTS, help="folder of the results, which are gone on with")
+    parser.add_argument("--processes", type=int, default=os.cpu_count() or 1)
+    return parser
+
+
+@dataclass(frozen=True)
+class _Searched:
+    """Discovery on a task, its finding written to a folder."""
+
+    folder: Path
+
+    def __call__(self, task: Task) -> Result:
+        torch.set_num_threads(1)
+        videos = load_all(DATA / task.tracks)
+        if task.way is not None:
+            videos = [injected(one, task.way, task.strength) for one in videos]
+        begin = time.process_time()
+        finding = discover(videos, seed=0)
+        seconds = time.process_time() - begin
+        write_finding(finding, self.folder / task.name)
+        return {"name": task.name, "videos": len(videos), "seconds": seconds, **_summary(finding)}
+
+
+def _summary(finding: Finding) -> Result:
+    document = to_document(finding)
+    return {key: document[key] for key in ("verdict", "sentence", "causes", "evidence", "evidence_after", "notes")}
+
+
+def _findings(results: Sequence[Result], tasks: Mapping[str, Task]) -> list[str]:
+    """What was found in the tracks as they are."""
+    head = ("set", "videos", "verdict", "causes", "gain, nats", "error, mm", "one second ahead", "noise, mm", "CPU min")
+    lines = [table_row(*head), table_row(*["---"] * len(head))]
+    return lines + [table_row(*_row(result)) for result in results if tasks[result["name"]].way is None]
+
+
+def _row(result: Result) -> list[str]:
+    named = [one for one in result["causes"] if one["named"]]
+    cells = [f"`{result['name']}`", str(result["videos"]), result["verdict"]]
+    cells.append(", ".join(f"`{one['name']}` {one['probability']:.2f}" for one in named) or "-")
+    gains = [one["held_out_gain"] for one in named]
+    cells.append(", ".join(f"{one['elpd_difference']:.0f} ± {one['elpd_se']:.0f}" for one in gains) or "-")
+    cells += [
+        ", ".join(f"{_mm(one['before'][key])} → {_mm(one['after'][key])}" for one in gains) or "-"
+        for key in ("rmse", "rmse_one_second")
+    ]
+    return [*cells, _mm(gains[0]["noise_sd"]) if gains else "-", f"{result['seconds'] / 60:.0f}"]
+
+
+def _mm(value: float | None) -> str:
+    return "-" if value is None else f"{1e3 * value:.3g}"
+
+
+def _recovered(results: Sequence[Result], tasks: Mapping[str, Task]) -> list[str]:
+    """What became of the effects that were added."""
+    head = ("set", "added", "strength", "verdict", "its probability", "found (95 %)", "inside", "named beside it")
+    lines = ["", table_row(*head), table_row(*["---"] * len(head))]
+    for result in results:
+        task = tasks[result["name"]]
+        if task.way is None:
+            continue
+        cause = next((one for one in result["causes"] if one["name"] == task.way), None)
+        others = [one["name"] for one in result["causes"] if one["named"] and one["name"] != task.way]
+        cells = [f"`{task.tracks}`", f"`{task.way}`", f"{task.strength:g}", result["verdict"]]
+        if cause is None:
+            cells += ["-", "-", "-"]
+        else:
+            found = cause["parameters"][TRUE_PARAMETER[task.way]]
+            inside = "yes" if found["q025"] <= task.strength <= found["q975"] else "**no**"
+            interval = f"{found['mean']:.3g} ({found['q025']:.3g} to {found['q975']:.3g})"
+            cells += [f"{cause['probability']:.2f}", interval, inside]
+        lines.append(table_row(*cells, ", ".join(f"`{one}`" for one in others) or "-"))
+    return lines
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,8 +1,10 @@
 """Long runs of many tasks whose results are written one by one, so that a run that was interrupted goes on."""
 
 import json
+import subprocess
 from collections.abc import Callable, Mapping
 from concurrent.futures import as_completed
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -24,6 +26,8 @@ def measured(
 ) -> list[Result]:
     """Results of tasks, those that are not there yet computed in processes and written as they come.
 
+    Each result says which version of the code it is of.
+
     Parameters
     ----------
     work
@@ -40,13 +44,14 @@ def measured(
     path.parent.mkdir(parents=True, exist_ok=True)
     known = {result[field]: result for result in read(path)}
     missing = [task for key, task in tasks.items() if key not in known]
+    code = version_of_code()
     with (
         local_workers(processes, tasks=len(missing)) as workers,
         path.open("a", encoding="utf-8") as file,
         progress_display(quiet=False).stage(label, total=len(missing)) as advance,
     ):
         for future in as_completed([workers.submit(work, task) for task in missing]):
-            result = future.result()
+            result = {**future.result(), "version": code}
             file.write(json.dumps(result) + "\n")
             file.flush()
             known[result[field]] = result
@@ -63,3 +68,12 @@ def read(path: Path) -> list[Result]:
         except json.JSONDecodeError:
             continue
     return found
+
+
+def version_of_code() -> str:
+    """The commit that this is, `-dirty` after it where files differ; the package's version where git does not know."""
+    describe = ["git", "-C", str(Path(__file__).parent), "describe", "--always", "--dirty"]
+    try:
+        return subprocess.run(describe, capture_output=True, text=True, check=True).stdout.strip()
+    except (OSError, subprocess.CalledProcessError):
+        return version("vrdp-prob")

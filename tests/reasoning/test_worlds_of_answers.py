@@ -11,8 +11,8 @@ from test_seen import CHAIN
 from vrdp_prob import inference
 from vrdp_prob.errors import InputError
 from vrdp_prob.inference import Status
-from vrdp_prob.models.physics import PhysicsModel
 from vrdp_prob.models.parameters import RESTITUTION
+from vrdp_prob.models.physics import PhysicsModel
 from vrdp_prob.reasoning import Change, PosteriorWorlds, ask, infer
 from vrdp_prob.reasoning.changes import BUILT_IN
 from vrdp_prob.reasoning.defaults import prior_restitutions

@@ -22,6 +22,7 @@ from vrdp_prob.inference.least_squares import Minimum, robust_cost
 from vrdp_prob.inference.noise_fit import NOISE_FIELDS
 from vrdp_prob.inference.plan import FitPlan
 from vrdp_prob.inference.samples import Gaussian
+from vrdp_prob.inference.standstill import first_false_stop, moving_on
 from vrdp_prob.models.likelihood import Likelihood
 
 CANDIDATES = 64
@@ -128,6 +129,7 @@ class GrowingFit:
         self._keep([self._followed(one, frame_count, previous) for one in self.hypotheses], frame_count)
         if not self._plan.alternatives:
             return
+        self._move_on(frame_count, previous)
         for encounter in self._finder.due(self.hypotheses[0], frame_count):
             self.doubtful |= encounter.puzzling and len(yaw_places(self.likelihood, encounter.bodies)) > 1
             self._explain_otherwise(encounter, frame_count)
@@ -141,6 +143,17 @@ class GrowingFit:
         found = alternatives(
             self._descent, best, encounter, frame_count, active, threshold=HUBER, generator=self._generator
         )
+        self.evaluations += sum(one.evaluations for one in found)
+        self._keep([*self.hypotheses, *(self._refined(best, one, active, frame_count) for one in found)], frame_count)
+
+    def _move_on(self, frame_count: int, previous: int) -> None:
+        """Look for other explanations where a body stands still in the best one so far, and is seen to move."""
+        best = self.hypotheses[0]
+        stop = first_false_stop(self.likelihood, best, frame_count, previous)
+        if stop is None:
+            return
+        active = self._active(frame_count)
+        found = moving_on(self._descent, best, stop, frame_count, active, threshold=HUBER)
         self.evaluations += sum(one.evaluations for one in found)
         self._keep([*self.hypotheses, *(self._refined(best, one, active, frame_count) for one in found)], frame_count)
 

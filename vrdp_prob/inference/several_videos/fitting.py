@@ -19,7 +19,7 @@ from vrdp_prob.inference.several_videos.ascent import ROUNDS, ImpossibleStartErr
 from vrdp_prob.inference.several_videos.joint_fit import JointFit, with_alternatives
 from vrdp_prob.inference.several_videos.linking import LinkedVideo, SharedNumbers, check_names, link
 from vrdp_prob.inference.several_videos.parts import carried_starts, link_fits, stream, structure_of
-from vrdp_prob.inference.several_videos.second_look import WORSE, doubtful, look_again, trusted
+from vrdp_prob.inference.several_videos.second_look import FAR_WORSE, WORSE, doubtful, look_again, trusted
 from vrdp_prob.inference.several_videos.transfer import first_numbers
 from vrdp_prob.models.effects.effect import Effect
 from vrdp_prob.models.likelihood import Likelihood
@@ -238,7 +238,7 @@ def fit_together(
         fits = [fit if one is other else one for one, other, fit in pairs]
         numbers, linked, guess = _guessed(fits, model, shared)
     structures = tuple(structure_of(one.likelihood.coordinates) for one in fits)
-    joint = climb(numbers, linked, *guess)
+    joint = _asking_dissenters(climb(numbers, linked, *guess), fits)
     names = None if shared is None else tuple(shared)
     found = _finished(joint, model, fits, structures, names, model_error=model_error)
     return replace(found, joint=_with_modes(found.joint, fits))
@@ -258,6 +258,28 @@ def _with_misfit(
     """A video's own fit with what its residuals are where it shares numbers with the others."""
     point = video.points(shared, own)
     return replace(fit, misfit=judge(video.likelihood, point, fit.clues.noise, fit.misfit.outliers))
+
+
+def _asking_dissenters(joint: JointFit, fits: Sequence[MapFit]) -> JointFit:
+    """The joint fit, or a better one from what the video says alone that is explained far worse among the others.
+
+    Several videos that are explained in the same wrong way outvote the one in which that shows.
+    """
+    worse = [
+        judge(video.likelihood, joint.point(k), fit.clues.noise, fit.misfit.outliers).residual_sd
+        / fit.misfit.residual_sd
+        for k, (video, fit) in enumerate(zip(joint.videos, fits, strict=True))
+    ]
+    dissenter = int(np.argmax(worse))
+    if worse[dissenter] < FAR_WORSE or len(fits) == 1:
+        return joint
+    starts = carried_starts(fits, joint.videos)
+    asked = [index == dissenter for index in range(len(fits))]
+    try:
+        other = climb(joint.numbers, joint.videos, *first_guess(joint.numbers, joint.videos, starts, asked))
+    except ImpossibleStartError:  # a video has no world at what the dissenter says
+        return joint
+    return max(joint, other, key=lambda one: one.log_density)
 
 
 def _with_modes(joint: JointFit, fits: Sequence[MapFit]) -> JointFit:

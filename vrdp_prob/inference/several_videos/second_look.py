@@ -59,8 +59,9 @@ def doubtful(fits: Sequence[MapFit], among: Collection[int] | None = None) -> li
 
 
 def may_take_another_course(fit: MapFit) -> bool:
-    """Whether anything can happen in a video: one body without walls has but one course of events."""
-    return len(fit.clues.tracks.bodies) > 1 or bool(fit.clues.tracks.walls)
+    """Whether something else may happen in a video: one body without walls that does not stop has but one course."""
+    tracks = fit.clues.tracks
+    return len(tracks.bodies) > 1 or bool(tracks.walls) or len(fit.rollout.events) > 0
 
 
 def look_again(

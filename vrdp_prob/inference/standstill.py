@@ -17,6 +17,7 @@ from vrdp_prob.inference.least_squares import Minimum
 from vrdp_prob.models.effects.body_friction import FRICTION_RATIO
 from vrdp_prob.models.likelihood import Likelihood
 from vrdp_prob.models.parameters import ROLLING_RESISTANCE, SLIDING_FRICTION
+from vrdp_prob.models.physics import PhysicsModel
 from vrdp_prob.models.simulator.events import RolloutEventKind
 
 FRICTION = (SLIDING_FRICTION.name, ROLLING_RESISTANCE.name)
@@ -28,8 +29,20 @@ FIRST_ITERATIONS, THEN_ITERATIONS = 10, 10
 """Steps in which something else takes the place of friction before the stop, and then in all coordinates."""
 
 
+def _drives(model: PhysicsModel) -> bool:
+    """Whether a model has forces beyond those of the base model, which only slow bodies."""
+    usual = {effect.name for effect in PhysicsModel.base().effects}
+    added = [effect for effect in model.effects if effect.name not in usual]
+    return any(effect.overrides("acceleration") or effect.overrides("pair_force") for effect in added)
+
+
 def first_false_stop(likelihood: Likelihood, hypothesis: Hypothesis, frame_count: int, previous: int) -> float | None:
-    """When the first body stopped (s) that is seen to move in frames in which it stands still; None without such."""
+    """When the first body stopped (s) that is seen to move in frames in which it stands still; None without such.
+
+    None, too, where no force of the model could have moved it.
+    """
+    if not _drives(likelihood.model):
+        return None
     with torch.no_grad():
         rollout = likelihood.rollout(torch.from_numpy(hypothesis.point[None]), frame_count)
     stops = rollout.events.of_kind(RolloutEventKind.STOP)

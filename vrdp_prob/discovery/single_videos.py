@@ -6,8 +6,6 @@ near it to be found, and a search from the beginning is the only way.
 
 from collections.abc import Sequence
 
-import numpy as np
-
 from vrdp_prob.discovery.scores import happens_once
 from vrdp_prob.inference.map_fit import MapFit, fit_map
 from vrdp_prob.inference.parallel import in_parallel
@@ -20,9 +18,10 @@ from vrdp_prob.models.parameters import Scope
 from vrdp_prob.models.physics import PhysicsModel
 
 LOST = 1.2
-"""Residuals in units of the noise, and of those of the video in the middle, from which a video may be lost."""
-VIDEOS, SECOND_LOOKS = 2, 3
-"""Lost videos that are looked at, and causes, the best first, with which all but the first of them are searched."""
+"""Residuals in units of the noise from which a video may be lost."""
+VIDEOS, WITH_ALL, SECOND_LOOKS = 4, 2, 4
+"""Lost videos that are looked at, those of them that are searched with every cause, and causes, the best first, with
+which the others are."""
 NEARLY, MOST_TOLD = 0.6, 2
 """Share of the largest gain from which another cause is told of, too, and number of causes that are."""
 EXPLAINED = 1.1
@@ -36,9 +35,8 @@ AT_ONCE = 4
 def lost_videos(fit: SharedFit) -> list[int]:
     """Videos that may have taken the wrong course of events, the worst first."""
     ratios = [part.misfit.ratio for part in fit.fits]
-    least = LOST * max(1.0, float(np.median(ratios)))
     order = sorted(range(len(ratios)), key=lambda index: -ratios[index])
-    return [index for index in order if ratios[index] > least and may_take_another_course(fit.fits[index])]
+    return [index for index in order if ratios[index] > LOST and may_take_another_course(fit.fits[index])]
 
 
 def causes_of_lost_videos(
@@ -51,7 +49,7 @@ def causes_of_lost_videos(
     fit
         Fit of the model without any of them.
     lost
-        The videos, the worst first; the first two are looked at.
+        The videos, the worst first; the first few are looked at.
     catalogue
         The causes. Those that happen once, vanish nowhere or belong to materials are left out: one video says too
         little of them.
@@ -81,11 +79,16 @@ def causes_of_lost_videos(
         return found
 
     gains: dict[str, float] = {}
-    for video in lost[:VIDEOS]:
+    for rank, video in enumerate(lost[:VIDEOS]):
         before = searched(video, fit.model).modes[0].log_density
         found = tried(video, effects)
-        gains = {effect.name: one.modes[0].log_density - before + gains.get(effect.name, 0.0) for effect, one in found}
-        effects = sorted((effect for effect, _ in found), key=lambda effect: -gains[effect.name])[:SECOND_LOOKS]
+        # Models are nested: a search that makes a video less probable has lost its own way.
+        gained = {effect.name: max(one.modes[0].log_density - before, 0.0) for effect, one in found}
+        gains = {name: gain + gains.get(name, 0.0) for name, gain in gained.items()}
+        explained = len(found) < len(effects)
+        effects = sorted((effect for effect, _ in found), key=lambda effect: -gains[effect.name])
+        if explained or rank + 1 >= WITH_ALL:
+            effects = effects[:SECOND_LOOKS]
     ranked = [(effect, gains[effect.name]) for effect in effects if effect.name in gains]
     return [pair for pair in ranked if pair[1] > max(needed, NEARLY * ranked[0][1])][:MOST_TOLD]
 

@@ -143,8 +143,7 @@ class GrowingFit:
         found = alternatives(
             self._descent, best, encounter, frame_count, active, threshold=HUBER, generator=self._generator
         )
-        self.evaluations += sum(one.evaluations for one in found)
-        self._keep([*self.hypotheses, *(self._refined(best, one, active, frame_count) for one in found)], frame_count)
+        self._keep_beside(best, found, active, frame_count)
 
     def _move_on(self, frame_count: int, previous: int) -> None:
         """Look for other explanations where a body stands still in the best one so far, and is seen to move."""
@@ -154,6 +153,12 @@ class GrowingFit:
             return
         active = self._active(frame_count)
         found = moving_on(self._descent, best, stop, frame_count, active, threshold=HUBER)
+        self._keep_beside(best, found, active, frame_count)
+
+    def _keep_beside(
+        self, best: Hypothesis, found: Sequence[Minimum], active: Bool[np.ndarray, "dimension"], frame_count: int
+    ) -> None:
+        """Keep the best of what is known and of other explanations than the best one."""
         self.evaluations += sum(one.evaluations for one in found)
         self._keep([*self.hypotheses, *(self._refined(best, one, active, frame_count) for one in found)], frame_count)
 

@@ -265,13 +265,14 @@ def _asking_dissenters(joint: JointFit, fits: Sequence[MapFit]) -> JointFit:
 
     Several videos that are explained in the same wrong way outvote the one in which that shows.
     """
+    if len(fits) == 1:
+        return joint
     worse = [
-        judge(video.likelihood, joint.point(k), fit.clues.noise, fit.misfit.outliers).residual_sd
-        / fit.misfit.residual_sd
-        for k, (video, fit) in enumerate(zip(joint.videos, fits, strict=True))
+        _with_misfit(fit, video, joint.gaussian.mean, own.centre).misfit.residual_sd / fit.misfit.residual_sd
+        for fit, video, own in zip(fits, joint.videos, joint.gaussian.locals, strict=True)
     ]
     dissenter = int(np.argmax(worse))
-    if worse[dissenter] < FAR_WORSE or len(fits) == 1:
+    if worse[dissenter] < FAR_WORSE:
         return joint
     starts = carried_starts(fits, joint.videos)
     asked = [index == dissenter for index in range(len(fits))]

@@ -49,16 +49,18 @@ class Task:
     @property
     def name(self) -> str:
         """A name, also of the folder of its finding."""
-        return self.tracks if self.way is None else f"{self.tracks}+{self.way}"
+        return self.tracks if self.way is None else f"{self.tracks}+{self.way}-{self.strength:g}"
 
 
 TASKS = (
     Task(FREE),
     Task(FREE, "surface_tilt", 0.003),
     Task(FREE, "linear_drag", 0.05),
+    Task(FREE, "linear_drag", 0.3),
     Task(FREE, "lens_distortion", 0.02),
+    Task(FREE, "lens_distortion", 0.1),
     Task(GLIDERS),
-    Task(GLIDERS, "lens_distortion", 0.02),
+    Task(GLIDERS, "lens_distortion", 0.1),
     Task(PUCKS),
     Task(PUCKS, "lens_distortion", 0.2),
 )

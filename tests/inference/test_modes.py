@@ -12,6 +12,7 @@ from vrdp_prob.inference.laplace import sample_laplace
 from vrdp_prob.inference.mixture import Mixture
 from vrdp_prob.inference.nuts_sampler import sample_nuts
 from vrdp_prob.inference.samples import PARETO_K_GOAL, assess
+from vrdp_prob.inference.yaw_tiles import Jumps
 
 SAMPLERS = {"emcee": sample_emcee, "nuts": sample_nuts, "laplace": sample_laplace}
 
@@ -30,6 +31,20 @@ def test_two_modes_get_the_weights_that_they_have(name: str) -> None:
     convergence = assess(name, samples)
     assert convergence.modes == samples.modes
     assert convergence.converged or name == "nuts", convergence.sentence
+
+
+@pytest.mark.parametrize("name", ["emcee", "laplace"])
+def test_jumps_reach_a_mode_that_the_fit_did_not_find(name: str) -> None:
+    target = TwoModes()
+    known = Mixture.of(target.start.components[0])
+    # 400 places of which none is in the other mode: where chains set out from is not what weighs the modes.
+    places = known.draws(400, np.random.default_rng(0))[0]
+    samples = SAMPLERS[name](
+        target, known, draws=1000, generator=np.random.default_rng(4), jumps=Jumps(target.start, places)
+    )
+    share = float((samples.points[..., 0] < FAR / 3).mean())
+    assert share == pytest.approx(target.weight, abs=0.06)
+    assert assess(name, samples).converged
 
 
 def test_the_fast_way_hands_on_where_it_cannot_be_trusted_and_says_so(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -15,7 +15,7 @@ from jaxtyping import Bool, Float
 from vrdp_prob.inference.descent import Descent
 from vrdp_prob.inference.events import Pairs, courses
 from vrdp_prob.inference.free_flight import SeenContact
-from vrdp_prob.inference.hypothesis import QUARTER, Hypothesis, distances, owned, yaw_places
+from vrdp_prob.inference.hypothesis import QUARTER, Hypothesis, different, owned, yaw_places
 from vrdp_prob.inference.least_squares import Minimum, robust_cost
 from vrdp_prob.inference.release_contact import strike_before
 from vrdp_prob.inference.samples import Gaussian
@@ -93,7 +93,8 @@ def alternatives(
     starts = drawn[chosen]
     first = descent(starts, local, frame_count=frame_count, iterations=FIRST_ITERATIONS, threshold=threshold)
     hopeless = HOPELESS if encounter.puzzling else HOPELESS / 2
-    kept = _different(likelihood, [one for one in first if one.cost < hypothesis.cost + hopeless], frame_count)
+    hopeful = [one for one in first if one.cost < hypothesis.cost + hopeless]
+    kept = different(likelihood, hopeful, worse=HOPELESS, most=THEN_REFINED, frame_count=frame_count)
     if not kept:
         return []
     return descent(
@@ -207,17 +208,3 @@ def _other_courses(found: Sequence[Pairs]) -> list[int]:
 def _apart(first: Float[np.ndarray, "dimension"], second: Float[np.ndarray, "dimension"], yaws: Sequence[int]) -> bool:
     turn = first[list(yaws)] - second[list(yaws)]
     return bool((np.abs(turn - QUARTER * np.round(turn / QUARTER)) > DIFFERENT).any())
-
-
-def _different(likelihood: Likelihood, found: Sequence[Minimum], frame_count: int) -> list[Minimum]:
-    """The best results that are not the same."""
-    left = sorted((one for one in found if np.isfinite(one.cost)), key=lambda one: one.cost)
-    left = [one for one in left if one.cost < left[0].cost + HOPELESS]
-    kept: list[Minimum] = []
-    while left and len(kept) < THEN_REFINED:
-        best = left[0]
-        kept.append(best)
-        precision = best.jacobian.T @ best.jacobian
-        apart = distances(likelihood, best.point, precision, np.array([one.point for one in left]), frame_count) > 1
-        left = [one for one, far in zip(left[1:], apart[1:].tolist(), strict=True) if far]
-    return kept

@@ -11,6 +11,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 from numpy.random import RandomState
 
+from vrdp_prob.inference.curved_gaussian import CurvedGaussian
 from vrdp_prob.inference.mixture import Mixture
 from vrdp_prob.inference.samples import LogDensity, evaluate
 
@@ -66,16 +67,17 @@ class IndependentProposal:
     ----------
     mixture
         Where proposals come from.
+    coordinates
+        Whose whitened coordinates the walkers live in.
     """
 
-    def __init__(self, mixture: Mixture) -> None:
-        self._mixture = mixture
+    def __init__(self, mixture: Mixture, coordinates: CurvedGaussian) -> None:
+        self._mixture, self._coordinates = mixture, coordinates
 
     def __call__(
         self, places: Float[np.ndarray, "walker dimension"], random: RandomState
     ) -> tuple[Float[np.ndarray, "walker dimension"], Float[np.ndarray, "walker"]]:
         """Proposals for walkers at some places."""
-        first = self._mixture.components[0]
         points, _ = self._mixture.draws(len(places), random)
-        ratio = self._mixture.log_density(first.points(places)) - self._mixture.log_density(points)
-        return first.whitened(points), ratio
+        ratio = self._mixture.log_density(self._coordinates.points(places)) - self._mixture.log_density(points)
+        return self._coordinates.whitened(points), ratio

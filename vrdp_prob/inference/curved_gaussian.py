@@ -8,6 +8,7 @@ Uncertainty Quantification 6 (2018); Bates and Watts, Relative curvature measure
 Statistical Society B 42 (1980).
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -20,7 +21,7 @@ from torch import Tensor
 from vrdp_prob.inference.least_squares import Residuals, robust_cost
 from vrdp_prob.inference.samples import Gaussian
 from vrdp_prob.inference.second_differences import second_differences
-from vrdp_prob.inference.straightening import Straightening
+from vrdp_prob.inference.straightening import Straightening, all_straightened
 
 MOST_BENT = 4
 """Largest number of axes along which others are bent."""
@@ -143,6 +144,43 @@ class CurvedGaussian:
         return replace(
             self, shift=self.shift + self.scale @ torch.from_numpy(np.asarray(shift)), scale=self.scale @ scale
         )
+
+
+class SeveralClouds:
+    """The inverse maps of several clouds at once: hundreds of them cost little more than one.
+
+    Parameters
+    ----------
+    clouds
+        The clouds, of one dimension; straightened along the same rates, as far as they are straightened.
+    """
+
+    def __init__(self, clouds: Sequence[CurvedGaussian]) -> None:
+        count, dimension = len(clouds), clouds[0].dimension
+        unit = np.eye(dimension)
+        self._mean = np.stack([cloud.gaussian.mean for cloud in clouds])
+        self._unroot = np.stack([solve_triangular(cloud.gaussian.root, unit, lower=True) for cloud in clouds])
+        self._shift = np.stack([cloud.shift.numpy() for cloud in clouds])
+        self._unscale = np.stack([solve_triangular(cloud.scale.numpy(), unit, lower=True) for cloud in clouds])
+        bent = max(cloud.axes.shape[1] for cloud in clouds)
+        self._axes = np.zeros((count, dimension, bent))
+        self._bend = np.zeros((count, bent, bent, dimension))
+        for index, cloud in enumerate(clouds):
+            own = cloud.axes.shape[1]
+            self._axes[index, :, :own] = cloud.axes.numpy()
+            self._bend[index, :own, :own] = cloud.bend.numpy()
+        self._straightenings = [cloud.straightening for cloud in clouds]
+
+    def squares(self, points: Float[np.ndarray, "point dimension"]) -> Float[np.ndarray, "component point"]:
+        """Squared distance of points from the middle of each cloud, in its standard normal coordinates."""
+        straight = all_straightened(self._straightenings, points)
+        bent = np.matmul(straight - self._mean[:, None], np.swapaxes(self._unroot, 1, 2))
+        if self._axes.shape[2]:
+            along = np.matmul(bent, self._axes)
+            products = (along[..., :, None] * along[..., None, :]).reshape(*along.shape[:2], -1)
+            bent = bent - np.matmul(products, self._bend.reshape(len(bent), -1, bent.shape[2])) / 2
+        whitened = np.matmul(bent - self._shift[:, None], np.swapaxes(self._unscale, 1, 2))
+        return np.asarray((whitened**2).sum(axis=2))
 
 
 def _bends(straight: CurvedGaussian, residuals: Residuals) -> Float[np.ndarray, "dimension dimension dimension"]:

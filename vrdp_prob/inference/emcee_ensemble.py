@@ -21,6 +21,8 @@ from vrdp_prob.models.simulator.work import metered
 GROUP = "ensemble"
 HAMILTONIAN, INDEPENDENT, DIFFERENCE, JUMP = 0.2, 0.4, 0.3, 0.1
 """Shares of the moves. One along the gradient costs as much as thirty of the others."""
+FAR = 0.6
+"""...and that of jumps between the islands of a posterior, beside them."""
 MOVES_PER_STEP = 2
 """Moves of all walkers between two draws that are kept."""
 
@@ -40,6 +42,8 @@ class Ensemble:
         Seed of all that it draws.
     file
         Where its chain is kept after every run; nowhere if None. What is there already is gone on with.
+    jumps
+        Proposals that reach what lies beyond the clouds of the mixture, if anything does.
     """
 
     def __init__(
@@ -49,6 +53,8 @@ class Ensemble:
         places: Float[np.ndarray, "walker dimension"],
         seed: int,
         file: Path | None,
+        *,
+        jumps: Mixture | None = None,
     ) -> None:
         self._density, self._mixture, self._file = density, mixture, file
         self.evaluations = self.gradients = self.work = 0
@@ -56,10 +62,12 @@ class Ensemble:
         difference = [[emcee.moves.DEMove(gamma0=gamma) for _ in mixture.components] for gamma in (None, 1.0)]
         moves = [
             (ComponentMove(density, mixture, self._hamiltonian), HAMILTONIAN),
-            (emcee.moves.MHMove(IndependentProposal(mixture)), INDEPENDENT),
+            (emcee.moves.MHMove(IndependentProposal(mixture, mixture.components[0])), INDEPENDENT),
             (ComponentMove(density, mixture, difference[0]), DIFFERENCE),
             (ComponentMove(density, mixture, difference[1]), JUMP),
         ]
+        if jumps is not None:
+            moves.append((emcee.moves.MHMove(IndependentProposal(jumps, mixture.components[0])), FAR))
         whitened = mixture.components[0].whitened(places)
         self._sampler = emcee.EnsembleSampler(*whitened.shape, self._log_probability, moves=moves, vectorize=True)
         self._state = emcee.State(whitened, random_state=RandomState(seed).get_state())

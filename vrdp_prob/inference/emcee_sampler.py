@@ -23,6 +23,7 @@ from vrdp_prob.inference.mixture import Mixture
 from vrdp_prob.inference.mode_weights import doubts, weights_from_chains
 from vrdp_prob.inference.samples import ESS_GOAL, R_HAT_GOAL, LogDensity, Samples
 from vrdp_prob.inference.shaping import Shaped, shaped, starting_places
+from vrdp_prob.inference.yaw_tiles import Jumps
 from vrdp_prob.models.simulator.work import metered, work_sentence
 from vrdp_prob.progress import Advance, ProgressDisplay, SilentProgress
 
@@ -52,6 +53,7 @@ def sample_emcee(
     checkpoint: Checkpoint | None = None,
     reported: Reported | None = None,
     form: Shaped | None = None,
+    jumps: Jumps | None = None,
     most_steps: int = MOST_STEPS,
     work_limit: int = WORK_LIMIT,
 ) -> Samples:
@@ -76,6 +78,8 @@ def sample_emcee(
         Quantities that have to be known well enough; the coordinates where None.
     form
         The clouds in the posterior's shape, where that is known already.
+    jumps
+        Proposals that reach what lies beyond the clouds, and places there, if anything does.
     most_steps, work_limit
         Steps of every ensemble and work of all after which sampling stops even if it has not converged.
 
@@ -92,9 +96,10 @@ def sample_emcee(
             Ensemble(
                 density,
                 form.mixture,
-                starting_places(density, form, walkers, generator),
+                _places(density, form, jumps, walkers, generator),
                 int(generator.integers(2**31)),
                 checkpoint.path(f"ensemble_{index}.h5") if checkpoint is not None else None,
+                jumps=None if jumps is None else jumps.mixture,
             )
             for index in range(ENSEMBLES)
         ]
@@ -156,6 +161,15 @@ def _run(
             if end >= WARM_UP + most_steps:
                 return (f"It stopped after {most_steps} steps.",)
             end = min(end + ROUND, WARM_UP + most_steps)
+
+
+def _places(
+    density: LogDensity, form: Shaped, jumps: Jumps | None, count: int, generator: np.random.Generator
+) -> Float[np.ndarray, "walker dimension"]:
+    """Places for walkers to set out from: those that jumps know, where there are any."""
+    if jumps is None:
+        return starting_places(density, form, count, generator)
+    return jumps.places[generator.choice(len(jumps.places), size=count)]
 
 
 def _kept_form(

@@ -7,6 +7,7 @@ import numpy as np
 import torch
 from jaxtyping import Float
 
+from vrdp_prob.inference.least_squares import Minimum
 from vrdp_prob.models.coordinates import Coordinates
 from vrdp_prob.models.likelihood import Likelihood
 from vrdp_prob.models.simulator.events import RolloutEventKind
@@ -89,7 +90,7 @@ def distances(
     quarter turn is no difference.
     """
     coordinates = likelihood.coordinates
-    before = _before_contact(likelihood, reference, frame_count)
+    before = frames_before_contact(likelihood, reference, frame_count)
     yaws = [place for place in yaw_places(likelihood) if coordinates.entries[place].owner in before]
     slopes = [
         place
@@ -113,8 +114,29 @@ def distances(
     return np.sqrt(np.maximum(np.einsum("ij,jk,ik->i", difference, metric, difference), 0.0))
 
 
-def _before_contact(
-    likelihood: Likelihood, point: Float[np.ndarray, "dimension"], frame_count: int | None
+def different(
+    likelihood: Likelihood,
+    found: Sequence[Minimum],
+    *,
+    worse: float,
+    most: int,
+    frame_count: int | None = None,
+) -> list[Minimum]:
+    """The best of some minima that are not the same, none of them so many nats worse than the best one."""
+    left = sorted((one for one in found if np.isfinite(one.cost)), key=lambda one: one.cost)
+    left = [one for one in left if one.cost < left[0].cost + worse]
+    kept: list[Minimum] = []
+    while left and len(kept) < most:
+        best = left[0]
+        kept.append(best)
+        precision = best.jacobian.T @ best.jacobian
+        apart = distances(likelihood, best.point, precision, np.array([one.point for one in left]), frame_count) > 1
+        left = [one for one, far in zip(left[1:], apart[1:].tolist(), strict=True) if far]
+    return kept
+
+
+def frames_before_contact(
+    likelihood: Likelihood, point: Float[np.ndarray, "dimension"], frame_count: int | None = None
 ) -> dict[int, int]:
     """Frame just before the first contact of each body that has one after it was released."""
     with torch.no_grad():

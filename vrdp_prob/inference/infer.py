@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -17,6 +18,7 @@ from vrdp_prob.inference.posterior import Posterior
 from vrdp_prob.inference.proposals import proposals
 from vrdp_prob.inference.samples import Samples, assess
 from vrdp_prob.inference.straightening import Rates
+from vrdp_prob.inference.yaw_tiles import yaw_jumps
 from vrdp_prob.models.effects.body_friction import BodyFriction
 from vrdp_prob.models.noise import NoiseFamily
 from vrdp_prob.models.physics import PhysicsModel
@@ -29,6 +31,8 @@ SAMPLERS: Mapping[str, Callable[..., Samples]] = {
     "laplace": sample_laplace,
 }
 """The samplers by name; all take the log density and what its modes propose."""
+JUMPING = frozenset({"emcee", "laplace"})
+"""Samplers that can use proposals beyond the modes."""
 OPTIONS = {
     "sampler": tuple(SAMPLERS),
     "noise": ("auto", *NoiseFamily),
@@ -117,15 +121,19 @@ def infer(
     if motion == "fixed":
         fit = fit.given_motion()
     reported = Reported.of(fit.likelihood.coordinates, fit.contacts, tracks.bodies)
+    likelihood, rates = fit.likelihood, Rates.of(tracks, fit.likelihood.coordinates)
+    options: dict[str, Any] = {"hand_on": hand_on} if sampler == "laplace" else {}
+    if sampler in JUMPING:
+        options["jumps"] = yaw_jumps(likelihood, fit.point, rates, likelihood.log_density, generator)
     samples = SAMPLERS[sampler](
-        fit.likelihood.log_density,
-        proposals(fit.modes, fit.likelihood.residuals, Rates.of(tracks, fit.likelihood.coordinates)),
+        likelihood.log_density,
+        proposals(fit.modes, likelihood.residuals, rates),
         draws=draws,
         generator=generator,
         progress=progress,
         checkpoint=kept,
         reported=reported,
-        **({"hand_on": hand_on} if sampler == "laplace" else {}),
+        **options,
     )
     convergence = assess(sampler, samples, reported)
     return posterior_from(

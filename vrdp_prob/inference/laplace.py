@@ -15,6 +15,7 @@ from vrdp_prob.inference.mixture import Mixture
 from vrdp_prob.inference.mode_weights import doubts, weights_from_importance
 from vrdp_prob.inference.samples import ESS_GOAL, PARETO_K_GOAL, LogDensity, Samples
 from vrdp_prob.inference.shaping import shaped
+from vrdp_prob.inference.yaw_tiles import Jumps
 from vrdp_prob.models.simulator.work import metered
 from vrdp_prob.progress import ProgressDisplay, SilentProgress
 
@@ -29,6 +30,8 @@ video 0 (k 0.58, 135 effective of 24 000) the mean of a drag was off by 0.36 sta
 FEWEST = 100.0
 """Where the weights leave fewer effective draws than this and nobody goes on they are flattened, so that the draws at
 least spread."""
+FAR = 0.7
+"""Share of the proposals that jumps make, where there are any."""
 MARGIN = 1.1
 """Effective draws beyond the goal at which it stops, so that resampling does not fall short of it."""
 
@@ -42,6 +45,7 @@ def sample_laplace(
     progress: ProgressDisplay | None = None,
     checkpoint: Checkpoint | None = None,
     reported: Reported | None = None,
+    jumps: Jumps | None = None,
     hand_on: bool = True,
 ) -> Samples:
     """Draw by importance sampling around the modes.
@@ -62,6 +66,8 @@ def sample_laplace(
         Where emcee keeps what it has done, if it comes to that; the fast way itself is done in seconds.
     reported
         Quantities that have to be known well enough; the coordinates where None.
+    jumps
+        Proposals that reach what lies beyond the clouds, if anything does.
     hand_on
         Whether emcee goes on where the weights cannot be trusted. If not, the draws are handed back as they are, and
         their Pareto k says that they are not to be trusted.
@@ -72,7 +78,8 @@ def sample_laplace(
     """
     with metered() as meter, (progress or SilentProgress()).stage("Importance sampling") as advance:
         form = shaped(density, start, generator, advance)
-        drawn = Weighted.drawn(density, form.mixture, ROUND, generator, advance)
+        proposal = form.mixture if jumps is None else form.mixture.joined(jumps.mixture, FAR)
+        drawn = Weighted.drawn(density, proposal, ROUND, generator, advance)
         weights, pareto_k = smoothed_weights(drawn.log_ratio)
         known = weighted_statistics(drawn.points, weights, reported)
         for done in range(1, MOST_ROUNDS):
@@ -81,7 +88,7 @@ def sample_laplace(
                 break  # more of the same would not do
             if done >= FEWEST_ROUNDS and pareto_k <= PARETO_K_GOAL and worth >= MARGIN * ESS_GOAL:
                 break
-            drawn = drawn.joined(Weighted.drawn(density, form.mixture, ROUND, generator, advance))
+            drawn = drawn.joined(Weighted.drawn(density, proposal, ROUND, generator, advance))
             weights, pareto_k = smoothed_weights(drawn.log_ratio)
             known = weighted_statistics(drawn.points, weights, reported)
     enough = min(known.ess_bulk, known.ess_tail) >= ESS_GOAL
@@ -99,6 +106,7 @@ def sample_laplace(
             checkpoint=checkpoint,
             reported=reported,
             form=form,
+            jumps=jumps,
         )
         return replace(
             samples,

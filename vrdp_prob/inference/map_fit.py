@@ -31,6 +31,7 @@ from vrdp_prob.inference.modes import (
 )
 from vrdp_prob.inference.plan import FitPlan
 from vrdp_prob.inference.refinement import Refined, climb, refine
+from vrdp_prob.inference.yaw_search import other_yaws
 from vrdp_prob.models.likelihood import Likelihood
 from vrdp_prob.models.noise import NoiseFamily
 from vrdp_prob.models.physics import PhysicsModel
@@ -166,6 +167,11 @@ def fit_map(
         likelihood = widened
         evaluations += sum(one.evaluations for one in found)
         misfit = misfit.with_error(error, likelihood.observations.position_reference)
+    if stages.alternatives:
+        turned = other_yaws(likelihood, found[0].point)
+        elsewhere = _refined(likelihood, [one.point for one in turned], likelihood, stages)
+        evaluations += sum(one.evaluations for one in turned) + sum(one.evaluations for one in elsewhere)
+        found = _best([*found, *elsewhere])
     climbed = _climbed(likelihood, found)
     while (wider := with_all_that_meet(likelihood, structure, [one.point for one in climbed])) is not None:
         structure, widened = wider
@@ -184,8 +190,13 @@ def _refined(
     """What refinement makes of several starts, the best first; those without hope left out."""
     descent = Descent(likelihood, plan.optimiser)
     found = [refine(descent, source.coordinates.carried(point, likelihood.coordinates)) for point in starts]
-    found.sort(key=lambda one: -one.log_density)
-    return [one for one in found if one is found[0] or one.log_density > found[0].log_density - HOPELESS]
+    return _best(found)
+
+
+def _best(found: Sequence[Refined]) -> list[Refined]:
+    """The best of some maxima and those that are not hopelessly worse, the best first."""
+    ordered = sorted(found, key=lambda one: -one.log_density)
+    return [one for one in ordered if one is ordered[0] or one.log_density > ordered[0].log_density - HOPELESS]
 
 
 def _climbed(likelihood: Likelihood, found: Sequence[Refined]) -> list[Refined]:

@@ -5,12 +5,13 @@ move.
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from jaxtyping import Float, Int
 from scipy.special import gammaln, logsumexp
 
-from vrdp_prob.inference.curved_gaussian import CurvedGaussian
+from vrdp_prob.inference.curved_gaussian import CurvedGaussian, SeveralClouds
 
 DEGREES_OF_FREEDOM = 30.0
 """Tails of the components: heavier than Gaussian, light enough to lose little in 40 dimensions."""
@@ -42,6 +43,11 @@ class Mixture:
         order = np.argsort(-weights, kind="stable")
         return cls(tuple(components[index] for index in order), weights[order] - logsumexp(weights))
 
+    def joined(self, other: "Mixture", share: float) -> "Mixture":
+        """Mixture of the components of both, a share of its weight on those of the other."""
+        log_weights = np.concatenate([self.log_weights + np.log1p(-share), other.log_weights + np.log(share)])
+        return Mixture.of(*self.components, *other.components, log_weights=log_weights)
+
     @property
     def dimension(self) -> int:
         """Number of coordinates."""
@@ -54,7 +60,15 @@ class Mixture:
 
     def log_densities(self, points: Float[np.ndarray, "point dimension"]) -> Float[np.ndarray, "component point"]:
         """Log density of each component, weights left out."""
-        return np.stack([_log_density(component, points) for component in self.components])
+        dimension, freedom = self.dimension, DEGREES_OF_FREEDOM
+        constant = gammaln((freedom + dimension) / 2) - gammaln(freedom / 2) - dimension / 2 * np.log(freedom * np.pi)
+        volumes = np.array([component.log_volume for component in self.components])
+        squares = self._clouds.squares(points)
+        return np.asarray(constant - volumes[:, None] - (freedom + dimension) / 2 * np.log1p(squares / freedom))
+
+    @cached_property
+    def _clouds(self) -> SeveralClouds:
+        return SeveralClouds(self.components)
 
     def log_density(self, points: Float[np.ndarray, "point dimension"]) -> Float[np.ndarray, "point"]:
         """Log density of the mixture, normalised."""
@@ -81,10 +95,3 @@ class Mixture:
 def _student_t(count: int, dimension: int, random: Random) -> Float[np.ndarray, "point dimension"]:
     normal = random.standard_normal((count, dimension))
     return np.asarray(normal / np.sqrt(random.chisquare(DEGREES_OF_FREEDOM, count) / DEGREES_OF_FREEDOM)[:, None])
-
-
-def _log_density(component: CurvedGaussian, points: Float[np.ndarray, "point dimension"]) -> np.ndarray:
-    dimension, freedom = component.dimension, DEGREES_OF_FREEDOM
-    squares = (component.whitened(points) ** 2).sum(axis=1)
-    constant = gammaln((freedom + dimension) / 2) - gammaln(freedom / 2) - dimension / 2 * np.log(freedom * np.pi)
-    return np.asarray(constant - component.log_volume - (freedom + dimension) / 2 * np.log1p(squares / freedom))

@@ -6,7 +6,7 @@ quadratic ridge leaves the posterior there, and its long tail is never sampled. 
 how much a rate has changed and not by how much its logarithm has. It is a shear, so it keeps volumes.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -144,7 +144,23 @@ class Straightening:
         return (torch.expm1(inside) - inside) @ self.displacement
 
 
-def straight_gaussian(mode: Mode, rates: Rates, generator: np.random.Generator) -> Gaussian:
+def all_straightened(
+    shears: Sequence[Straightening | None], points: Float[np.ndarray, "point dimension"]
+) -> Float[np.ndarray, "shear point dimension"]:
+    """Points straightened by each of several shears along the same rates; None leaves them as they are."""
+    straight = np.tile(points, (len(shears), 1, 1))
+    known = [(index, shear) for index, shear in enumerate(shears) if shear is not None]
+    if not known:
+        return straight
+    directions = known[0][1].directions.numpy()
+    centres = np.stack([shear.centre.numpy() for _, shear in known]) @ directions.T
+    displacement = np.stack([shear.displacement.numpy() for _, shear in known])
+    change = np.minimum(points @ directions.T - centres[:, None], LARGEST)
+    straight[[index for index, _ in known]] -= np.matmul(np.expm1(change) - change, displacement)
+    return straight
+
+
+def straight_gaussian(mode: Mode, rates: Rates, generator: np.random.Generator, *, draws: int = DRAWS) -> Gaussian:
     """The Gaussian of a mode, as wide along the rates as the posterior of a linear dependence on them is.
 
     That posterior has a long tail towards small rates, of which the curvature at the mode knows nothing. It needs no
@@ -156,7 +172,7 @@ def straight_gaussian(mode: Mode, rates: Rates, generator: np.random.Generator) 
     if not len(taken):
         return gaussian
     covariance = gaussian.root @ gaussian.root.T
-    found = _moments(mode, rates, covariance[np.ix_(taken, taken)], generator)
+    found = _moments(mode, rates, covariance[np.ix_(taken, taken)], generator, draws)
     if found is None:
         return gaussian
     spread, following, wide = ROOM**2 * found, _following(mode, rates, taken), covariance.copy()
@@ -177,7 +193,11 @@ def _following(mode: Mode, rates: Rates, places: Int[np.ndarray, "place"]) -> Fl
 
 
 def _moments(
-    mode: Mode, rates: Rates, covariance: Float[np.ndarray, "taken taken"], generator: np.random.Generator
+    mode: Mode,
+    rates: Rates,
+    covariance: Float[np.ndarray, "taken taken"],
+    generator: np.random.Generator,
+    count: int,
 ) -> Float[np.ndarray, "taken taken"] | None:
     """Second moments about the mode of the factors of rates; None where too few of the draws have weight."""
     taken, places = rates.taken, rates.places
@@ -188,18 +208,18 @@ def _moments(
     values, vectors = np.linalg.eigh((information + information.T) / 2)
     root = vectors * np.sqrt(np.maximum(values, 0.0))
     slope = (mode.point[places] - mean[places]) / sd[places] ** 2
-    normal = generator.standard_normal((DRAWS, len(taken)))
-    normal /= np.sqrt(generator.chisquare(TAILS, DRAWS) / TAILS)[:, None]
-    draws = mode.point[taken] + WIDER * normal @ _root(covariance).T
-    change = np.expm1(np.minimum((draws - mode.point[taken]) @ rates.directions[:, taken].T, LARGEST))
+    normal = generator.standard_normal((count, len(taken)))
+    normal /= np.sqrt(generator.chisquare(TAILS, count) / TAILS)[:, None]
+    drawn = mode.point[taken] + WIDER * normal @ _root(covariance).T
+    change = np.expm1(np.minimum((drawn - mode.point[taken]) @ rates.directions[:, taken].T, LARGEST))
     log_density = change @ slope - ((change @ root) ** 2).sum(axis=1) / 2
-    log_density -= (((draws - mean[taken]) / sd[taken]) ** 2).sum(axis=1) / 2
+    log_density -= (((drawn - mean[taken]) / sd[taken]) ** 2).sum(axis=1) / 2
     log_ratio = log_density + (TAILS + len(taken)) / 2 * np.log1p((normal**2).sum(axis=1) / TAILS)
     weights = np.exp(log_ratio - log_ratio.max())
     weights /= weights.sum()
     if 1 / (weights**2).sum() < FEWEST:
         return None
-    moved = draws - mode.point[taken]
+    moved = drawn - mode.point[taken]
     moments: np.ndarray = (moved * weights[:, None]).T @ moved
     return moments
 

@@ -23,8 +23,8 @@ HAMILTONIAN, INDEPENDENT, DIFFERENCE, JUMP = 0.2, 0.4, 0.3, 0.1
 """Shares of the moves. One along the gradient costs as much as thirty of the others."""
 FAR = 0.6
 """...and that of jumps between the islands of a posterior, beside them."""
-MOVES_PER_STEP = 2
-"""Moves of all walkers between two draws that are kept."""
+MOVES_PER_STEP, WITH_JUMPS = 2, 3
+"""Moves of all walkers between two draws that are kept, and as many where some of them are jumps."""
 
 
 class Ensemble:
@@ -66,6 +66,7 @@ class Ensemble:
             (ComponentMove(density, mixture, difference[0]), DIFFERENCE),
             (ComponentMove(density, mixture, difference[1]), JUMP),
         ]
+        self._moves_per_step = MOVES_PER_STEP if jumps is None else WITH_JUMPS
         if jumps is not None:
             moves.append((emcee.moves.MHMove(IndependentProposal(jumps, mixture.components[0])), FAR))
         whitened = mixture.components[0].whitened(places)
@@ -107,7 +108,7 @@ class Ensemble:
                 self._state,
                 steps,
                 tune=tune,
-                thin_by=MOVES_PER_STEP,
+                thin_by=self._moves_per_step,
                 skip_initial_state_check=True,
                 progress=False,
             )

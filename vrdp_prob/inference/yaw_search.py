@@ -22,11 +22,13 @@ YAWS, SPINS = 16, 6
 """Yaws over a quarter turn and spins over the prior that are tried together."""
 REACH = 2.0
 """Prior standard deviations on either side over which spins are spread."""
+AFTER = 16
+"""Frames from the first contact on that count at first; later contacts would follow only after a while."""
 FIRST_ITERATIONS, HOPELESS = 3, 40.0
 """Steps in the coordinates of the bodies that meet, and nats by which a result may be worse than the best one then."""
 THEN_ITERATIONS, NEARLY = 5, 10.0
-"""Further steps in all coordinates, and nats by which a result may be worse after them."""
-MOST_KEPT = 24, 12
+"""Further steps on all frames, and nats by which a result may be worse after them."""
+MOST_KEPT = 16, 8
 """Results that are kept after either."""
 
 
@@ -41,15 +43,15 @@ def other_yaws(likelihood: Likelihood, point: Float[np.ndarray, "dimension"]) ->
         A maximum. Every cube that meets something there, and whose yaw nobody measured, is turned by itself.
     """
     descent = Descent(likelihood, Optimiser.GAUSS_NEWTON)
-    free = ~likelihood.coordinates.mask(NOISE_FIELDS)
+    known = ~likelihood.coordinates.mask(NOISE_FIELDS)
     found: list[Minimum] = []
     for body, frame in unseen_yaws(likelihood, point):
-        local = owned(likelihood.coordinates, bodies_met(likelihood, point, body)) & free
-        first = descent(
-            turned_worlds(likelihood, point, body, frame, spins=SPINS, yaws=YAWS), local, iterations=FIRST_ITERATIONS
-        )
-        kept = different(likelihood, first, worse=HOPELESS, most=MOST_KEPT[0])
-        then = descent(np.array([one.point for one in kept]), free, iterations=THEN_ITERATIONS)
+        local = owned(likelihood.coordinates, bodies_met(likelihood, point, body)) & known
+        until = min(frame + AFTER, len(likelihood.tracks.times))
+        starts = turned_worlds(likelihood, point, body, frame, spins=SPINS, yaws=YAWS)
+        first = descent(starts, local, frame_count=until, iterations=FIRST_ITERATIONS)
+        kept = different(likelihood, first, worse=HOPELESS, most=MOST_KEPT[0], frame_count=until)
+        then = descent(np.array([one.point for one in kept]), local, iterations=THEN_ITERATIONS)
         found += different(likelihood, then, worse=NEARLY, most=MOST_KEPT[1])
     return found
 

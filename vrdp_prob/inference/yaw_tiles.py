@@ -8,12 +8,12 @@ Bayesian inference for latent Gaussian models by using integrated nested Laplace
 Society B 71 (2009), whose lattice over few parameters this is; its Gaussians are only proposals here.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 import torch
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 from scipy.special import logsumexp
 
 from vrdp_prob.inference.curved_gaussian import CurvedGaussian
@@ -28,19 +28,23 @@ from vrdp_prob.inference.plan import Optimiser
 from vrdp_prob.inference.refinement import Refined, mode_at
 from vrdp_prob.inference.samples import LogDensity, evaluate
 from vrdp_prob.inference.straightening import Rates, Straightening, straight_gaussian
-from vrdp_prob.inference.yaw_search import REACH, bodies_met, turned_worlds, unseen_yaws
+from vrdp_prob.inference.yaw_search import AFTER, REACH, bodies_met, turned_worlds, unseen_yaws
 from vrdp_prob.models.likelihood import Likelihood
 
-YAWS, SPINS = 32, 12
-"""Knots over a quarter turn, and over the prior of the spin."""
+KNOTS, FEWER_KNOTS = (32, 12), (24, 8)
+"""Knots over a quarter turn and over the prior of the spin, for one cube and for each of several."""
+MOST_CUBES = 2
+"""Where more of them are hit, tiles of one at a time reach next to nothing, and take minutes to make."""
 FIRST_ITERATIONS, HOPELESS = 4, 60.0
-"""Steps of every knot in the coordinates of the cube and what it meets, and nats by which a knot may be worse then."""
+"""Steps of every knot on the frames around the first contact, and nats by which a knot may be worse then."""
 THEN_ITERATIONS, PASSES = 6, 2
-"""Steps in all coordinates, and times that a knot sets out anew from a better neighbour."""
+"""Steps on all frames, and times that a knot sets out anew from a better neighbour."""
+LAST_ITERATIONS = 2
+"""Steps in all coordinates; those before are in what all share and what the cube and those that it meets have."""
 BETTER = 1.0
 """Nats by which a neighbour is better."""
 LEAST_EVIDENCE, MOST_TILES = 7.0, 120
-"""Tiles whose evidence is more nats below the best one's are left out, and all but so many of the best."""
+"""Tiles whose evidence is more nats below the best one's are left out, and all but so many of the best of all cubes."""
 RATE_DRAWS = 4000
 """Draws from which the shape of a tile along rates is found."""
 TRIALS, TRIAL_DRAWS = 3, 2000
@@ -77,6 +81,8 @@ def yaw_jumps(
 ) -> Jumps | None:
     """Proposals for the yaws and spins of cubes that meet something; None where every yaw is measured or idle.
 
+    Nor are there any where more than two such cubes are hit.
+
     Parameters
     ----------
     likelihood
@@ -92,22 +98,19 @@ def yaw_jumps(
     """
     clouds: list[CurvedGaussian] = []
     log_weights: list[float] = []
-    for body, frame in unseen_yaws(likelihood, point):
-        tiles = _Lattice.around(likelihood, point, body, frame).tiles()
-        if not tiles:
-            continue
-        best = max(tile.log_evidence for tile in tiles)
-        tiles = sorted((tile for tile in tiles if tile.log_evidence > best - LEAST_EVIDENCE), key=_by_evidence)
-        clouds += [_cloud(tile, rates) for tile in tiles[:MOST_TILES]]
-        evidence = np.array([tile.log_evidence for tile in tiles[:MOST_TILES]])
-        log_weights += list(evidence - logsumexp(evidence))
+    cubes = list(unseen_yaws(likelihood, point))
+    if len(cubes) > MOST_CUBES:
+        return None
+    for body, frame in cubes:
+        knots = KNOTS if len(cubes) == 1 else FEWER_KNOTS
+        tiles = _Lattice.around(likelihood, point, body, frame, knots).tiles(MOST_TILES // len(cubes))
+        evidence = np.array([tile.log_evidence for tile in tiles])
+        chosen = np.flatnonzero(evidence > evidence.max(initial=-np.inf) - LEAST_EVIDENCE)
+        clouds += [_cloud(tiles[index], rates) for index in chosen]
+        log_weights += list(evidence[chosen] - logsumexp(evidence[chosen]))
     if not clouds:
         return None
     return _corrected(Mixture.of(*clouds, log_weights=np.array(log_weights)), density, generator)
-
-
-def _by_evidence(tile: Mode) -> float:
-    return -tile.log_evidence
 
 
 def _cloud(tile: Mode, rates: Rates) -> CurvedGaussian:
@@ -137,6 +140,10 @@ class _Lattice:
         The density.
     body
         The cube.
+    frame
+        That frame.
+    knots
+        Number of yaws and of spins; a cube that rests before its first contact has one spin.
     turning
         Change of that yaw per change of the release spin (s).
     starts
@@ -147,14 +154,24 @@ class _Lattice:
 
     likelihood: Likelihood
     body: int
+    frame: int
+    knots: tuple[int, int]
     turning: float
     starts: Float[np.ndarray, "knot dimension"]
     met: frozenset[int]
 
     @classmethod
-    def around(cls, likelihood: Likelihood, point: Float[np.ndarray, "dimension"], body: int, frame: int) -> "_Lattice":
+    def around(
+        cls,
+        likelihood: Likelihood,
+        point: Float[np.ndarray, "dimension"],
+        body: int,
+        frame: int,
+        knots: tuple[int, int],
+    ) -> "_Lattice":
         """The lattice of a cube, all else as it is at a point."""
-        starts = turned_worlds(likelihood, point, body, frame, spins=SPINS, yaws=YAWS)
+        yaws, spins = knots
+        starts = turned_worlds(likelihood, point, body, frame, spins=spins, yaws=yaws)
         spin = likelihood.coordinates.places.get(("spin", body))
         turning = 0.0
         if spin is not None:
@@ -163,7 +180,7 @@ class _Lattice:
                 angles = likelihood.rollout(torch.from_numpy(ends)).trajectory[:, frame, body, 2].numpy()
             yaw = likelihood.coordinates.places["angle", body]
             turning = float(np.diff(angles - ends[:, yaw])[0] / np.diff(ends[:, spin])[0])
-        return cls(likelihood, body, turning, starts, bodies_met(likelihood, point, body))
+        return cls(likelihood, body, frame, knots, turning, starts, bodies_met(likelihood, point, body))
 
     @property
     def _held(self) -> list[int]:
@@ -171,19 +188,31 @@ class _Lattice:
         places = self.likelihood.coordinates.places
         return [places[name, self.body] for name in ("angle", "spin") if (name, self.body) in places]
 
-    def tiles(self) -> list[Mode]:
-        """A Gaussian for every knot that is not without hope."""
-        knots = self._refitted()
-        finite = [one for one in knots if one is not None and np.isfinite(one.cost)]
-        if not finite:
+    def tiles(self, most: int) -> list[Mode]:
+        """A Gaussian for every knot that is not without hope, of so many of the best."""
+        finite = sorted((one for one in self._refitted() if np.isfinite(one.cost)), key=lambda one: one.cost)
+        near = [one.point for one in finite[:most] if one.cost < finite[0].cost + 2 * LEAST_EVIDENCE]
+        if not near:
             return []
-        values = evaluate(self.likelihood.log_density, np.array([one.point for one in finite]))
+        last = self._descent(np.array(near), self._free, iterations=LAST_ITERATIONS)
+        values = evaluate(self.likelihood.log_density, np.array([one.point for one in last]))
         modes = [
             mode_at(self.likelihood, Refined(one.point, float(value), one.converged, 0))
-            for one, value in zip(finite, values, strict=True)
-            if value > values.max() - 2 * LEAST_EVIDENCE
+            for one, value in zip(last, values, strict=True)
+            if np.isfinite(value)
         ]
         return [Mode(mode.point, mode.precision + self._size, mode.log_density) for mode in modes]
+
+    @property
+    def _descent(self) -> Descent:
+        return Descent(self.likelihood, Optimiser.GAUSS_NEWTON)
+
+    @property
+    def _free(self) -> Bool[np.ndarray, "dimension"]:
+        """Coordinates that follow."""
+        free = ~self.likelihood.coordinates.mask(NOISE_FIELDS)
+        free[self._held] = False
+        return free
 
     @property
     def _size(self) -> Float[np.ndarray, "dimension dimension"]:
@@ -191,53 +220,48 @@ class _Lattice:
         coordinates = self.likelihood.coordinates
         across = np.zeros((2, len(coordinates)))
         yaw, *spin = self._held
-        across[0, [yaw, *spin]] = np.array([1.0, self.turning])[: 1 + len(spin)] / (QUARTER / YAWS)
-        across[1, spin] = (SPINS - 1) / (2 * REACH * coordinates.prior_sd[spin])
+        across[0, [yaw, *spin]] = np.array([1.0, self.turning])[: 1 + len(spin)] * self.knots[0] / QUARTER
+        across[1, spin] = (self.knots[1] - 1) / (2 * REACH * coordinates.prior_sd[spin])
         return across.T @ across
 
-    def _refitted(self) -> list[Minimum | None]:
-        """What becomes of all else at each knot; None where it is without hope."""
+    def _refitted(self) -> list[Minimum]:
+        """What becomes of all else at each knot that is not without hope."""
         coordinates = self.likelihood.coordinates
-        descent = Descent(self.likelihood, Optimiser.GAUSS_NEWTON)
         held = self._held
-        free = ~coordinates.mask(NOISE_FIELDS)
-        free[held] = False
-        first = descent(self.starts, owned(coordinates, self.met) & free, iterations=FIRST_ITERATIONS)
+        shared = np.array([entry.owner is None for entry in coordinates.entries])
+        local = (owned(coordinates, self.met) | shared) & self._free
+        until = min(self.frame + AFTER, len(self.likelihood.tracks.times))
+        first = self._descent(self.starts, local, frame_count=until, iterations=FIRST_ITERATIONS)
         best = min(one.cost for one in first)
-        hopeful = [k for k, one in enumerate(first) if one.cost < best + HOPELESS]
-        knots: list[Minimum | None] = [None] * len(first)
-        for k, one in zip(hopeful, self._refits(descent, [first[k].point for k in hopeful], free), strict=True):
-            knots[k] = one
-        for _ in range(PASSES):
-            again = list(self._from_neighbours(knots))
-            points = []
-            for k, neighbour in again:
+        setting_out = [(k, one.point) for k, one in enumerate(first) if one.cost < best + HOPELESS]
+        knots: dict[int, Minimum] = {}
+        for _ in range(1 + PASSES):
+            if not setting_out:
+                break
+            points = np.array([point for _, point in setting_out])
+            for (k, _), one in zip(setting_out, self._descent(points, local, iterations=THEN_ITERATIONS), strict=True):
+                if k not in knots or one.cost < knots[k].cost:
+                    knots[k] = one
+            setting_out = []
+            for k, neighbour in self._from_neighbours(knots):
                 point = neighbour.point.copy()
                 point[held] = self.starts[k][held]
-                points.append(point)
-            for (k, _neighbour), one in zip(again, self._refits(descent, points, free), strict=True):
-                present = knots[k]
-                if present is None or one.cost < present.cost:
-                    knots[k] = one
-        return knots
+                setting_out.append((k, point))
+        return list(knots.values())
 
-    @staticmethod
-    def _refits(descent: Descent, points: list[np.ndarray], free: np.ndarray) -> list[Minimum]:
-        return descent(np.array(points), free, iterations=THEN_ITERATIONS) if points else []
-
-    @staticmethod
-    def _from_neighbours(knots: list[Minimum | None]) -> Iterator[tuple[int, Minimum]]:
+    def _from_neighbours(self, knots: Mapping[int, Minimum]) -> Iterator[tuple[int, Minimum]]:
         """Knots with a much better neighbour, and that neighbour; the lattice closes along the yaw."""
-        costs = np.array([np.inf if one is None else one.cost for one in knots]).reshape(-1, YAWS)
+        yaws = self.knots[0]
+        costs = np.full((len(self.starts) // yaws, yaws), np.inf)
+        for k, one in knots.items():
+            costs.flat[k] = one.cost
         for row, column in np.ndindex(costs.shape):
             around = [
-                ((row + down) * YAWS + (column + right) % YAWS)
+                ((row + down) * yaws + (column + right) % yaws)
                 for down in (-1, 0, 1)
                 for right in (-1, 0, 1)
                 if (down or right) and 0 <= row + down < len(costs)
             ]
             best = min(around, key=lambda k: costs.flat[k])
-            neighbour = knots[best]
-            near = costs.flat[best] < min(costs[row, column] - BETTER, costs.min() + 2 * LEAST_EVIDENCE)
-            if neighbour is not None and near:
-                yield row * YAWS + column, neighbour
+            if costs.flat[best] < min(costs[row, column] - BETTER, costs.min() + 2 * LEAST_EVIDENCE):
+                yield row * yaws + column, knots[best]

@@ -9,8 +9,9 @@ from _clock import processor_seconds
 from arviz_stats.base.array import array_stats
 
 from tests.inference.prior_scenes import prior_scene
-from vrdp_prob.inference import SAMPLERS, default_model
+from vrdp_prob.inference import default_model
 from vrdp_prob.inference.diagnostics import Reported
+from vrdp_prob.inference.infer import sampled
 from vrdp_prob.inference.map_fit import MapFit, fit_map
 from vrdp_prob.inference.mixture import Mixture
 from vrdp_prob.inference.proposals import proposals
@@ -61,16 +62,13 @@ def agreement(scenes: int, names: Sequence[str]) -> Iterator[SceneAgreement]:
     accepted = ((seed, scene) for seed in count() if (scene := prior_scene(seed)) is not None)
     for seed, scene in islice(accepted, scenes):
         fit = fit_map(scene.tracks, default_model(), np.random.default_rng(seed))
-        reported, start = (
-            Reported.of(fit.likelihood.coordinates, fit.contacts, fit.likelihood.tracks.bodies),
-            start_of(fit),
-        )
+        reported = Reported.of(fit.likelihood.coordinates, fit.contacts, fit.likelihood.tracks.bodies)
         moments, verdicts, seconds = {}, {}, {}
         for name in names:
             begin = processor_seconds()
-            samples = SAMPLERS[name](
-                fit.likelihood.log_density,
-                start,
+            samples = sampled(
+                fit,
+                name,
                 draws=DRAWS[name],
                 generator=np.random.default_rng([seed, SEEDS[name]]),
                 reported=reported,

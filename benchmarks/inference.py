@@ -30,6 +30,7 @@ from tests.inference.generator import observe, random_scene
 from vrdp_prob.datasets import load_all
 from vrdp_prob.inference import SAMPLERS, default_model
 from vrdp_prob.inference.diagnostics import Reported
+from vrdp_prob.inference.infer import sampled
 from vrdp_prob.inference.map_fit import fit_map
 from vrdp_prob.inference.nuts_chain import Task, make
 from vrdp_prob.inference.samples import ESS_GOAL, assess
@@ -86,13 +87,7 @@ def samplers(videos: Sequence[Tracks], names: Sequence[str]) -> list[Check]:
         reported = Reported.of(fit.likelihood.coordinates, fit.contacts, fit.likelihood.tracks.bodies)
         for key in names:
             begin = processor_seconds()
-            samples = SAMPLERS[key](
-                fit.likelihood.log_density,
-                start_of(fit),
-                draws=DRAWS,
-                generator=np.random.default_rng(1),
-                reported=reported,
-            )
+            samples = sampled(fit, key, draws=DRAWS, generator=np.random.default_rng(1), reported=reported)
             seconds = processor_seconds() - begin
             convergence = assess(key, samples, reported)
             bulk, tail = convergence.ess_bulk or 0.0, convergence.ess_tail or 0.0

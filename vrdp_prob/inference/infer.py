@@ -12,7 +12,7 @@ from vrdp_prob.inference.checkpoint import Checkpoint, fingerprint
 from vrdp_prob.inference.diagnostics import Reported
 from vrdp_prob.inference.emcee_sampler import sample_emcee
 from vrdp_prob.inference.laplace import sample_laplace
-from vrdp_prob.inference.map_fit import fit_map
+from vrdp_prob.inference.map_fit import MapFit, fit_map
 from vrdp_prob.inference.nuts_sampler import sample_nuts
 from vrdp_prob.inference.posterior import Posterior
 from vrdp_prob.inference.proposals import proposals
@@ -31,8 +31,6 @@ SAMPLERS: Mapping[str, Callable[..., Samples]] = {
     "laplace": sample_laplace,
 }
 """The samplers by name; all take the log density and what its modes propose."""
-JUMPING = frozenset({"emcee", "laplace"})
-"""Samplers that can use proposals beyond the modes."""
 OPTIONS = {
     "sampler": tuple(SAMPLERS),
     "noise": ("auto", *NoiseFamily),
@@ -121,19 +119,15 @@ def infer(
     if motion == "fixed":
         fit = fit.given_motion()
     reported = Reported.of(fit.likelihood.coordinates, fit.contacts, tracks.bodies)
-    likelihood, rates = fit.likelihood, Rates.of(tracks, fit.likelihood.coordinates)
-    options: dict[str, Any] = {"hand_on": hand_on} if sampler == "laplace" else {}
-    if sampler in JUMPING:
-        options["jumps"] = yaw_jumps(likelihood, fit.point, rates, likelihood.log_density, generator)
-    samples = SAMPLERS[sampler](
-        likelihood.log_density,
-        proposals(fit.modes, likelihood.residuals, rates),
+    samples = sampled(
+        fit,
+        sampler,
         draws=draws,
         generator=generator,
         progress=progress,
         checkpoint=kept,
         reported=reported,
-        **options,
+        **({"hand_on": hand_on} if sampler == "laplace" else {}),
     )
     convergence = assess(sampler, samples, reported)
     return posterior_from(
@@ -144,6 +138,26 @@ def infer(
         generator=generator,
         draw_defaults=defaults == "prior",
     )
+
+
+def sampled(fit: MapFit, sampler: str, *, generator: np.random.Generator, **options: Any) -> Samples:
+    """Draws of a sampler that sets out from what a fit has found.
+
+    Parameters
+    ----------
+    fit
+        The fit.
+    sampler
+        Name of the sampler.
+    generator
+        Source of randomness.
+    options
+        What else the sampler takes.
+    """
+    likelihood, rates = fit.likelihood, Rates.of(fit.likelihood.tracks, fit.likelihood.coordinates)
+    start = proposals(fit.modes, likelihood.residuals, rates)
+    jumps = yaw_jumps(likelihood, fit.point, rates, likelihood.log_density, generator)
+    return SAMPLERS[sampler](likelihood.log_density, start, generator=generator, jumps=jumps, **options)
 
 
 def _given(value: object) -> str:

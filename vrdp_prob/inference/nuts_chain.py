@@ -15,12 +15,15 @@ from pyro.infer.mcmc import NUTS
 from torch import Tensor
 
 from vrdp_prob.inference.curved_gaussian import CurvedGaussian
+from vrdp_prob.inference.mixture import Mixture
 from vrdp_prob.inference.nuts_lockstep import Ask, in_lockstep
 from vrdp_prob.inference.samples import LogDensity, evaluate_with_gradient
 from vrdp_prob.models.simulator.work import metered
 
 TREE_DEPTH = 6
 ACCEPTANCE = 0.85
+TRIES = 4
+"""Jumps that are tried before every transition."""
 OUT_OF_SUPPORT = 1e10
 """Potential where a world has no support; finite, because Pyro compares energies."""
 
@@ -43,6 +46,8 @@ class Task:
         How many there are to be.
     seeds
         Seed of each chain's piece.
+    jumps
+        Proposals that reach what trajectories do not, tried before every transition; None for none.
     """
 
     density: LogDensity
@@ -51,6 +56,7 @@ class Task:
     step_sizes: Float[np.ndarray, "chain"] | None
     transitions: int
     seeds: tuple[int, ...]
+    jumps: Mixture | None = None
 
 
 @dataclass(frozen=True)
@@ -102,7 +108,10 @@ def make(task: Task) -> Piece:
         return evaluate_with_gradient(lambda places: task.density(task.cloud.mapped(places)), whitened)
 
     sizes = [None] * len(task.places) if task.step_sizes is None else [float(size) for size in task.step_sizes]
-    functions = [partial(_run, place, size, task.transitions) for place, size in zip(task.places, sizes, strict=True)]
+    functions = [
+        partial(_run, place, size, task.transitions, _Jumping.of(task, seed))
+        for place, size, seed in zip(task.places, sizes, task.seeds, strict=True)
+    ]
     with warnings.catch_warnings(), metered() as meter:
         warnings.simplefilter("ignore")
         made = in_lockstep(functions, task.seeds, density_and_gradient)
@@ -110,8 +119,48 @@ def make(task: Task) -> Piece:
     return Piece(np.stack(whitened), np.array(found), sum(diverged), gradients, meter.rows)
 
 
+@dataclass(frozen=True)
+class _Jumping:
+    """Metropolis steps whose proposals forget the place.
+
+    Parameters
+    ----------
+    mixture
+        Where proposals come from.
+    cloud
+        Whitens the chain's coordinates.
+    generator
+        Source of the proposals.
+    """
+
+    mixture: Mixture
+    cloud: CurvedGaussian
+    generator: np.random.Generator
+
+    @classmethod
+    def of(cls, task: Task, seed: int) -> "_Jumping | None":
+        """Those of a chain; None where its task has no jumps."""
+        return None if task.jumps is None else cls(task.jumps, task.cloud, np.random.default_rng([seed, 1]))
+
+    def __call__(self, place: Float[np.ndarray, "dimension"], ask: Ask) -> Float[np.ndarray, "dimension"] | None:
+        """Another place; None where none was accepted."""
+        points, _ = self.mixture.draws(TRIES, self.generator)
+        proposed = self.cloud.whitened(points)
+        ways = self.mixture.log_density(np.concatenate([self.cloud.points(place[None]), points]))
+        value, found, here = ask(place)[0], None, 0
+        for number, whitened in enumerate(proposed, start=1):
+            there, _ = ask(whitened)
+            if np.log(self.generator.random()) < there - value + ways[here] - ways[number]:
+                value, found, here = there, whitened, number
+        return found
+
+
 def _run(
-    place: Float[np.ndarray, "dimension"], step_size: float | None, transitions: int, ask: Ask
+    place: Float[np.ndarray, "dimension"],
+    step_size: float | None,
+    transitions: int,
+    jumping: _Jumping | None,
+    ask: Ask,
 ) -> tuple[Float[np.ndarray, "draw dimension"], float, int]:
     """Places, step size and number of divergences of one chain."""
     finding = step_size is None
@@ -137,6 +186,10 @@ def _run(
     kernel.setup(warmup_steps=transitions if finding else 0)
     places = []
     for _ in range(transitions):
+        found = None if jumping is None else jumping(parameters["whitened"].detach().numpy(), ask)
+        if found is not None:
+            parameters = {"whitened": torch.from_numpy(found.copy())}
+            kernel.clear_cache()
         parameters = kernel.sample(parameters)
         places.append(parameters["whitened"].detach().numpy().copy())
     diverged = 0 if finding else len(kernel.diagnostics()["divergences"])

@@ -16,7 +16,7 @@ from vrdp_prob.inference.curved_gaussian import CurvedGaussian
 from vrdp_prob.inference.diagnostics import Reported, chain_statistics, drift, joined
 from vrdp_prob.inference.importance import Weighted, smoothed_weights
 from vrdp_prob.inference.mixture import Mixture
-from vrdp_prob.inference.mode_weights import doubts, weights_from_importance
+from vrdp_prob.inference.mode_weights import doubts, weights_from_chains, weights_from_importance
 from vrdp_prob.inference.nuts_chain import Piece, Task
 from vrdp_prob.inference.nuts_worker import Workers, workers
 from vrdp_prob.inference.samples import (
@@ -29,6 +29,7 @@ from vrdp_prob.inference.samples import (
     evaluate,
 )
 from vrdp_prob.inference.shaping import Shaped, shaped, starting_places
+from vrdp_prob.inference.yaw_tiles import Jumps
 from vrdp_prob.models.simulator.work import metered
 from vrdp_prob.progress import Advance, ProgressDisplay, SilentProgress
 
@@ -70,6 +71,7 @@ def sample_nuts(
     most_gradients: int = MOST_GRADIENTS,
     work_limit: int = WORK_LIMIT,
     processes: int | None = None,
+    jumps: Jumps | None = None,
 ) -> Samples:
     """Draw with several NUTS chains in every mode.
 
@@ -95,6 +97,9 @@ def sample_nuts(
         Gradients and work of all chains after which sampling stops even if it has not converged.
     processes
         How many processes to use; as many as there are cores, at most 2, where None. The draws do not depend on it.
+    jumps
+        Proposals that reach what lies beyond the clouds, and places there. Chains that make them are all in the
+        coordinates of the heaviest cloud, and go to and fro between the modes by themselves.
 
     Returns
     -------
@@ -103,11 +108,14 @@ def sample_nuts(
     """
     with metered() as meter:
         form, places = _kept_start(density, start, generator, checkpoint)
-        modes, doubtful = _kept_weights(density, form.mixture, generator, checkpoint)
+        if jumps is not None:
+            places = jumps.places[generator.choice(len(jumps.places), size=(1, CHAINS))]
+        modes, doubtful = ((), ()) if jumps else _kept_weights(density, form.mixture, generator, checkpoint)
     seed = int(generator.integers(2**31))
     inhabited = [index for index in range(len(places)) if len(places) == 1 or modes[index].weight >= HARDLY_ANY]
+    far = None if jumps is None else jumps.mixture
     groups = [
-        _Group(form.mixture.components[mode], mode, number, places[mode, number * TOGETHER :][:TOGETHER], seed)
+        _Group(form.mixture.components[mode], mode, number, places[mode, number * TOGETHER :][:TOGETHER], seed, far)
         for mode in inhabited
         for number in range(GROUPS)
     ]
@@ -132,6 +140,9 @@ def sample_nuts(
                 )
                 break
     evaluations = form.evaluations + (EVIDENCE_DRAWS if len(places) > 1 else 0)
+    if jumps is not None:
+        modes = weights_from_chains(form.mixture, joined(chains))
+        doubtful = doubts(modes)
     return Samples(
         joined(chains),
         np.stack([evaluate(density, chain) for chain in joined(chains)]),
@@ -160,6 +171,7 @@ class _Group:
     number: int
     places: Float[np.ndarray, "chain dimension"]
     seed: int
+    jumps: Mixture | None = None
     pieces: list[Piece] = field(default_factory=list)
 
     @property
@@ -173,7 +185,7 @@ class _Group:
         own = np.random.SeedSequence([self.seed, self.mode, self.number, len(self.pieces)])
         seeds = tuple(int(one) for one in own.generate_state(len(places)))
         sizes = None if adapt else np.full(len(places), np.median(self.pieces[-1].step_sizes))
-        return Task(density, self.cloud, places, sizes, transitions, seeds)
+        return Task(density, self.cloud, places, sizes, transitions, seeds, self.jumps)
 
     @property
     def points(self) -> Float[np.ndarray, "chain draw dimension"]:

@@ -65,7 +65,9 @@ def causes_of_lost_videos(
 
     def searched(video: int, model: PhysicsModel) -> MapFit:
         tracks = fit.fits[video].clues.tracks
-        return fit_map(tracks, model, stream(seed, tracks.video), plan=FitPlan(attempts=1), model_error=False)
+        return fit_map(
+            tracks, model, stream(seed, tracks.video), plan=FitPlan(attempts=1, yaws=False), model_error=False
+        )
 
     def tried(video: int, effects: Sequence[Effect]) -> list[tuple[Effect, MapFit]]:
         """Searches with causes, until one of them explains the video."""

@@ -167,7 +167,7 @@ def fit_map(
         likelihood = widened
         evaluations += sum(one.evaluations for one in found)
         misfit = misfit.with_error(error, likelihood.observations.position_reference)
-    if stages.alternatives:
+    if stages.alternatives and stages.yaws:
         turned = other_yaws(likelihood, found[0].point)
         elsewhere = _refined(likelihood, [one.point for one in turned], likelihood, stages)
         evaluations += sum(one.evaluations for one in turned) + sum(one.evaluations for one in elsewhere)

@@ -35,6 +35,9 @@ class FitPlan:
         contacts, fits grown anew where there was doubt. Without them there is one start and one mode.
     attempts
         Times that a fit is grown anew at most, where the first met several open yaws at once or is not plausible.
+    yaws
+        Whether, beside alternatives, other yaws and spins are looked for of cubes whose yaw nobody measured. Under a
+        model that lacks something a wrong yaw may take its place.
     """
 
     optimiser: Optimiser = Optimiser.GAUSS_NEWTON
@@ -42,6 +45,7 @@ class FitPlan:
     windows: int | tuple[int, ...] = 8
     alternatives: bool = True
     attempts: int = 3
+    yaws: bool = True
 
     def ends(self, tracks: Tracks) -> list[int]:
         """Frame counts of the windows, the whole video last."""

@@ -219,7 +219,7 @@ def fit_together(
     check_videos(videos)
     if shared is not None:
         check_names(shared, model)
-    plan = FitPlan() if model_error else FitPlan(attempts=1)
+    plan = FitPlan() if model_error else FitPlan(attempts=1, yaws=False)
     with (progress or SilentProgress()).stage("Fitting each video (MAP)", total=len(videos)) as advance:
 
         def fit(tracks: Tracks) -> MapFit:

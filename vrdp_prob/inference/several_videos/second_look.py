@@ -99,7 +99,7 @@ def look_again(
         best, goal = fits[index], WORSE * np.median([one.misfit.residual_sd for one in fits])
         for look in range(looks):
             generator = stream(seed, f"{best.clues.tracks.video} {look}")
-            found = fit_map(best.clues.tracks, told, generator, plan=FitPlan(attempts=1), model_error=False)
+            found = fit_map(best.clues.tracks, told, generator, plan=FitPlan(attempts=1, yaws=False), model_error=False)
             gained = best.misfit.residual_sd / found.misfit.residual_sd - 1
             if gained > SAME:
                 likelihood = plain_likelihood(found.clues, model, structure_of(found.likelihood.coordinates))

@@ -9,10 +9,9 @@ from tests.inference.densities import FAR, Hopeless, TwoModes
 from vrdp_prob.inference import laplace
 from vrdp_prob.inference.emcee_sampler import sample_emcee
 from vrdp_prob.inference.laplace import sample_laplace
-from vrdp_prob.inference.mixture import Mixture
+from vrdp_prob.inference.mixture import Jumps, Mixture
 from vrdp_prob.inference.nuts_sampler import sample_nuts
 from vrdp_prob.inference.samples import PARETO_K_GOAL, assess
-from vrdp_prob.inference.yaw_tiles import Jumps
 
 SAMPLERS = {"emcee": sample_emcee, "nuts": sample_nuts, "laplace": sample_laplace}
 

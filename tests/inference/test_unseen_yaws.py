@@ -9,9 +9,10 @@ from tests.inference.scene_ranks import ranks
 from vrdp_prob.inference import default_model, infer
 from vrdp_prob.inference.hypothesis import QUARTER
 from vrdp_prob.inference.map_fit import MapFit, fit_map
+from vrdp_prob.inference.mixture import Jumps
 from vrdp_prob.inference.straightening import Rates
 from vrdp_prob.inference.yaw_search import turned_worlds, unseen_yaws
-from vrdp_prob.inference.yaw_tiles import Jumps, yaw_jumps
+from vrdp_prob.inference.yaw_tiles import yaw_jumps
 
 ONE_CUBE = 2689
 """Seed of a scene in which a cylinder hits a turning cube."""
@@ -38,7 +39,7 @@ def one_cube() -> MapFit:
 
 def jumps_of(fit: MapFit) -> Jumps | None:
     rates = Rates.of(fit.likelihood.tracks, fit.likelihood.coordinates)
-    return yaw_jumps(fit.likelihood, fit.point, rates, fit.likelihood.log_density, np.random.default_rng(0))
+    return yaw_jumps(fit.likelihood, fit.point, rates, np.random.default_rng(0))
 
 
 def test_yaws_are_spread_evenly_where_the_cube_is_hit(one_cube: MapFit) -> None:

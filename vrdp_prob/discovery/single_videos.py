@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from vrdp_prob.discovery.scores import happens_once
 from vrdp_prob.inference.map_fit import MapFit, fit_map
 from vrdp_prob.inference.parallel import in_parallel
-from vrdp_prob.inference.plan import FitPlan
+from vrdp_prob.inference.plan import IN_DOUBT
 from vrdp_prob.inference.several_videos.fitting import SharedFit
 from vrdp_prob.inference.several_videos.parts import stream
 from vrdp_prob.inference.several_videos.second_look import may_take_another_course
@@ -65,9 +65,7 @@ def causes_of_lost_videos(
 
     def searched(video: int, model: PhysicsModel) -> MapFit:
         tracks = fit.fits[video].clues.tracks
-        return fit_map(
-            tracks, model, stream(seed, tracks.video), plan=FitPlan(attempts=1, yaws=False), model_error=False
-        )
+        return fit_map(tracks, model, stream(seed, tracks.video), plan=IN_DOUBT, model_error=False)
 
     def tried(video: int, effects: Sequence[Effect]) -> list[tuple[Effect, MapFit]]:
         """Searches with causes, until one of them explains the video."""

@@ -15,7 +15,7 @@ from jaxtyping import Bool, Float
 from vrdp_prob.inference.descent import Descent
 from vrdp_prob.inference.events import Pairs, courses
 from vrdp_prob.inference.free_flight import SeenContact
-from vrdp_prob.inference.hypothesis import QUARTER, Hypothesis, different, owned, yaw_places
+from vrdp_prob.inference.hypothesis import QUARTER, Hypothesis, different, least_turn, owned, yaw_places
 from vrdp_prob.inference.least_squares import Minimum, robust_cost
 from vrdp_prob.inference.release_contact import strike_before
 from vrdp_prob.inference.samples import Gaussian
@@ -207,4 +207,4 @@ def _other_courses(found: Sequence[Pairs]) -> list[int]:
 
 def _apart(first: Float[np.ndarray, "dimension"], second: Float[np.ndarray, "dimension"], yaws: Sequence[int]) -> bool:
     turn = first[list(yaws)] - second[list(yaws)]
-    return bool((np.abs(turn - QUARTER * np.round(turn / QUARTER)) > DIFFERENT).any())
+    return bool((np.abs(least_turn(turn)) > DIFFERENT).any())

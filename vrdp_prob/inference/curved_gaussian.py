@@ -127,14 +127,12 @@ class CurvedGaussian:
 
     def whitened(self, points: Float[np.ndarray, "*batch dimension"]) -> Float[np.ndarray, "*batch dimension"]:
         """The inverse of `points`; bends leave the coordinates along their axes alone, so these can be read off."""
-        if self.straightening is not None:
-            points = self.straightening.straightened(torch.from_numpy(np.ascontiguousarray(points))).numpy()
-        centred = np.moveaxis(points - self.gaussian.mean, -1, 0)
-        bent = solve_triangular(self.gaussian.root, centred.reshape(self.dimension, -1), lower=True)
-        along = self.axes.numpy().T @ bent
-        places = bent - np.einsum("an,bn,abk->kn", along, along, self.bend.numpy()) / 2
-        whitened = solve_triangular(self.scale.numpy(), places - self.shift.numpy()[:, None], lower=True)
-        return np.ascontiguousarray(np.moveaxis(whitened.reshape(centred.shape), 0, -1))
+        flat = np.ascontiguousarray(points).reshape(-1, self.dimension)
+        return self._inverse.whitened(flat)[0].reshape(points.shape)
+
+    @cached_property
+    def _inverse(self) -> "SeveralClouds":
+        return SeveralClouds((self,))
 
     def moved(
         self, shift: Float[np.ndarray, "dimension"], covariance: Float[np.ndarray, "dimension dimension"]
@@ -171,16 +169,15 @@ class SeveralClouds:
             self._bend[index, :own, :own] = cloud.bend.numpy()
         self._straightenings = [cloud.straightening for cloud in clouds]
 
-    def squares(self, points: Float[np.ndarray, "point dimension"]) -> Float[np.ndarray, "component point"]:
-        """Squared distance of points from the middle of each cloud, in its standard normal coordinates."""
+    def whitened(self, points: Float[np.ndarray, "point dimension"]) -> Float[np.ndarray, "component point dimension"]:
+        """Standard normal coordinates of points in each cloud."""
         straight = all_straightened(self._straightenings, points)
         bent = np.matmul(straight - self._mean[:, None], np.swapaxes(self._unroot, 1, 2))
         if self._axes.shape[2]:
             along = np.matmul(bent, self._axes)
             products = (along[..., :, None] * along[..., None, :]).reshape(*along.shape[:2], -1)
             bent = bent - np.matmul(products, self._bend.reshape(len(bent), -1, bent.shape[2])) / 2
-        whitened = np.matmul(bent - self._shift[:, None], np.swapaxes(self._unscale, 1, 2))
-        return np.asarray((whitened**2).sum(axis=2))
+        return np.asarray(np.matmul(bent - self._shift[:, None], np.swapaxes(self._unscale, 1, 2)))
 
 
 def _bends(straight: CurvedGaussian, residuals: Residuals) -> Float[np.ndarray, "dimension dimension dimension"]:

@@ -19,11 +19,10 @@ from jaxtyping import Float
 from vrdp_prob.inference.checkpoint import Checkpoint, kept
 from vrdp_prob.inference.diagnostics import Reported, chain_statistics, drift, joined
 from vrdp_prob.inference.emcee_ensemble import Ensemble
-from vrdp_prob.inference.mixture import Mixture
+from vrdp_prob.inference.mixture import Jumps, Mixture
 from vrdp_prob.inference.mode_weights import doubts, weights_from_chains
 from vrdp_prob.inference.samples import ESS_GOAL, R_HAT_GOAL, LogDensity, Samples
 from vrdp_prob.inference.shaping import Shaped, shaped, starting_places
-from vrdp_prob.inference.yaw_tiles import Jumps
 from vrdp_prob.models.simulator.work import metered, work_sentence
 from vrdp_prob.progress import Advance, ProgressDisplay, SilentProgress
 
@@ -169,7 +168,7 @@ def _places(
     """Places for walkers to set out from: those that jumps know, where there are any."""
     if jumps is None:
         return starting_places(density, form, count, generator)
-    return jumps.places[generator.choice(len(jumps.places), size=count)]
+    return jumps.starts(count, generator)
 
 
 def _kept_form(

@@ -67,12 +67,17 @@ def yaw_places(likelihood: Likelihood, bodies: Iterable[int] | None = None) -> l
     return [place for place in places if place is not None]
 
 
+def least_turn(angles: Float[np.ndarray, "*angle"]) -> Float[np.ndarray, "*angle"]:
+    """Turns that a square cannot tell from some angles (rad), by at most an eighth of a turn."""
+    return angles - QUARTER * np.round(angles / QUARTER)
+
+
 def turned_least(
     points: Float[np.ndarray, "*point dimension"], places: Sequence[int]
 ) -> Float[np.ndarray, "*point dimension"]:
     """The same worlds with the yaws at some places within an eighth of a turn from zero."""
     result = points.copy()
-    result[..., places] -= QUARTER * np.round(result[..., places] / QUARTER)
+    result[..., places] = least_turn(result[..., places])
     return result
 
 
@@ -108,7 +113,7 @@ def distances(
         body = coordinates.entries[place].owner or 0
         angle = turned[:, before[body], body]
         change[place, slopes] = (angle[1 : len(slopes) + 1] - angle[0]) / SLOPE_STEP
-        difference[:, place] = turned_least(angle[len(slopes) + 1 :, None] - angle[0], [0])[:, 0]
+        difference[:, place] = least_turn(angle[len(slopes) + 1 :] - angle[0])
     straight = np.linalg.inv(change)
     metric = straight.T @ precision @ straight
     return np.sqrt(np.maximum(np.einsum("ij,jk,ik->i", difference, metric, difference), 0.0))

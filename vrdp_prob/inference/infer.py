@@ -156,7 +156,7 @@ def sampled(fit: MapFit, sampler: str, *, generator: np.random.Generator, **opti
     """
     likelihood, rates = fit.likelihood, Rates.of(fit.likelihood.tracks, fit.likelihood.coordinates)
     start = proposals(fit.modes, likelihood.residuals, rates)
-    jumps = yaw_jumps(likelihood, fit.point, rates, likelihood.log_density, generator)
+    jumps = yaw_jumps(likelihood, fit.point, rates, generator)
     return SAMPLERS[sampler](likelihood.log_density, start, generator=generator, jumps=jumps, **options)
 
 

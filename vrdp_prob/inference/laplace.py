@@ -11,11 +11,10 @@ from vrdp_prob.inference.checkpoint import Checkpoint
 from vrdp_prob.inference.diagnostics import Reported, weighted_statistics
 from vrdp_prob.inference.emcee_sampler import sample_emcee
 from vrdp_prob.inference.importance import Weighted, effective_count, flattened, resampled, smoothed_weights
-from vrdp_prob.inference.mixture import Mixture
+from vrdp_prob.inference.mixture import Jumps, Mixture
 from vrdp_prob.inference.mode_weights import doubts, weights_from_importance
 from vrdp_prob.inference.samples import ESS_GOAL, PARETO_K_GOAL, LogDensity, Samples
 from vrdp_prob.inference.shaping import shaped
-from vrdp_prob.inference.yaw_tiles import Jumps
 from vrdp_prob.models.simulator.work import metered
 from vrdp_prob.progress import ProgressDisplay, SilentProgress
 

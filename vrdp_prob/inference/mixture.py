@@ -63,7 +63,7 @@ class Mixture:
         dimension, freedom = self.dimension, DEGREES_OF_FREEDOM
         constant = gammaln((freedom + dimension) / 2) - gammaln(freedom / 2) - dimension / 2 * np.log(freedom * np.pi)
         volumes = np.array([component.log_volume for component in self.components])
-        squares = self._clouds.squares(points)
+        squares = (self._clouds.whitened(points) ** 2).sum(axis=2)
         return np.asarray(constant - volumes[:, None] - (freedom + dimension) / 2 * np.log1p(squares / freedom))
 
     @cached_property
@@ -90,6 +90,26 @@ class Mixture:
         for index, component in enumerate(self.components):
             points[chosen == index] = component.points(whitened[chosen == index])
         return points, chosen
+
+
+@dataclass(frozen=True)
+class Jumps:
+    """Proposals that reach what lies beyond the clouds around the modes, and places there.
+
+    Parameters
+    ----------
+    mixture
+        What proposes.
+    places
+        Points in proportion to the posterior, as far as weighted draws tell.
+    """
+
+    mixture: Mixture
+    places: Float[np.ndarray, "place dimension"]
+
+    def starts(self, count: int, generator: np.random.Generator) -> Float[np.ndarray, "count dimension"]:
+        """Places for chains to set out from."""
+        return self.places[generator.choice(len(self.places), size=count)]
 
 
 def _student_t(count: int, dimension: int, random: Random) -> Float[np.ndarray, "point dimension"]:

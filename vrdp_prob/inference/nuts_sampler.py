@@ -15,7 +15,7 @@ from vrdp_prob.inference.checkpoint import Checkpoint, kept
 from vrdp_prob.inference.curved_gaussian import CurvedGaussian
 from vrdp_prob.inference.diagnostics import Reported, chain_statistics, drift, joined
 from vrdp_prob.inference.importance import Weighted, smoothed_weights
-from vrdp_prob.inference.mixture import Mixture
+from vrdp_prob.inference.mixture import Jumps, Mixture
 from vrdp_prob.inference.mode_weights import doubts, weights_from_chains, weights_from_importance
 from vrdp_prob.inference.nuts_chain import Piece, Task
 from vrdp_prob.inference.nuts_worker import Workers, workers
@@ -29,7 +29,6 @@ from vrdp_prob.inference.samples import (
     evaluate,
 )
 from vrdp_prob.inference.shaping import Shaped, shaped, starting_places
-from vrdp_prob.inference.yaw_tiles import Jumps
 from vrdp_prob.models.simulator.work import metered
 from vrdp_prob.progress import Advance, ProgressDisplay, SilentProgress
 
@@ -109,7 +108,7 @@ def sample_nuts(
     with metered() as meter:
         form, places = _kept_start(density, start, generator, checkpoint)
         if jumps is not None:
-            places = jumps.places[generator.choice(len(jumps.places), size=(1, CHAINS))]
+            places = jumps.starts(CHAINS, generator)[None]
         modes, doubtful = ((), ()) if jumps else _kept_weights(density, form.mixture, generator, checkpoint)
     seed = int(generator.integers(2**31))
     inhabited = [index for index in range(len(places)) if len(places) == 1 or modes[index].weight >= HARDLY_ANY]

@@ -132,22 +132,18 @@ class Straightening:
 
     def bent(self, points: Float[Tensor, "*batch dimension"]) -> Float[Tensor, "*batch dimension"]:
         """Points of the posterior that belong to points beside straight ridges; differentiable."""
-        return points + self._shift(points)
-
-    def straightened(self, points: Float[Tensor, "*batch dimension"]) -> Float[Tensor, "*batch dimension"]:
-        """The inverse of `bent`: the shift depends on the rates alone, which it leaves as they are."""
-        return points - self._shift(points)
-
-    def _shift(self, points: Float[Tensor, "*batch dimension"]) -> Float[Tensor, "*batch dimension"]:
         change = (points - self.centre) @ self.directions.T
         inside = change.clamp(max=LARGEST)
-        return (torch.expm1(inside) - inside) @ self.displacement
+        return points + (torch.expm1(inside) - inside) @ self.displacement
 
 
 def all_straightened(
     shears: Sequence[Straightening | None], points: Float[np.ndarray, "point dimension"]
 ) -> Float[np.ndarray, "shear point dimension"]:
-    """Points straightened by each of several shears along the same rates; None leaves them as they are."""
+    """Points straightened by each of several shears along the same rates; None leaves them as they are.
+
+    This is the inverse of `bent`: the shift depends on the rates alone, which it leaves as they are.
+    """
     straight = np.tile(points, (len(shears), 1, 1))
     known = [(index, shear) for index, shear in enumerate(shears) if shear is not None]
     if not known:

@@ -12,7 +12,7 @@ from jaxtyping import Float
 
 from vrdp_prob.inference.descent import Descent
 from vrdp_prob.inference.events import first_contacts
-from vrdp_prob.inference.hypothesis import QUARTER, different, frames_before_contact, owned, yaw_places
+from vrdp_prob.inference.hypothesis import QUARTER, different, frames_before_contact, least_turn, owned, yaw_places
 from vrdp_prob.inference.least_squares import Minimum
 from vrdp_prob.inference.noise_fit import NOISE_FIELDS
 from vrdp_prob.inference.plan import Optimiser
@@ -91,5 +91,5 @@ def turned_worlds(
         angles = likelihood.rollout(torch.from_numpy(spinning)).trajectory[:, frame, body, 2].numpy()
     starts = np.repeat(spinning, yaws, axis=0)
     turn = np.tile((np.arange(yaws) + 0.5) / yaws * QUARTER, len(spinning)) - np.repeat(angles, yaws)
-    starts[:, yaw] += turn - QUARTER * np.round(turn / QUARTER)
+    starts[:, yaw] += least_turn(turn)
     return starts

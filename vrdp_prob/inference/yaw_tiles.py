@@ -21,7 +21,7 @@ from vrdp_prob.inference.descent import Descent
 from vrdp_prob.inference.hypothesis import QUARTER, owned
 from vrdp_prob.inference.importance import Weighted, flattened, resampled
 from vrdp_prob.inference.least_squares import Minimum
-from vrdp_prob.inference.mixture import Mixture
+from vrdp_prob.inference.mixture import Jumps, Mixture
 from vrdp_prob.inference.mode import Mode
 from vrdp_prob.inference.noise_fit import NOISE_FIELDS
 from vrdp_prob.inference.plan import Optimiser
@@ -56,27 +56,10 @@ EFFECTIVE = 60.0
 PLACES = 400
 
 
-@dataclass(frozen=True)
-class Jumps:
-    """Proposals that reach every island, and places on them.
-
-    Parameters
-    ----------
-    mixture
-        The tiles.
-    places
-        Points in proportion to the posterior, as far as weighted draws tell.
-    """
-
-    mixture: Mixture
-    places: Float[np.ndarray, "place dimension"]
-
-
 def yaw_jumps(
     likelihood: Likelihood,
     point: Float[np.ndarray, "dimension"],
     rates: Rates,
-    density: LogDensity,
     generator: np.random.Generator,
 ) -> Jumps | None:
     """Proposals for the yaws and spins of cubes that meet something; None where every yaw is measured or idle.
@@ -86,13 +69,11 @@ def yaw_jumps(
     Parameters
     ----------
     likelihood
-        The density, of which the tiles are made.
+        The density.
     point
         Its maximum. Several cubes are turned one at a time.
     rates
         Rates of slowing down, along which tiles are straightened.
-    density
-        What is to be sampled.
     generator
         Source of the draws that correct the tiles' weights.
     """
@@ -110,7 +91,7 @@ def yaw_jumps(
         log_weights += list(evidence[chosen] - logsumexp(evidence[chosen]))
     if not clouds:
         return None
-    return _corrected(Mixture.of(*clouds, log_weights=np.array(log_weights)), density, generator)
+    return _corrected(Mixture.of(*clouds, log_weights=np.array(log_weights)), likelihood.log_density, generator)
 
 
 def _cloud(tile: Mode, rates: Rates) -> CurvedGaussian:

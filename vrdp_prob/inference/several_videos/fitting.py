@@ -13,7 +13,7 @@ from vrdp_prob.inference.misfit import judge
 from vrdp_prob.inference.mode import Mode
 from vrdp_prob.inference.model_error_fit import TURNS, next_model_error
 from vrdp_prob.inference.parallel import in_parallel
-from vrdp_prob.inference.plan import FitPlan
+from vrdp_prob.inference.plan import IN_DOUBT, FitPlan
 from vrdp_prob.inference.several_videos.agreement import first_guess, following_ones
 from vrdp_prob.inference.several_videos.ascent import ROUNDS, ImpossibleStartError, climb
 from vrdp_prob.inference.several_videos.joint_fit import JointFit, with_alternatives
@@ -219,7 +219,7 @@ def fit_together(
     check_videos(videos)
     if shared is not None:
         check_names(shared, model)
-    plan = FitPlan() if model_error else FitPlan(attempts=1, yaws=False)
+    plan = FitPlan() if model_error else IN_DOUBT
     with (progress or SilentProgress()).stage("Fitting each video (MAP)", total=len(videos)) as advance:
 
         def fit(tracks: Tracks) -> MapFit:

@@ -12,7 +12,7 @@ from jaxtyping import Bool
 
 from vrdp_prob.inference.map_fit import MapFit, fit_map
 from vrdp_prob.inference.parallel import in_parallel
-from vrdp_prob.inference.plan import FitPlan
+from vrdp_prob.inference.plan import IN_DOUBT
 from vrdp_prob.inference.several_videos.agreement import consensus
 from vrdp_prob.inference.several_videos.parts import carried_starts, link_fits, plain_likelihood, stream, structure_of
 from vrdp_prob.models.parameters import Prior, Scope
@@ -99,7 +99,7 @@ def look_again(
         best, goal = fits[index], WORSE * np.median([one.misfit.residual_sd for one in fits])
         for look in range(looks):
             generator = stream(seed, f"{best.clues.tracks.video} {look}")
-            found = fit_map(best.clues.tracks, told, generator, plan=FitPlan(attempts=1, yaws=False), model_error=False)
+            found = fit_map(best.clues.tracks, told, generator, plan=IN_DOUBT, model_error=False)
             gained = best.misfit.residual_sd / found.misfit.residual_sd - 1
             if gained > SAME:
                 likelihood = plain_likelihood(found.clues, model, structure_of(found.likelihood.coordinates))

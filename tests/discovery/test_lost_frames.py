@@ -45,6 +45,13 @@ def test_the_time_of_the_loss_is_told_with_the_interval_between_two_frames(found
         assert times[frame - 1] < one.q025 < one.q975 < times[frame]
 
 
+def test_frames_lost_in_every_video_explain_them_all(found: tuple[Trial, Trial]) -> None:
+    _, trial = found
+    (cause,) = trial.causes
+    assert len(trial.acting(cause)) == len(trial.fit.videos)
+    assert not trial.patches(cause)
+
+
 def test_without_the_cause_nothing_is_held_any_more(found: tuple[Trial, Trial]) -> None:
     _, trial = found
     assert all(structure.held for structure in trial.fit.structures)

@@ -8,10 +8,12 @@ import pytest
 from tests.discovery.fitted import fitted
 from vrdp_prob.discovery import unexplained as module
 from vrdp_prob.discovery.residual_model import ResidualModel
+from vrdp_prob.discovery.scores import score_causes
 from vrdp_prob.discovery.trials import Trial, gain
 from vrdp_prob.discovery.unexplained import unexplained
 from vrdp_prob.inference.several_videos.fitting import SharedFit
 from vrdp_prob.inference.several_videos.population import with_learned_spreads
+from vrdp_prob.models.effects.external_impulse import ExternalImpulse
 from vrdp_prob.models.effects.surface_tilt import SurfaceTilt
 from vrdp_prob.models.model_error import straying
 
@@ -69,9 +71,23 @@ def test_accelerations_at_random_are_found(size: float, monkeypatch: pytest.Monk
     assert found.shared_widening.max() > 1.5
 
 
-def test_a_cause_stands_out_and_leaves_nothing() -> None:
+@pytest.fixture(scope="module")
+def without() -> Trial:
+    """Videos of a slope without it."""
     _, fit = fitted("surface_tilt", seed=2)
-    without = Trial((), fit.under(with_learned_spreads(fit), model_error=False))
+    return Trial((), fit.under(with_learned_spreads(fit), model_error=False))
+
+
+def test_kicks_in_video_after_video_explain_no_slope(without: Trial) -> None:
+    kicks = ExternalImpulse()
+    (score,) = score_causes(without.fit, without.unexplained.plain, [kicks], seed=0)
+    kicked = without.with_cause(score)
+    assert kicked is not None
+    assert len(kicked.acting(kicks)) > 1
+    assert kicked.patches(kicks)
+
+
+def test_a_cause_stands_out_and_leaves_nothing(without: Trial) -> None:
     tilt = SurfaceTilt()
     within = Trial((tilt,), without.fit.under(without.fit.model.with_effect(tilt), model_error=False))
     assert without.unexplained.accelerated

@@ -11,7 +11,7 @@ import pytest
 import torch
 import xarray as xr
 
-from tests.inference.generator import Scene, observe
+from tests.inference.three_bodies import NOISE, tracks
 from vrdp_prob.inference import Posterior, default_model, infer, tree
 from vrdp_prob.inference.map_fit import MapFit, fit_map
 from vrdp_prob.inference.predictive import replicated
@@ -21,25 +21,6 @@ from vrdp_prob.models.model_error import ModelError, straying
 from vrdp_prob.models.noise import NoiseFamily
 from vrdp_prob.models.unknowns import DEGREES_OF_FREEDOM
 from vrdp_prob.models.unknowns import NOISE as NOISE_SCALE
-from vrdp_prob.scene import Shape, Tracks
-
-NOISE = 0.005
-
-
-def tracks() -> Tracks:
-    """A disc hits a cube; a third body enters late; some positions are missing."""
-    scene = Scene(
-        (Shape.CYLINDER, Shape.CUBE, Shape.SPHERE),
-        np.array([[-1.2, 0.0], [-0.2, 0.05], [-1.0, 1.5]]),
-        np.array([[1.8, 0.0], [0.0, 0.0], [0.9, 0.1]]),
-        np.array([1.5, 0.8, 1.0]),
-        np.array([0.9, 0.95, 0.8]),
-        np.full(3, 0.2),
-        np.array([0.4, 0.4, 0.05]),
-        angle=np.array([0.0, 0.3, 0.0]),
-        release=np.array([0.0, 0.0, 0.4]),
-    )
-    return observe(scene, noise=NOISE, dropout=0.1, frames=40, seed=2)
 
 
 @cache

@@ -6,10 +6,13 @@ import torch
 
 from tests.inference.prior_scenes import PriorScene, prior_scene
 from tests.inference.scene_ranks import ranks
+from tests.inference.three_bodies import tracks
 from vrdp_prob.inference import default_model, infer
 from vrdp_prob.inference.hypothesis import QUARTER
+from vrdp_prob.inference.importance import Weighted, effective_count, smoothed_weights
 from vrdp_prob.inference.map_fit import MapFit, fit_map
 from vrdp_prob.inference.mixture import Jumps
+from vrdp_prob.inference.samples import PARETO_K_GOAL
 from vrdp_prob.inference.straightening import Rates
 from vrdp_prob.inference.yaw_search import turned_worlds, unseen_yaws
 from vrdp_prob.inference.yaw_tiles import yaw_jumps
@@ -40,6 +43,18 @@ def one_cube() -> MapFit:
 def jumps_of(fit: MapFit) -> Jumps | None:
     rates = Rates.of(fit.likelihood.tracks, fit.likelihood.coordinates)
     return yaw_jumps(fit.likelihood, fit.point, rates, np.random.default_rng(0))
+
+
+def test_tiles_lie_on_an_island_far_finer_than_the_lattice() -> None:
+    fit = fit_map(tracks(), default_model(), np.random.default_rng(0))
+    jumps = jumps_of(fit)
+    assert jumps is not None
+    drawn = Weighted.drawn(
+        fit.likelihood.log_density, jumps.mixture, 4000, np.random.default_rng(1), lambda _worlds: None
+    )
+    weights, pareto_k = smoothed_weights(drawn.log_ratio)
+    assert pareto_k < PARETO_K_GOAL
+    assert effective_count(weights) > 200
 
 
 def test_yaws_are_spread_evenly_where_the_cube_is_hit(one_cube: MapFit) -> None:

@@ -49,7 +49,7 @@ class Step:
     beside_chance
         The same beside what the model leaves to chance.
     tried
-        Refits with one more cause, the best first.
+        Refits with one more cause, the best first; what patches several videos comes late.
     overdispersion
         Of each video, by what the model leaves unexplained before the step.
     """
@@ -130,6 +130,10 @@ def search(
                 break
             chain.append(winner)
             steps.append(after)
+        best = searcher.unpatched(chain[-1])
+        if best is not chain[-1]:
+            chain.append(best)
+            steps.append(searcher.first(best))
         best, lesser, rivals = searcher.compared(chain, steps)
     return Search(chain[0], best, tuple(steps), lesser, rivals, needed, steps[-1].overdispersion)
 
@@ -173,7 +177,15 @@ class _Searcher:
         found.sort(key=_merit, reverse=True)
         if not self._settled(trial, found):
             found += self._lost(trial, found)
-        return replace(step, tried=tuple(sorted(found, key=_merit, reverse=True)))
+        return replace(step, tried=tuple(self._in_order(trial, found)))
+
+    def _in_order(self, trial: Trial, found: Sequence[Trial]) -> list[Trial]:
+        """Trials by merit, but those that patch several videos after every cause that brings enough by itself."""
+
+        def late(one: Trial) -> bool:
+            return one.patches(one.causes[-1]) or gain(one, trial)[0] < self.needed
+
+        return sorted(found, key=lambda one: (late(one), -_merit(one)))
 
     def _settled(self, trial: Trial, found: Sequence[Trial]) -> bool:
         """Whether the best cause leaves nothing to explain, and is not a kick in each of several videos."""
@@ -237,7 +249,8 @@ class _Searcher:
         A cause that was found first may fit worse than another once a further one has joined; then they are swapped.
         """
         best = chain[-1]
-        lesser = (*self._lesser(best, best.causes[:-1]), *chain[-2:-1])
+        known = [one for one in chain[-2:-1] if one.causes == best.causes[:-1]]
+        lesser = (*self._lesser(best, best.causes[: len(best.causes) - len(known)]), *known)
         divisor = steps[-1].overdispersion
 
         def merit(trial: Trial) -> float:
@@ -254,6 +267,11 @@ class _Searcher:
             lesser = self._lesser(best, best.causes)
             rivals = self._rivals(best, lesser, steps)
         return best, lesser, rivals
+
+    def unpatched(self, best: Trial) -> Trial:
+        """A model without those of its causes that patch several videos and explain few of them."""
+        patching = next((cause for cause in best.causes if best.patches(cause)), None)
+        return best if patching is None else self.unpatched(self._left_out(best, patching))
 
     def _lesser(self, best: Trial, causes: Sequence[Effect]) -> tuple[Trial, ...]:
         """A model without each of some causes."""
@@ -281,7 +299,7 @@ class _Searcher:
                 close = {one.causes[-1].name for one in others if gain(one, without)[0] > least}
                 again = [one for one in step.scores if one.effect.name in close][:MOST_RIVALS]
                 others = self._refitted(without, again)
-            found.append(tuple(others))
+            found.append(tuple(one for one in others if not one.patches(one.causes[-1])))
         return tuple(found)
 
     def _refitted(self, trial: Trial, scores: Sequence[CauseScore]) -> list[Trial]:
@@ -328,7 +346,7 @@ def _merit(trial: Trial) -> float:
 def _mends_several(trial: Trial) -> bool:
     """Whether the last cause of a model happens once in each of several videos."""
     cause = trial.causes[-1]
-    return happens_once(cause) and trial.acting(cause) > 1
+    return happens_once(cause) and len(trial.acting(cause)) > 1
 
 
 def _shortlist(scores: Sequence[CauseScore]) -> list[CauseScore]:

@@ -25,6 +25,8 @@ A cause that holds another one as its limit (a bowl whose middle is far away is 
 """
 FIRST_ROUNDS = 5
 """Common steps with which it is seen whether a cause can win."""
+PATCHED = 0.5
+"""Share of the videos with a cause that happens once from which on, if they stray still, it explains none of them."""
 FELL = 5.0
 """Nats by which a video may be less probable with one more cause; beyond that it has lost its course of events."""
 
@@ -166,9 +168,20 @@ class Trial:
             return self
         return replace(self, fit=self.fit.under(self.fit.model, model_error=False))
 
-    def acting(self, cause: Effect) -> int:
-        """Number of videos on which a cause acts that happens once."""
-        return int(np.count_nonzero(self.choices[cause.name]))
+    def acting(self, cause: Effect) -> list[int]:
+        """Videos on which a cause acts that happens once."""
+        return [int(video) for video in np.flatnonzero(self.choices[cause.name])]
+
+    def patches(self, cause: Effect) -> bool:
+        """Whether a cause happens once in each of several videos, and most of them stray with it as well.
+
+        One kick explains a video or it does not. Where nearly every video needs one and is not explained by it, kicks
+        stand for something that acts all the time.
+        """
+        if not happens_once(cause) or len(acting := self.acting(cause)) < 2:
+            return False
+        stray = [any(one.size for one in self.unexplained.straying[video]) for video in acting]
+        return sum(stray) > PATCHED * len(stray)
 
     def mended(self, lost: Sequence[int], *, seed: int) -> "Trial":
         """The fit with some videos searched anew; itself where that finds nothing better."""

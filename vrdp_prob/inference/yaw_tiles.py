@@ -8,7 +8,7 @@ Bayesian inference for latent Gaussian models by using integrated nested Laplace
 Society B 71 (2009), whose lattice over few parameters this is; its Gaussians are only proposals here.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -26,7 +26,7 @@ from vrdp_prob.inference.mode import Mode
 from vrdp_prob.inference.noise_fit import NOISE_FIELDS
 from vrdp_prob.inference.plan import Optimiser
 from vrdp_prob.inference.refinement import Refined, mode_at
-from vrdp_prob.inference.samples import LogDensity, evaluate
+from vrdp_prob.inference.samples import LogDensity, evaluate, evaluate_with_gradient
 from vrdp_prob.inference.straightening import Rates, Straightening, straight_gaussian
 from vrdp_prob.inference.yaw_search import AFTER, REACH, bodies_met, turned_worlds, unseen_yaws
 from vrdp_prob.models.likelihood import Likelihood
@@ -45,6 +45,9 @@ BETTER = 1.0
 """Nats by which a neighbour is better."""
 LEAST_EVIDENCE, MOST_TILES = 7.0, 120
 """Tiles whose evidence is more nats below the best one's are left out, and all but so many of the best of all cubes."""
+MOVES, WORTH_MOVING, FARTHEST = 2, 0.5, 0.5
+"""Times that tiles move to where the posterior within them is largest, twice the gain (nats) that is worth it, and the
+distance, in knots, that they move at most each time."""
 RATE_DRAWS = 4000
 """Draws from which the shape of a tile along rates is found."""
 TRIALS, TRIAL_DRAWS = 3, 2000
@@ -175,14 +178,36 @@ class _Lattice:
         near = [one.point for one in finite[:most] if one.cost < finite[0].cost + 2 * LEAST_EVIDENCE]
         if not near:
             return []
-        last = self._descent(np.array(near), self._free, iterations=LAST_ITERATIONS)
+        modes = self._modes(np.array(near))
+        for _ in range(MOVES if modes else 0):
+            modes = self._moved(modes)
+        return modes
+
+    def _modes(self, points: Float[np.ndarray, "tile dimension"]) -> list[Mode]:
+        """A Gaussian the size of a tile for each point, after all else has followed what is held there."""
+        last = self._descent(points, self._free, iterations=LAST_ITERATIONS)
         values = evaluate(self.likelihood.log_density, np.array([one.point for one in last]))
         modes = [
             mode_at(self.likelihood, Refined(one.point, float(value), one.converged, 0))
             for one, value in zip(last, values, strict=True)
             if np.isfinite(value)
         ]
-        return [Mode(mode.point, mode.precision + self._size, mode.log_density) for mode in modes]
+        return [Mode(mode.point, mode.precision + self._across.T @ self._across, mode.log_density) for mode in modes]
+
+    def _moved(self, modes: Sequence[Mode]) -> list[Mode]:
+        """Tiles moved to where the posterior within them is largest: an island may be far finer than the lattice."""
+        points = np.array([mode.point for mode in modes])
+        _, gradients = evaluate_with_gradient(self.likelihood.log_density, points)
+        shifts = np.array(
+            [np.linalg.solve(one.precision, gradient) for one, gradient in zip(modes, gradients, strict=True)]
+        )
+        far = np.einsum("td,td->t", gradients, shifts) > WORTH_MOVING
+        if not far.any():
+            return list(modes)
+        lengths = np.linalg.norm(shifts @ self._across.T, axis=1)
+        shifts *= np.minimum(1.0, FARTHEST / np.maximum(lengths, 1e-12))[:, None]
+        moved = self._modes((points + shifts)[far])
+        return [mode for mode, moves in zip(modes, far, strict=True) if not moves] + moved
 
     @property
     def _descent(self) -> Descent:
@@ -196,14 +221,14 @@ class _Lattice:
         return free
 
     @property
-    def _size(self) -> Float[np.ndarray, "dimension dimension"]:
-        """Precision that cuts a Gaussian out to the size of a tile."""
+    def _across(self) -> Float[np.ndarray, "2 dimension"]:
+        """Change of the place on the lattice, in knots, per change of the coordinates."""
         coordinates = self.likelihood.coordinates
         across = np.zeros((2, len(coordinates)))
         yaw, *spin = self._held
         across[0, [yaw, *spin]] = np.array([1.0, self.turning])[: 1 + len(spin)] * self.knots[0] / QUARTER
         across[1, spin] = (self.knots[1] - 1) / (2 * REACH * coordinates.prior_sd[spin])
-        return across.T @ across
+        return across
 
     def _refitted(self) -> list[Minimum]:
         """What becomes of all else at each knot that is not without hope."""

@@ -33,10 +33,10 @@ demo: $(SETUP)
 	$(BIN)/vrdp-prob demo --out $(OUT)/demo
 
 test: $(SETUP)
-	$(BIN)/python -m pytest -m "not slow" -n 2 --dist loadfile
+	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -m "not slow" -n 2 --dist loadfile
 
 test-slow: $(SETUP)
-	$(BIN)/python -m pytest -m slow -n 2 --dist loadfile
+	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -m slow -n 2 --dist loadfile
 
 test-discovery: $(SETUP)
 	mkdir -p $(OUT)

@@ -14,6 +14,7 @@ from vrdp_prob.discovery.finding import Check, Finding, FoundCause, Gain, UpperB
 from vrdp_prob.discovery.search import Search, search
 from vrdp_prob.discovery.trials import Trial, gain, gains, weights
 from vrdp_prob.inference import default_model
+from vrdp_prob.inference.parallel import linear_algebra_in_one_thread
 from vrdp_prob.inference.several_videos.fitting import fit_together
 from vrdp_prob.models.effects.effect import Effect
 from vrdp_prob.models.model_file import known_effects
@@ -35,6 +36,7 @@ LEAST_SHARE = 0.01
 """Probability from which a cause is told of that could take the place of a named one."""
 
 
+@linear_algebra_in_one_thread
 def discover(
     videos: Sequence[Tracks],
     *,

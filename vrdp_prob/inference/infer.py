@@ -14,6 +14,7 @@ from vrdp_prob.inference.emcee_sampler import sample_emcee
 from vrdp_prob.inference.laplace import sample_laplace
 from vrdp_prob.inference.map_fit import MapFit, fit_map
 from vrdp_prob.inference.nuts_sampler import sample_nuts
+from vrdp_prob.inference.parallel import linear_algebra_in_one_thread
 from vrdp_prob.inference.posterior import Posterior
 from vrdp_prob.inference.proposals import proposals
 from vrdp_prob.inference.samples import Samples, assess
@@ -45,6 +46,7 @@ def default_model() -> PhysicsModel:
     return PhysicsModel.base().with_effect(BodyFriction())
 
 
+@linear_algebra_in_one_thread
 def infer(
     tracks: Tracks,
     *,

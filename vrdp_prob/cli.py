@@ -224,6 +224,7 @@ def discover_causes(
     as_json: Annotated[bool, typer.Option("--json", help="One JSON document on standard output.")] = False,
     camera: CameraOption = None,
     model: Model = None,
+    processes: Processes = None,
     sampler: Annotated[
         str,
         typer.Option(
@@ -240,7 +241,7 @@ def discover_causes(
     physics = model_at(model)
     check_video_count(video_names(folder), source=folder)
     videos = load_all(folder, camera=camera, progress=progress)
-    finding = discover(videos, model=physics, seed=seed, progress=progress)
+    finding = discover(videos, model=physics, seed=seed, processes=processes, progress=progress)
     if sampler != SAMPLER_OF_FITS:
         note = f"Causes are compared by fits, without draws: --sampler {sampler} changed nothing."
         finding = replace(finding, notes=(*finding.notes, note))

@@ -54,7 +54,7 @@ Words = Annotated[
 Scenes = Annotated[
     str | None, typer.Option(metavar="A:B", help="Scenes A to B-1 of the question file; all by default.")
 ]
-Processes = Annotated[int | None, typer.Option(metavar="N", min=1, help="Videos at a time; by default one per core.")]
+Processes = Annotated[int | None, typer.Option(metavar="N", min=1, help="Processes; by default one per core.")]
 ConceptsOption = Annotated[
     str,
     typer.Option(

@@ -31,12 +31,13 @@ def finding_of(
     effect_size: float = 4.0,
     setting: Setting = SMALL,
     catalogue: Collection[str] | None = None,
+    processes: int = 1,
 ) -> tuple[Truth, Finding]:
     """What discovery says of a tracks folder, and the truth, which the folder does not tell."""
     truth = hide(ways, seed=seed, effect_size=effect_size, setting=setting).write(folder)
     known = known_effects()
     looked_for = None if catalogue is None else [known[name]() for name in catalogue]
-    return truth, discover(load_all(folder), seed=0, catalogue=looked_for)
+    return truth, discover(load_all(folder), seed=0, catalogue=looked_for, processes=processes)
 
 
 @pytest.fixture(scope="module")
@@ -62,8 +63,13 @@ def test_a_check_shows_it(tilted: tuple[Truth, Finding]) -> None:
     assert next(check for check in finding.checks if check.name == "push in one direction").significant
 
 
-def test_nothing_is_found_where_nothing_is_hidden_and_the_same_seed_says_the_same(tmp_path: Path) -> None:
-    first, again = (finding_of(tmp_path / name, [], seed=1, catalogue=SMOOTH)[1] for name in ("first", "again"))
+def test_nothing_is_found_where_nothing_is_hidden_and_the_same_seed_says_the_same_in_two_processes(
+    tmp_path: Path,
+) -> None:
+    first, again = (
+        finding_of(tmp_path / str(processes), [], seed=1, catalogue=SMOOTH, processes=processes)[1]
+        for processes in (1, 2)
+    )
     assert first.verdict is Verdict.NONE
     assert not first.named
     assert first.extended.effects == first.model.effects

@@ -14,7 +14,7 @@ from vrdp_prob.discovery.finding import Check, Finding, FoundCause, Gain, UpperB
 from vrdp_prob.discovery.search import Search, search
 from vrdp_prob.discovery.trials import Trial, gain, gains, weights
 from vrdp_prob.inference import default_model
-from vrdp_prob.inference.parallel import linear_algebra_in_one_thread
+from vrdp_prob.inference.parallel import linear_algebra_in_one_thread, several_processes
 from vrdp_prob.inference.several_videos.fitting import fit_together
 from vrdp_prob.models.effects.effect import Effect
 from vrdp_prob.models.model_file import known_effects
@@ -43,6 +43,7 @@ def discover(
     model: PhysicsModel | None = None,
     seed: int = 0,
     catalogue: Sequence[Effect] | None = None,
+    processes: int | None = None,
     progress: ProgressDisplay | None = None,
 ) -> Finding:
     """Say whether a model explains some videos, and if not, which causes it lacks.
@@ -57,6 +58,8 @@ def discover(
         Seed of all randomness: the same seed gives the same finding.
     catalogue
         Causes that are looked for; all that the package knows and the model has not where None.
+    processes
+        Number of processes that fit videos and try causes side by side; as many as there are cores where None.
     progress
         Told how far the work is.
 
@@ -68,10 +71,11 @@ def discover(
     check_video_count(videos)
     physics = default_model() if model is None else model
     compile_model(physics)
-    fit = fit_together(videos, model=physics, seed=seed, model_error=False, progress=progress)
-    found = search(fit, _catalogue(physics, catalogue), seed=seed, progress=progress)
-    checks = run_checks(found.base.fit, seed=seed)
-    after = run_checks(found.best.fit, seed=seed) if found.best.causes else checks
+    with several_processes(processes):
+        fit = fit_together(videos, model=physics, seed=seed, model_error=False, progress=progress)
+        found = search(fit, _catalogue(physics, catalogue), seed=seed, progress=progress)
+        checks = run_checks(found.base.fit, seed=seed)
+        after = run_checks(found.best.fit, seed=seed) if found.best.causes else checks
     causes = _causes(found, seed)
     verdict = _verdict(found, after)
     return Finding(

@@ -7,6 +7,7 @@ Davies, Hypothesis testing when a nuisance parameter is present only under the a
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from jaxtyping import Float
@@ -15,7 +16,7 @@ from scipy.stats import chi2
 from vrdp_prob.discovery.linear import RANK, Score
 from vrdp_prob.discovery.probes import Probe, probes
 from vrdp_prob.discovery.residual_model import ResidualModel
-from vrdp_prob.inference.parallel import in_parallel
+from vrdp_prob.inference.parallel import in_parallel, in_processes
 from vrdp_prob.inference.several_videos.fitting import SharedFit
 from vrdp_prob.inference.several_videos.linking import Key
 from vrdp_prob.models.effects.effect import Effect
@@ -97,13 +98,14 @@ def happens_once(effect: Effect) -> bool:
 
 def score_causes(fit: SharedFit, model: ResidualModel, effects: Iterable[Effect], *, seed: int) -> list[CauseScore]:
     """Scores of causes that have a strength at which they vanish, the least probable by chance first."""
-    found = []
-    for effect in effects:
-        if effect.vanishes_at or effect.vanishes_like:
-            scan = _scan_once if happens_once(effect) else _scan_shared
-            found.append(scan(fit, model, effect, np.random.default_rng(seed)))
-    present = [one for one in found if one is not None]
+    vanishing = [effect for effect in effects if effect.vanishes_at or effect.vanishes_like]
+    present = [one for one in in_processes(partial(_scanned, fit, model, seed), vanishing) if one is not None]
     return sorted(present, key=lambda one: (one.p_value, -one.chi_square))
+
+
+def _scanned(fit: SharedFit, model: ResidualModel, seed: int, effect: Effect) -> CauseScore | None:
+    scan = _scan_once if happens_once(effect) else _scan_shared
+    return scan(fit, model, effect, np.random.default_rng(seed))
 
 
 def _probed(

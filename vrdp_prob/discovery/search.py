@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 
 import numpy as np
 from jaxtyping import Float
@@ -11,13 +12,13 @@ from vrdp_prob.discovery.proposals import hidden_things
 from vrdp_prob.discovery.scores import CauseScore, happens_once, score_causes
 from vrdp_prob.discovery.single_videos import causes_of_lost_videos, lost_videos
 from vrdp_prob.discovery.trials import Trial, gain, weights
-from vrdp_prob.inference.parallel import in_parallel
+from vrdp_prob.inference.parallel import in_processes
 from vrdp_prob.inference.several_videos.fitting import SharedFit, fit_together
 from vrdp_prob.inference.several_videos.population import with_learned_spreads
 from vrdp_prob.inference.several_videos.second_look import doubtful
 from vrdp_prob.models.effects.effect import Effect
 from vrdp_prob.models.effects.external_impulse import ExternalImpulse
-from vrdp_prob.progress import ProgressDisplay, SilentProgress
+from vrdp_prob.progress import Advance, ProgressDisplay, SilentProgress
 
 SHORTLIST_LEVEL = 0.01
 """Causes whose score chance makes as large more often are not refitted."""
@@ -145,7 +146,7 @@ class _Searcher:
     catalogue: tuple[Effect, ...]
     seed: int
     needed: float
-    advance: Callable[[int], None]
+    advance: Advance
     _known: dict[Trial, Step] = field(default_factory=dict)
 
     def first(self, trial: Trial) -> Step:
@@ -172,7 +173,7 @@ class _Searcher:
             found += self._refitted(trial, [one for one in likely if one not in close])
             found.sort(key=_merit, reverse=True)
         kicks = next((one for one in step.scores if isinstance(one.effect, ExternalImpulse) and one.sites), None)
-        if kicks is not None and (not found or found[0].causes[-1] is kicks.effect):
+        if kicks is not None and (not found or found[0].causes[-1].name == kicks.effect.name):
             found += self._hidden(trial, found, kicks)
         found.sort(key=_merit, reverse=True)
         if not self._settled(trial, found):
@@ -222,17 +223,13 @@ class _Searcher:
 
     def _hidden(self, trial: Trial, found: Sequence[Trial], kicks: CauseScore) -> list[Trial]:
         """Fits with something unseen in the place of kicks."""
-        kicked = next((one for one in found if one.causes[-1] is kicks.effect), None)
+        kicked = next((one for one in found if one.causes[-1].name == kicks.effect.name), None)
         kicked = kicked or next(iter(self._refitted(trial, [kicks])), None)
         if kicked is None:
             return []
         left = [effect for effect in self.catalogue if effect.name not in trial.names]
         starts = hidden_things(kicked.fit, left, kicks.p_value)
-
-        def refit(score: CauseScore) -> Trial | None:
-            return kicked.with_cause_in_place(score, trial.fit.joint.log_density)
-
-        return self._all(refit, starts)
+        return self._all(partial(kicked.with_cause_in_place, least=trial.fit.joint.log_density), starts)
 
     def doubted(self, trial: Trial, lesser: Trial, divisor: Float[np.ndarray, "video"]) -> bool:
         """Whether a cause brings too little, or brings it in too few of the videos that could have been drawn."""
@@ -326,16 +323,12 @@ class _Searcher:
                 promised.pop(hopeful.causes[-1].name)
             found = [mended if one is hopeful else one for one in found]
         most = max((one.brought(trial) for one in found), default=0.0)
-        found = [one.continued() if one.brought(trial) > SHORT * most > 0 else one for one in found]
-        return sorted(found, key=_merit, reverse=True)
+        close = [one for one in found if one.brought(trial) > SHORT * most > 0]
+        rest = [one for one in found if one not in close]
+        return sorted([*in_processes(Trial.continued, close), *rest], key=_merit, reverse=True)
 
     def _all(self, refit: Callable[[CauseScore], Trial | None], scores: Sequence[CauseScore]) -> list[Trial]:
-        def done(score: CauseScore) -> Trial | None:
-            found = refit(score)
-            self.advance(1)
-            return found
-
-        return [one for one in in_parallel(done, scores) if one is not None]
+        return [one for one in in_processes(refit, scores, advance=self.advance) if one is not None]
 
 
 def _merit(trial: Trial) -> float:

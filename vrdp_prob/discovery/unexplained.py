@@ -22,7 +22,7 @@ from scipy.stats import chi2
 from vrdp_prob.discovery.held_out import left_out
 from vrdp_prob.discovery.linear import LinearFit, LinearVideo
 from vrdp_prob.discovery.residual_model import ResidualModel, VideoResiduals
-from vrdp_prob.inference.parallel import in_parallel
+from vrdp_prob.inference.parallel import in_processes
 from vrdp_prob.inference.several_videos.fitting import SharedFit
 from vrdp_prob.models.model_error import Factors, Strand, Whitening, factors
 
@@ -105,7 +105,7 @@ def unexplained(fit: SharedFit) -> Unexplained:
         _Search(video, part.clues.acceleration, plain.linear.prior)
         for video, part in zip(plain.videos, fit.fits, strict=True)
     ]
-    straying = tuple(in_parallel(_Search.found, searches))
+    straying = tuple(in_processes(_Search.found, searches))
     whitenings = [search.whitening(one) for search, one in zip(searches, straying, strict=True)]
     videos = tuple(
         replace(video, linear=video.linear.straying(one)) for video, one in zip(plain.videos, whitenings, strict=True)

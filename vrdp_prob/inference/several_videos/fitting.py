@@ -3,6 +3,7 @@
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from jaxtyping import Float
@@ -12,7 +13,7 @@ from vrdp_prob.inference.map_fit import MapFit, fit_map
 from vrdp_prob.inference.misfit import judge
 from vrdp_prob.inference.mode import Mode
 from vrdp_prob.inference.model_error_fit import TURNS, next_model_error
-from vrdp_prob.inference.parallel import in_parallel
+from vrdp_prob.inference.parallel import in_processes
 from vrdp_prob.inference.plan import IN_DOUBT, FitPlan
 from vrdp_prob.inference.several_videos.agreement import first_guess, following_ones
 from vrdp_prob.inference.several_videos.ascent import ROUNDS, ImpossibleStartError, climb
@@ -221,13 +222,8 @@ def fit_together(
         check_names(shared, model)
     plan = FitPlan() if model_error else IN_DOUBT
     with (progress or SilentProgress()).stage("Fitting each video (MAP)", total=len(videos)) as advance:
-
-        def fit(tracks: Tracks) -> MapFit:
-            found = fit_map(tracks, model, stream(seed, tracks.video), plan=plan, model_error=model_error)
-            advance(1)
-            return found
-
-        alone = in_parallel(fit, videos)
+        by_itself = partial(_by_itself, model=model, seed=seed, plan=plan, model_error=model_error)
+        alone = in_processes(by_itself, videos, advance=advance)
         fits = look_again(alone, doubtful(alone), model, shared, seed=seed)
     numbers, linked, guess = _guessed(fits, model, shared)
     seen = [_with_misfit(fit, video, guess[0], own) for fit, video, own in zip(fits, linked, guess[1], strict=True)]
@@ -242,6 +238,10 @@ def fit_together(
     names = None if shared is None else tuple(shared)
     found = _finished(joint, model, fits, structures, names, model_error=model_error)
     return replace(found, joint=_with_modes(found.joint, fits))
+
+
+def _by_itself(tracks: Tracks, *, model: PhysicsModel, seed: int, plan: FitPlan, model_error: bool) -> MapFit:
+    return fit_map(tracks, model, stream(seed, tracks.video), plan=plan, model_error=model_error)
 
 
 def _guessed(

@@ -5,13 +5,13 @@ the other videos hold it, the search finds its way.
 """
 
 from collections.abc import Collection, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Bool
 
 from vrdp_prob.inference.map_fit import MapFit, fit_map
-from vrdp_prob.inference.parallel import in_parallel
+from vrdp_prob.inference.parallel import in_processes
 from vrdp_prob.inference.plan import IN_DOUBT
 from vrdp_prob.inference.several_videos.agreement import consensus
 from vrdp_prob.inference.several_videos.parts import carried_starts, link_fits, plain_likelihood, stream, structure_of
@@ -93,23 +93,50 @@ def look_again(
     if not chosen:
         return list(fits)
     excess = _excess(fits)
-    told = _told(fits, model, shared)
+    goal = WORSE * float(np.median([one.misfit.residual_sd for one in fits]))
+    look = _Look(model, _told(fits, model, shared), goal, seed, looks)
+    doubted = [(fits[index], bool(excess[index] >= FAR_WORSE)) for index in chosen]
+    improved = dict(zip(chosen, in_processes(look, doubted), strict=True))
+    return [improved.get(index) or fit for index, fit in enumerate(fits)]
 
-    def looked(index: int) -> MapFit:
-        best, goal = fits[index], WORSE * np.median([one.misfit.residual_sd for one in fits])
-        for look in range(looks):
-            generator = stream(seed, f"{best.clues.tracks.video} {look}")
-            found = fit_map(best.clues.tracks, told, generator, plan=IN_DOUBT, model_error=False)
+
+@dataclass(frozen=True)
+class _Look:
+    """Searches for a better fit of a video.
+
+    Parameters
+    ----------
+    model
+        The physics.
+    told
+        The same with what other videos say as its prior.
+    goal
+        Residuals in units of the noise that are good enough.
+    seed
+        Seed of the searches.
+    looks
+        Their number at most.
+    """
+
+    model: PhysicsModel
+    told: PhysicsModel
+    goal: float
+    seed: int
+    looks: int
+
+    def __call__(self, doubted: tuple[MapFit, bool]) -> MapFit | None:
+        """A better fit, if there is one; with a fit comes whether it is far worse than those of other videos."""
+        (best, far_worse), better = doubted, None
+        for look in range(self.looks):
+            generator = stream(self.seed, f"{best.clues.tracks.video} {look}")
+            found = fit_map(best.clues.tracks, self.told, generator, plan=IN_DOUBT, model_error=False)
             gained = best.misfit.residual_sd / found.misfit.residual_sd - 1
             if gained > SAME:
-                likelihood = plain_likelihood(found.clues, model, structure_of(found.likelihood.coordinates))
-                best = replace(found, likelihood=likelihood)
-            if (abs(gained) < SAME and excess[index] < FAR_WORSE) or best.misfit.residual_sd < goal:
+                likelihood = plain_likelihood(found.clues, self.model, structure_of(found.likelihood.coordinates))
+                best = better = replace(found, likelihood=likelihood)
+            if (abs(gained) < SAME and not far_worse) or best.misfit.residual_sd < self.goal:
                 break
-        return best
-
-    improved = dict(zip(chosen, in_parallel(looked, chosen), strict=True))
-    return [improved.get(index, fit) for index, fit in enumerate(fits)]
+        return better
 
 
 def _excess(fits: Sequence[MapFit]) -> np.ndarray:

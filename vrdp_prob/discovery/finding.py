@@ -46,8 +46,10 @@ class HeldOut:
     Parameters
     ----------
     rmse, rmse_one_second, rmse_end
-        Root mean square error (m) of predicted positions: over the whole video, one second after the release, and in
-        the last frames; None where no video is so long.
+        Root mean square error (m, per axis) of predicted positions in the video in the middle, half of the others being
+        better: over all frames that are predicted, one second after the first of them, and in the last ones; None where
+        no video is so long. A single video in which two bodies just miss each other says nothing here, and much in the
+        log predictive density.
     coverage_50, coverage_90
         Share of the observations in the middle 50 % and 90 % of their predictive distributions.
     """

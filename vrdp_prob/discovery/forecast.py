@@ -4,6 +4,7 @@ What a video shares with others is what the others say; its own unknowns (releas
 first part, and the rest is predicted.
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -61,19 +62,23 @@ def held_out(videos: Sequence[LinkedVideo], points: Sequence[np.ndarray], caviti
         What the other videos say.
     """
     forecasts = in_parallel(lambda k: _forecast(videos[k], points[k], cavities[k]), range(len(videos)))
-    ahead = np.concatenate([one.ahead for one in forecasts])
-    squares = np.concatenate([one.squares for one in forecasts])
     standardised = np.abs(np.concatenate([one.standardised.ravel() for one in forecasts]))
     frame = min(float(np.median(np.diff(video.likelihood.tracks.times))) for video in videos)
-    one_second = np.abs(ahead - AHEAD) <= (AROUND + 0.5) * frame
-    end = np.concatenate([one.ahead > one.ahead.max() - (2 * AROUND + 0.5) * frame for one in forecasts])
+    one_second = [np.abs(one.ahead - AHEAD) <= (AROUND + 0.5) * frame for one in forecasts]
+    end = [one.ahead > one.ahead.max(initial=0.0) - (2 * AROUND + 0.5) * frame for one in forecasts]
     return HeldOut(
-        rmse=float(np.sqrt(squares.mean())),
-        rmse_one_second=float(np.sqrt(squares[one_second].mean())) if one_second.any() else None,
-        rmse_end=float(np.sqrt(squares[end].mean())) if end.any() else None,
+        rmse=math.nan if (rmse := _in_the_middle([one.squares for one in forecasts])) is None else rmse,
+        rmse_one_second=_in_the_middle([one.squares[near] for one, near in zip(forecasts, one_second, strict=True)]),
+        rmse_end=_in_the_middle([one.squares[late] for one, late in zip(forecasts, end, strict=True)]),
         coverage_50=float((standardised < HALF).mean()),
         coverage_90=float((standardised < NINE_TENTHS).mean()),
     )
+
+
+def _in_the_middle(squares: Sequence[Float[np.ndarray, "_"]]) -> float | None:
+    """Root mean square error of the video in the middle; None where there is no error in any."""
+    errors = [np.sqrt(one.mean()) for one in squares if len(one)]
+    return float(np.median(errors)) if errors else None
 
 
 def _forecast(video: LinkedVideo, point: Float[np.ndarray, "dimension"], cavity: Cavity) -> Forecast:

@@ -102,7 +102,7 @@ def sample_emcee(
             )
             for index in range(ENSEMBLES)
         ]
-    with (progress or SilentProgress()).stage("Sampling (emcee)", total=WARM_UP + most_steps) as advance:
+    with (progress or SilentProgress()).stage("Sampling (emcee), at most", total=WARM_UP + most_steps) as advance:
         stopped = _run(ensembles, form.mixture, reported, advance, most_steps=most_steps, work_limit=work_limit)
     points = _points(form.mixture, ensembles)
     by_walker = joined(points)

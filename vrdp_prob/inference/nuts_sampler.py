@@ -119,7 +119,7 @@ def sample_nuts(
         for number in range(GROUPS)
     ]
     count = min(os.cpu_count() or 1, MOST_PROCESSES) if processes is None else processes
-    stage = (progress or SilentProgress()).stage("Sampling (NUTS)", total=most_gradients)
+    stage = (progress or SilentProgress()).stage("Sampling (NUTS), at most", total=most_gradients)
     with stage as advance, workers(count) as pool:
         run = _Run(density, form.mixture, groups, checkpoint, pool, advance)
         run.further(warm_up, adapt=True)

@@ -181,10 +181,11 @@ class _Searcher:
         return replace(step, tried=tuple(self._in_order(trial, found)))
 
     def _in_order(self, trial: Trial, found: Sequence[Trial]) -> list[Trial]:
-        """Trials by merit, but those that patch several videos after every cause that brings enough by itself."""
+        """Trials by merit, but those that patch several videos after every cause that is not in doubt by itself."""
+        alike = np.ones(len(trial.fit.videos))
 
         def late(one: Trial) -> bool:
-            return one.patches(one.causes[-1]) or gain(one, trial)[0] < self.needed
+            return one.patches(one.causes[-1]) or self.doubted(one, trial, alike)
 
         return sorted(found, key=lambda one: (late(one), -_merit(one)))
 

@@ -20,6 +20,8 @@ from vrdp_prob.models.effects.speed_dependent_restitution import SpeedDependentR
 from vrdp_prob.models.effects.wall import Wall
 from vrdp_prob.models.effects.wind import Wind
 from vrdp_prob.models.physics import PhysicsModel
+from vrdp_prob.models.simulator.ending_kernel import GRIP
+from vrdp_prob.models.simulator.outcome import Outcome
 
 GRAVITY = 9.81
 FRICTION, DRAG = 0.02, 0.1
@@ -83,6 +85,19 @@ def test_paths(effect: Effect, parameters: dict[str, float], law: Law) -> None:
     np.testing.assert_allclose(found, expected, atol=1e-8)
     without = at(scene, END).trajectory[0, -1, 0, :2].numpy()
     assert np.linalg.norm(found - without) > 0.01
+
+
+@pytest.mark.parametrize("excess", [1e-9, 1e-6, 1e-4, 2e-3, 1e-2, 0.3, 10.0])
+def test_a_body_at_rest_in_a_dome_either_stays_or_goes(excess: float) -> None:
+    stiffness, middle = 0.7, np.array([0.5, -1.0])
+    away = np.array(START) - middle
+    friction = stiffness * np.linalg.norm(away) / GRAVITY / (1 + excess)
+    parameters = {"bowl_stiffness": -stiffness, "bowl_x": middle[0], "bowl_y": middle[1], "sliding_friction": friction}
+    rollout = at(world([START], [(0, 0)], [DISC], parameters), END, model=model_with(Bowl()))
+    assert rollout.outcome == (Outcome.OK,)
+    # Along the slope x'' = k x - friction g from rest.
+    grown = (math.cosh(math.sqrt(stiffness) * END) - 1) * excess / (1 + excess) if excess > GRIP else 0.0
+    np.testing.assert_allclose(rollout.trajectory[0, -1, 0, :2], START + grown * away, atol=3e-6)
 
 
 @pytest.mark.parametrize("effect", [effect for effect, _, _ in PATHS], ids=[effect.name for effect, _, _ in PATHS])

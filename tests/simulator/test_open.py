@@ -20,6 +20,7 @@ from vrdp_prob.models.effects.surface_tilt import SurfaceTilt
 from vrdp_prob.models.effects.time_varying_friction import TimeVaryingFriction
 from vrdp_prob.models.parameters import Scope
 from vrdp_prob.models.physics import PhysicsModel
+from vrdp_prob.models.simulator.ending_kernel import GRIP
 from vrdp_prob.models.simulator.events import RolloutEventKind
 from vrdp_prob.models.simulator.outcome import Outcome
 from vrdp_prob.models.simulator.rollout import simulate
@@ -101,9 +102,10 @@ def test_a_body_starts_when_friction_has_become_too_small() -> None:
     result = at(
         scene([[0, 0]], [[0, 0]], sliding_friction=friction, tilt_x=tilt, friction_trend=trend), 4.0, model=ALONE
     )
-    begin = (tilt / friction - 1) / trend
-    # a = g (tilt - friction (1 + trend t)) = -g friction trend (t - begin)
-    expected = -GRAVITY * friction * trend * (4.0 - begin) ** 3 / 6
+    begin = (tilt / friction / (1 + GRIP) - 1) / trend
+    # a = g (tilt - friction (1 + trend t)), which is GRIP tilt g / (1 + GRIP) at first and grows by -g friction trend.
+    first, growth, lasted = GRIP / (1 + GRIP) * tilt * GRAVITY, -GRAVITY * friction * trend, 4.0 - begin
+    expected = first * lasted**2 / 2 + growth * lasted**3 / 6
     assert result.trajectory[0, -1, 0, 0].item() == pytest.approx(expected, abs=1e-6)
 
 

@@ -45,7 +45,15 @@ LINGERING_SLIP = 1e-7
 STRAIGHT = 1e-9
 """Sine of the angle between velocity and acceleration below which a motion counts as straight."""
 SLOWEST = 1e-10
-"""Speed in m/s (or rad/s) below which a body rests, and with which it starts when a force moves it."""
+"""Speed in m/s (or rad/s) below which a body rests."""
+LAUNCH = 2.0 * VANISHED
+"""Speed in m/s with which a body at rest starts when a force moves it; far above the error of a step."""
+GRIP = 1e-3
+"""Relative excess of a push over friction up to which a body at rest stays.
+
+While a body creeps, friction turns it towards the push within its speed over its deceleration. A start takes some
+`1 / excess` steps of that length, and just above the limit they find no end.
+"""
 SMALLEST_SHARE = 1e-16
 """Relative change of a root at which its search ends."""
 CROSSING_LOOKS = 32
@@ -122,13 +130,25 @@ def settle(world, body, t, y):
         return
     y[3], y[4] = 0.0, 0.0
     set_push_at(world, body, t, y)
-    size = math.hypot(push[0], push[1])
-    if size > push[2]:
-        y[3], y[4] = SLOWEST * push[0] / size, SLOWEST * push[1] / size
+    if yields(push):
+        launch(y, push)
     elif push[2] > 0.0:
         phase[MOVING] = RESTING
     if world.model[SLIPS]:
         y[6], y[7] = y[3], y[4]
+
+
+@compiled
+def yields(push):
+    """Whether friction cannot hold a body at rest."""
+    return math.hypot(push[0], push[1]) > push[2] * (1.0 + GRIP)
+
+
+@compiled
+def launch(y, push):
+    """Let a body at rest move the way it is pushed."""
+    size = math.hypot(push[0], push[1])
+    y[3], y[4] = LAUNCH * push[0] / size, LAUNCH * push[1] / size
 
 
 @compiled

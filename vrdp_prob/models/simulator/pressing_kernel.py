@@ -27,7 +27,7 @@ from vrdp_prob.models.simulator.cluster_kernel import (
     set_touch_count,
     touch_count,
 )
-from vrdp_prob.models.simulator.ending_kernel import SLOWEST, VANISHED, set_push_at, settle
+from vrdp_prob.models.simulator.ending_kernel import SLOWEST, VANISHED, launch, set_push_at, settle, yields
 from vrdp_prob.models.simulator.laws_kernel import COUPLED, compiled
 from vrdp_prob.models.simulator.motion_kernel import add_pair_forces, cluster_derivatives, derivatives, take_states
 from vrdp_prob.models.simulator.world_kernel import (
@@ -64,8 +64,6 @@ OPENING = 1e-6
 """Speed in m/s at which bodies in touch count as parting."""
 FAINT = 1e-9
 """Relative acceleration in m/s^2 that must bring two bodies together for their contact to last."""
-BLOCKED = 1e-6
-"""Relative excess of a push over friction below which a body stays at rest that others stop."""
 PATIENCE = 0.02
 """Time in s between two looks at bodies at rest whose forces change with time."""
 LOOKS = 4
@@ -105,12 +103,6 @@ def set_push(world, body, t):
 
 
 @compiled
-def yields(push, margin):
-    """Whether friction cannot hold a body at rest, by more than a relative margin."""
-    return math.hypot(push[0], push[1]) > push[2] * (1.0 + margin)
-
-
-@compiled
 def turns(push):
     """Whether friction cannot hold a body from spinning."""
     return abs(push[TURN]) > push[BRAKE]
@@ -137,7 +129,7 @@ def failure(world, cluster, t):
         body = world.members[cluster, 1 + place]
         phase, push = world.phase[body], world.stages[PUSH, body]
         set_push(world, body, t)
-        if phase[MOVING] == RESTING and not stays(push) and yields(push, 0.0):
+        if phase[MOVING] == RESTING and not stays(push) and yields(push):
             return YIELDS, body
         if phase[SPIN_SENSE] == 0.0 and push[LEANING] < LEANS_TURNING and turns(push):
             return TURNS, body
@@ -196,10 +188,8 @@ def find_yielding(world, cluster, t, horizon):
 @compiled
 def start(world, body):
     """Let a body at rest move the way it is pushed."""
-    y, push = world.polynomial[body, 0], world.stages[PUSH, body]
-    size = math.hypot(push[0], push[1])
     world.phase[body, MOVING] = SLIDING
-    y[3], y[4] = 2.0 * VANISHED * push[0] / size, 2.0 * VANISHED * push[1] / size
+    launch(world.polynomial[body, 0], world.stages[PUSH, body])
 
 
 @compiled
@@ -218,7 +208,7 @@ def loosened(world, cluster, t):
         body = world.members[cluster, 1 + place]
         phase, push = world.phase[body], world.stages[PUSH, body]
         set_push(world, body, t)
-        if phase[MOVING] == RESTING and not stays(push) and yields(push, 0.0):
+        if phase[MOVING] == RESTING and not stays(push) and yields(push):
             start(world, body)
             changed = True
         if phase[SPIN_SENSE] == 0.0 and push[LEANING] < LEANS_TURNING and turns(push):
@@ -239,7 +229,7 @@ def blocked(world, cluster):
             continue
         changed = True
         # A body that others stop is pushed just as hard as friction holds.
-        if yields(push, BLOCKED):
+        if yields(push):
             start(world, body)
         else:
             at_rest = world.polynomial[body, 0]
@@ -325,7 +315,7 @@ def leans(world, touch, t):
         body = int(world.touching[touch, TOUCH_A + side])
         if not world.kind[body, FIXED]:
             set_push_at(world, body, t, world.stages[WORK, body])
-            if yields(world.stages[PUSH, body], 0.0):
+            if yields(world.stages[PUSH, body]):
                 return True
     return False
 

@@ -3,11 +3,11 @@
     python benchmarks/billiards.py [--json FILE] [--docs docs] [--train 62] [--results FOLDER]
 
 Tracks of ../shared/data/billiards_three_cushion, as in the real-world table of VRDP (Ding et al., NeurIPS 2021): the
-model and what all shots share are learned on the training videos; of each test video frames 0 to 19 are seen, frames 20
-to 39 are predicted, and questions ask what happens there. Constant velocity is what a person without a simulator would
-say. The finding, the learned models and each test video's errors are kept in `--results` as they come, so that a run
-that was interrupted goes on; delete that folder after a change of the code. `--docs` writes the tables into
-`billiards.md` there.
+model and what all shots share are learned on frames 0 to 39 of the training videos; of each test video frames 0 to 19
+are seen, frames 20 to 39 are predicted, and questions ask what happens there. Constant velocity is what a person
+without a simulator would say. The finding, the learned models and each test video's errors are kept in `--results` as
+they come, so that a run that was interrupted goes on; delete that folder after a change of the code. `--docs` writes
+the tables into `billiards.md` there.
 """
 
 import argparse
@@ -71,7 +71,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return 0
     asked = json.loads((DATA / "questions.json").read_text(encoding="utf-8"))
     names = {part: [_video(one) for one in asked if one["split"] == part] for part in ("train", "test")}
-    training = load_all(DATA, videos=names["train"][: options.train])
+    training = [_up_to(ASKED, tracks) for tracks in load_all(DATA, videos=names["train"][: options.train])]
     compile_model(default_model())
     extended = _found(training, options.results)
     fits = {
@@ -115,6 +115,10 @@ def _parser() -> argparse.ArgumentParser:
 
 def _video(entry: Mapping[str, str]) -> str:
     return Path(entry["video_filename"]).stem
+
+
+def _up_to(frames: int, tracks: Tracks) -> Tracks:
+    return replace(tracks, data=tracks.data.isel(time=slice(frames)))
 
 
 def _found(training: Sequence[Tracks], folder: Path) -> PhysicsModel:
@@ -165,8 +169,7 @@ def _simulated(
     tracks: Tracks, model: PhysicsModel
 ) -> tuple[Float[np.ndarray, "time body 2"], dict[frozenset[str], float]]:
     """Most probable positions, and the probability of each event, from the first frames alone."""
-    seen = replace(tracks, data=tracks.data.isel(time=slice(SEEN)))
-    posterior = infer(seen, sampler="laplace", model=model, seed=0, draws=DRAWS)
+    posterior = infer(_up_to(SEEN, tracks), sampler="laplace", model=model, seed=0, draws=DRAWS)
     times = torch.tensor(tracks.times[:ASKED])
     best = simulate(posterior.map_worlds(), times, model).trajectory[0, :, :, :2].numpy()
     drawn = simulate(posterior.worlds(DRAWS), times, model)

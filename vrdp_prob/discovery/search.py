@@ -50,7 +50,7 @@ class Step:
     beside_chance
         The same beside what the model leaves to chance.
     tried
-        Refits with one more cause, the best first; what patches several videos comes late.
+        Refits with one more cause, the best first; what patches several videos comes last, unless all else is doubted.
     overdispersion
         Of each video, by what the model leaves unexplained before the step.
     """
@@ -181,13 +181,12 @@ class _Searcher:
         return replace(step, tried=tuple(self._in_order(trial, found)))
 
     def _in_order(self, trial: Trial, found: Sequence[Trial]) -> list[Trial]:
-        """Trials by merit, but those that patch several videos after every cause that is not in doubt by itself."""
-        alike = np.ones(len(trial.fit.videos))
-
-        def late(one: Trial) -> bool:
-            return one.patches(one.causes[-1]) or self.doubted(one, trial, alike)
-
-        return sorted(found, key=lambda one: (late(one), -_merit(one)))
+        """Trials by merit; those that patch several videos last, unless the best other one is in doubt."""
+        patching = [one for one in found if one.patches(one.causes[-1])]
+        others = sorted((one for one in found if one not in patching), key=_merit, reverse=True)
+        if others and not self.doubted(others[0], trial, np.ones(len(trial.fit.videos))):
+            return [*others, *sorted(patching, key=_merit, reverse=True)]
+        return sorted(found, key=_merit, reverse=True)
 
     def _settled(self, trial: Trial, found: Sequence[Trial]) -> bool:
         """Whether the best cause leaves nothing to explain, and is not a kick in each of several videos."""

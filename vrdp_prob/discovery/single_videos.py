@@ -4,20 +4,19 @@ Scores and refits begin at the fit without the cause. Where that has taken the w
 near it to be found, and a search from the beginning is the only way.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 
 from vrdp_prob.discovery.scores import happens_once
-from vrdp_prob.inference.map_fit import MapFit, fit_map
+from vrdp_prob.inference.map_fit import MapFit
 from vrdp_prob.inference.parallel import in_processes
 from vrdp_prob.inference.plan import IN_DOUBT
 from vrdp_prob.inference.several_videos.fitting import SharedFit
-from vrdp_prob.inference.several_videos.parts import stream
+from vrdp_prob.inference.several_videos.parts import fit_alone
 from vrdp_prob.inference.several_videos.second_look import may_take_another_course
 from vrdp_prob.models.effects.effect import Effect
 from vrdp_prob.models.parameters import Scope
 from vrdp_prob.models.physics import PhysicsModel
-from vrdp_prob.scene import Tracks
 
 LOST = 1.2
 """Residuals in units of the noise from which a video may be lost."""
@@ -65,13 +64,16 @@ def causes_of_lost_videos(
         (effect for effect in catalogue if _tells(effect)), key=lambda effect: not _acts_in_contacts(effect)
     )
 
+    def searched(video: int) -> Callable[[PhysicsModel], MapFit]:
+        return partial(fit_alone, fit.fits[video].clues.tracks, seed=seed, plan=IN_DOUBT)
+
     def tried(video: int, effects: Sequence[Effect]) -> list[tuple[Effect, MapFit]]:
         """Searches with causes, until one of them explains the video."""
         found: list[tuple[Effect, MapFit]] = []
         for first in range(0, len(effects), AT_ONCE):
             some = effects[first : first + AT_ONCE]
             models = [fit.model.with_effect(effect) for effect in some]
-            fits = in_processes(partial(_searched, fit.fits[video].clues.tracks, seed), models)
+            fits = in_processes(searched(video), models)
             found += zip(some, fits, strict=True)
             if min(one.misfit.ratio for one in fits) < EXPLAINED:
                 break
@@ -79,7 +81,7 @@ def causes_of_lost_videos(
 
     gains: dict[str, float] = {}
     for rank, video in enumerate(lost[:VIDEOS]):
-        before = _searched(fit.fits[video].clues.tracks, seed, fit.model).modes[0].log_density
+        before = searched(video)(fit.model).modes[0].log_density
         found = tried(video, effects)
         # Models are nested: a search that makes a video less probable has lost its own way.
         gained = {effect.name: max(one.modes[0].log_density - before, 0.0) for effect, one in found}
@@ -90,10 +92,6 @@ def causes_of_lost_videos(
             effects = effects[:SECOND_LOOKS]
     ranked = [(effect, gains[effect.name]) for effect in effects if effect.name in gains]
     return [pair for pair in ranked if pair[1] > max(needed, NEARLY * ranked[0][1])][:MOST_TOLD]
-
-
-def _searched(tracks: Tracks, seed: int, model: PhysicsModel) -> MapFit:
-    return fit_map(tracks, model, stream(seed, tracks.video), plan=IN_DOUBT, model_error=False)
 
 
 def _tells(effect: Effect) -> bool:

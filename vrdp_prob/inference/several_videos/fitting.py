@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Float
 
 from vrdp_prob.errors import InputError
-from vrdp_prob.inference.map_fit import MapFit, fit_map
+from vrdp_prob.inference.map_fit import MapFit
 from vrdp_prob.inference.misfit import judge
 from vrdp_prob.inference.mode import Mode
 from vrdp_prob.inference.model_error_fit import TURNS, next_model_error
@@ -19,7 +19,7 @@ from vrdp_prob.inference.several_videos.agreement import first_guess, following_
 from vrdp_prob.inference.several_videos.ascent import ROUNDS, ImpossibleStartError, climb
 from vrdp_prob.inference.several_videos.joint_fit import JointFit, with_alternatives
 from vrdp_prob.inference.several_videos.linking import LinkedVideo, SharedNumbers, check_names, link
-from vrdp_prob.inference.several_videos.parts import carried_starts, link_fits, stream, structure_of
+from vrdp_prob.inference.several_videos.parts import carried_starts, fit_alone, link_fits, structure_of
 from vrdp_prob.inference.several_videos.second_look import FAR_WORSE, WORSE, doubtful, look_again, trusted
 from vrdp_prob.inference.several_videos.transfer import first_numbers
 from vrdp_prob.models.effects.effect import Effect
@@ -222,8 +222,8 @@ def fit_together(
         check_names(shared, model)
     plan = FitPlan() if model_error else IN_DOUBT
     with (progress or SilentProgress()).stage("Fitting each video (MAP)", total=len(videos)) as advance:
-        by_itself = partial(_by_itself, model=model, seed=seed, plan=plan, model_error=model_error)
-        alone = in_processes(by_itself, videos, advance=advance)
+        fitted = partial(fit_alone, model=model, seed=seed, plan=plan, model_error=model_error)
+        alone = in_processes(fitted, videos, advance=advance)
         fits = look_again(alone, doubtful(alone), model, shared, seed=seed)
     numbers, linked, guess = _guessed(fits, model, shared)
     seen = [_with_misfit(fit, video, guess[0], own) for fit, video, own in zip(fits, linked, guess[1], strict=True)]
@@ -238,10 +238,6 @@ def fit_together(
     names = None if shared is None else tuple(shared)
     found = _finished(joint, model, fits, structures, names, model_error=model_error)
     return replace(found, joint=_with_modes(found.joint, fits))
-
-
-def _by_itself(tracks: Tracks, *, model: PhysicsModel, seed: int, plan: FitPlan, model_error: bool) -> MapFit:
-    return fit_map(tracks, model, stream(seed, tracks.video), plan=plan, model_error=model_error)
 
 
 def _guessed(

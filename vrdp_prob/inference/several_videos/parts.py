@@ -7,18 +7,25 @@ import numpy as np
 from jaxtyping import Float
 
 from vrdp_prob.inference.clues import Clues
-from vrdp_prob.inference.map_fit import MapFit
+from vrdp_prob.inference.map_fit import MapFit, fit_map
+from vrdp_prob.inference.plan import FitPlan
 from vrdp_prob.inference.several_videos.linking import LinkedVideo, SharedNumbers, link
 from vrdp_prob.models.coordinates import Coordinates
 from vrdp_prob.models.likelihood import Likelihood
 from vrdp_prob.models.parameters import MASS, RESTITUTION
 from vrdp_prob.models.physics import PhysicsModel
 from vrdp_prob.models.unknowns import Structure, unknowns
+from vrdp_prob.scene import Tracks
 
 
 def stream(seed: int, video: str) -> np.random.Generator:
     """Source of randomness of one video, the same whatever the other videos are."""
     return np.random.default_rng([seed, zlib.crc32(video.encode())])
+
+
+def fit_alone(tracks: Tracks, model: PhysicsModel, *, seed: int, plan: FitPlan, model_error: bool = False) -> MapFit:
+    """The fit of one of several videos by itself, with its own randomness."""
+    return fit_map(tracks, model, stream(seed, tracks.video), plan=plan, model_error=model_error)
 
 
 def carried_starts(fits: Sequence[MapFit], videos: Sequence[LinkedVideo]) -> list[Float[np.ndarray, "_ _"]]:

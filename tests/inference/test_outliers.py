@@ -6,7 +6,7 @@ from tests.inference.test_infer import chain, with_outliers
 from vrdp_prob.inference.clues import Clues
 from vrdp_prob.inference.outliers import gross_outliers, without
 from vrdp_prob.models.noise import NoiseFamily
-from vrdp_prob.scene import Tracks
+from vrdp_prob.scene import Body, Shape, Tracks
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -48,3 +48,27 @@ def test_jumps_within_the_stated_noise_are_none() -> None:
     assert not Clues.of(jumped).outliers.any()
     unstated = Tracks.from_arrays("unstated", tracks.bodies, tracks.times, positions)
     assert gross_outliers(unstated, np.full(tracks.seen.shape, 0.0002)).any()
+
+
+def test_soft_contacts_are_none_and_outliers_within_them_are() -> None:
+    times = np.arange(80) / 100
+    velocity = 0.1 - 0.45 * np.tanh((times - 0.4) / 0.015) - 0.15 * np.exp(-(((times - 0.43) / 0.02) ** 2))
+    positions = np.stack([np.cumsum(velocity) / 100, 0.01 * times], axis=-1)[:, None]
+    positions += np.random.default_rng(0).normal(0, 1e-5, positions.shape)
+    soft = Tracks.from_arrays("soft", (Body("a", Shape.CYLINDER),), times, positions)
+    assert not Clues.of(soft).outliers.any()
+    positions[41, 0, 1] += 0.02
+    assert Clues.of(Tracks.from_arrays("struck", soft.bodies, times, positions)).outliers[41, 0]
+
+
+def test_what_comes_before_a_first_contact_is_none() -> None:
+    times = np.arange(40) / 25
+    along = np.where(times < 0.06, 1.5 * times, 0.09 - 0.4 * (times - 0.06))
+    struck = np.stack([along, 0.2 * times], axis=-1)
+    other = np.stack([np.ones(40), 1.2 * times], axis=-1)
+    positions = np.stack([struck, other], axis=1)
+    positions += np.random.default_rng(0).normal(0, 1e-3, positions.shape)
+    bodies = (Body("a", Shape.SPHERE), Body("b", Shape.SPHERE))
+    assert not Clues.of(Tracks.from_arrays("early", bodies, times, positions)).outliers.any()
+    positions[:2, 0] += [[0.5, 0.0], [0.0, 0.5]]
+    assert Clues.of(Tracks.from_arrays("spoilt", bodies, times, positions)).outliers[:2, 0].all()

@@ -66,6 +66,11 @@ class Clues:
         """Measurement noise (m)."""
         return _roughness(self.clean)
 
+    @cached_property
+    def position_sd(self) -> Float[np.ndarray, "time body"]:
+        """Standard deviation (m) of each position per axis: the noise, or the stated one where it is larger."""
+        return _position_sd(self.tracks, self.noise)
+
     @property
     def noise_family(self) -> NoiseFamily:
         """Distribution of the noise that the tracks call for."""
@@ -134,7 +139,7 @@ class Clues:
         freedom = 2 * (len(places) - 1)
         if freedom < SHORTEST_REST_TEST:
             return False
-        sd = _position_sd(self.tracks, self.noise)[chosen, body, None]
+        sd = self.position_sd[chosen, body, None]
         scatter = float((((places - np.average(places, axis=0, weights=sd[:, 0] ** -2)) / sd) ** 2).sum())
         angles = self.tracks.angles
         turning = 0.0 if angles is None else float(np.std(_finite(angles[chosen, body])))

@@ -156,7 +156,7 @@ def fit_map(
     structure = structure_at(everything, starts, clues.moving)
     likelihood = Likelihood(tracks, model, unknowns(tracks, model, structure, family), family)
     found = _refined(everything, starts, likelihood, stages)
-    misfit = judge(likelihood, found[0].point, clues.noise, int(clues.outliers.sum()))
+    misfit = judge(likelihood, found[0].point, clues)
     evaluations = sum(one.evaluations for one in attempts) + sum(one.evaluations for one in found)
     for _ in range(TURNS if model_error else 0):
         error = next_model_error(likelihood, found[0].point, clues, misfit)
@@ -237,11 +237,16 @@ def _plausible(attempts: Sequence[GrowingFit]) -> bool:
 
 
 def _grow(task: _Task, generator: np.random.Generator, progress: ProgressDisplay | None) -> GrowingFit:
-    """Fit windows that grow to the whole video, with everything that might matter among the unknowns."""
+    """Fit windows that grow to the whole video, with everything that might matter among the unknowns.
+
+    Under Student-t noise a course of events that is wrong from some time on hardly differs from many outliers, so
+    windows grow with Gaussian noise, and without the outliers that the tracks show by themselves.
+    """
     clues, tracks, plan = task.clues, task.clues.tracks, task.plan
     everything = frozenset(body for body, one in enumerate(tracks.bodies) if one.radius is not None)
     structure = Structure(moving=clues.moving, colliding=everything)
-    likelihood = Likelihood(tracks, task.model, unknowns(tracks, task.model, structure, task.noise), task.noise)
+    left_out = clues.outliers if task.noise is NoiseFamily.STUDENT_T else None
+    likelihood = Likelihood(tracks, task.model, unknowns(tracks, task.model, structure), left_out=left_out)
     growing = GrowingFit(likelihood, _start(likelihood, clues), clues, generator, plan)
     growing.trust_release_fits(
         {body: (clues.noise, clues.release(body).velocity_sd) for body in range(len(tracks.bodies))}

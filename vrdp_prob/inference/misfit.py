@@ -4,11 +4,16 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import torch
-from jaxtyping import Float
+from jaxtyping import Bool, Float
+from scipy.ndimage import median_filter
 
+from vrdp_prob.inference.clues import Clues
+from vrdp_prob.inference.outliers import FARTHEST
 from vrdp_prob.models.likelihood import Likelihood
 from vrdp_prob.models.model_error import ModelError
 
+NEIGHBOURS = 5
+"""Residuals in a row whose median says what is usual there."""
 LARGEST_RATIO = 1.5
 """Residuals this much larger than the measurement noise are called a misfit."""
 
@@ -20,7 +25,7 @@ class Misfit:
     Parameters
     ----------
     residual_sd
-        Standard deviation (m) of the residuals per axis, outliers discounted.
+        Standard deviation (m) of the residuals per axis, gross outliers left out.
     noise_sd
         Standard deviation (m) of the measurement noise: the stated one where there is one, at least that of the
         tracks' roughness.
@@ -105,7 +110,7 @@ class Misfit:
         return text
 
 
-def judge(likelihood: Likelihood, point: Float[np.ndarray, "dimension"], noise: float, outliers: int) -> Misfit:
+def judge(likelihood: Likelihood, point: Float[np.ndarray, "dimension"], clues: Clues) -> Misfit:
     """Compare what a fit predicts with what was seen.
 
     Parameters
@@ -114,30 +119,46 @@ def judge(likelihood: Likelihood, point: Float[np.ndarray, "dimension"], noise: 
         The density that was fitted.
     point
         The fit.
-    noise
-        Measurement noise (m) from the tracks' roughness.
-    outliers
-        Number of gross outliers in the tracks.
+    clues
+        Noise and outliers that the tracks show by themselves.
     """
-    tracks, observations = likelihood.tracks, likelihood.observations
+    tracks = likelihood.tracks
     residuals = tracks.positions - likelihood.predicted(torch.from_numpy(point[None]))[0, :, :, :2]
-    shares = np.full(tracks.seen.shape, np.nan)
-    shares[observations.frame, observations.body] = likelihood.information_shares(torch.from_numpy(point[None]))[0][0]
-    weights = shares[..., None] * np.ones(2)
-    squares = np.where(np.isnan(weights), 0.0, weights * np.nan_to_num(residuals) ** 2)
-    counted = np.nansum(weights, axis=(0, 2))
-    per_body = np.sqrt(squares.sum(axis=(0, 2)) / counted)
-    worst = int(np.argmax(per_body))
-    stated = 0.0 if tracks.position_covariance is None else observations.position_reference
+    residuals[standing_out(residuals, clues)] = np.nan
+    squares = np.nanmean(residuals**2, axis=(0, 2))
+    worst = int(np.argmax(squares))
+    stated = 0.0 if tracks.position_covariance is None else likelihood.observations.position_reference
     return Misfit(
-        residual_sd=float(np.sqrt(squares.sum() / counted.sum())),
-        noise_sd=max(noise, stated),
+        residual_sd=float(np.sqrt(np.nanmean(residuals**2))),
+        noise_sd=max(clues.noise, stated),
         noise_stated=tracks.position_covariance is not None,
-        correlation=_neighbour_correlation(np.sqrt(weights) * residuals),
+        correlation=_neighbour_correlation(residuals),
         worst=tracks.bodies[worst].id,
-        worst_sd=float(per_body[worst]),
-        outliers=outliers,
+        worst_sd=float(np.sqrt(squares[worst])),
+        outliers=int(clues.outliers.sum()),
     )
+
+
+def standing_out(residuals: Float[np.ndarray, "time body 2"], clues: Clues) -> Bool[np.ndarray, "time body"]:
+    """Which residuals are errors of the measurement and no measure of the model, whatever else it leaves unexplained.
+
+    These are gross outliers of the tracks, and residuals far off those before and after: where a model is wrong,
+    neighbours are off alike, which noise with heavy tails would take for outliers.
+
+    Parameters
+    ----------
+    residuals
+        Differences (m) of what was seen from what a fit predicts; NaN where nothing was seen.
+    clues
+        Noise and outliers that the tracks show by themselves.
+    """
+    found = clues.outliers.copy()
+    for body in range(residuals.shape[1]):
+        seen = np.flatnonzero(np.isfinite(residuals[:, body, 0]) & ~found[:, body])
+        around = median_filter(residuals[seen, body], size=(NEIGHBOURS, 1), mode="nearest")
+        distance = np.linalg.norm(residuals[seen, body] - around, axis=-1)
+        found[seen, body] = distance > FARTHEST * clues.position_sd[seen, body]
+    return found
 
 
 def _neighbour_correlation(residuals: Float[np.ndarray, "time body 2"]) -> float:

@@ -16,7 +16,7 @@ from scipy.optimize import OptimizeResult, minimize
 
 from vrdp_prob.inference.clues import Clues
 from vrdp_prob.inference.least_squares import jacobian
-from vrdp_prob.inference.misfit import Misfit
+from vrdp_prob.inference.misfit import Misfit, standing_out
 from vrdp_prob.inference.noise_fit import NOISE_FIELDS
 from vrdp_prob.models.likelihood import Likelihood
 from vrdp_prob.models.model_error import ModelError, Strand
@@ -114,7 +114,7 @@ def expected_model_error(likelihood: Likelihood, point: Float[np.ndarray, "dimen
     A first fit that lacks it may have its contacts at wrong times, which would look like much larger accelerations.
     """
     share = EXPECTED_SHARE * clues.acceleration / clues.noise
-    position, angle = _variances(likelihood, point)
+    position, angle = _variances(likelihood, point, clues)
     scales = likelihood.coordinates.quantities(torch.from_numpy(point[None]))
     return ModelError(
         noise_scale=clues.noise / likelihood.observations.position_reference,
@@ -139,7 +139,7 @@ def fit_model_error(likelihood: Likelihood, point: Float[np.ndarray, "dimension"
     clues
         Noise and accelerations that the tracks show by themselves.
     """
-    positions, angles = _linear(likelihood, point)
+    positions, angles = _linear(likelihood, point, clues)
     found = _search(likelihood, clues).run(positions)
     if found is None:
         return None
@@ -228,7 +228,7 @@ def _spread(linear: _Linear) -> float:
     return float(np.sqrt(np.mean(linear.residuals**2 / linear.variance)))
 
 
-def _linear(likelihood: Likelihood, point: Float[np.ndarray, "dimension"]) -> tuple[_Linear, _Linear]:
+def _linear(likelihood: Likelihood, point: Float[np.ndarray, "dimension"], clues: Clues) -> tuple[_Linear, _Linear]:
     """The residuals of positions and of angles as functions of what the worlds depend on."""
     coordinates = likelihood.coordinates
     free = ~coordinates.mask(NOISE_FIELDS)
@@ -243,7 +243,7 @@ def _linear(likelihood: Likelihood, point: Float[np.ndarray, "dimension"]) -> tu
 
     values, derivative = jacobian(discrepancies, point, coordinates.scale, active=free, central=True)
     prior_values, prior_derivative = jacobian(prior, point, coordinates.scale, active=free, central=True)
-    position, angle = _variances(likelihood, point)
+    position, angle = _variances(likelihood, point, clues)
     count = 2 * len(position)
     strands = likelihood.strands
     return (
@@ -267,10 +267,17 @@ def _linear(likelihood: Likelihood, point: Float[np.ndarray, "dimension"]) -> tu
 
 
 def _variances(
-    likelihood: Likelihood, point: Float[np.ndarray, "dimension"]
+    likelihood: Likelihood, point: Float[np.ndarray, "dimension"], clues: Clues
 ) -> tuple[Float[np.ndarray, "observation"], Float[np.ndarray, "angle"]]:
-    """Variance factors of positions and angles: those of an earlier model error, else by how far off they are."""
+    """Variance factors of positions and angles: those of an earlier model error, else by how far off they are.
+
+    A position that is off as those before and after is what the model error is for.
+    """
     if likelihood.model_error is not None:
         return likelihood.model_error.position_variance, likelihood.model_error.angle_variance
-    position, angle = likelihood.information_shares(torch.from_numpy(point[None]))
-    return np.minimum(1 / position[0], LARGEST_VARIANCE), np.minimum(1 / angle[0], LARGEST_VARIANCE)
+    draws = torch.from_numpy(point[None])
+    position, angle = likelihood.information_shares(draws)
+    residuals = likelihood.tracks.positions - likelihood.predicted(draws)[0, :, :, :2]
+    alone = standing_out(residuals, clues)[likelihood.observations.frame, likelihood.observations.body]
+    variance = np.where(alone, np.minimum(1 / position[0], LARGEST_VARIANCE), 1.0)
+    return variance, np.minimum(1 / angle[0], LARGEST_VARIANCE)

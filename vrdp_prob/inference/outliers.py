@@ -8,6 +8,8 @@ from vrdp_prob.scene import Tracks
 FARTHEST = 7.0
 """A position is an outlier if all that its neighbours predict for it is farther off than so many standard deviations.
 A contact between two frames leaves the prediction from at least one side intact."""
+OVERSHOOT = 1.5
+"""A soft contact may throw a body back faster than it leaves; velocities lie within so many halves of their change."""
 ROUNDS = 3
 FEWEST_LEFT = 4
 """Positions of a body that are kept in any case."""
@@ -27,6 +29,11 @@ def gross_outliers(tracks: Tracks, sd: Float[np.ndarray, "time body"]) -> Bool[n
             if not new.any() or len(kept) - int(new.sum()) < FEWEST_LEFT:
                 break
             found[seen[new], body] = True
+    fastest = max((_fastest(tracks, body, ~found[:, body]) for body in range(len(tracks.bodies))), default=0.0)
+    for body in range(len(tracks.bodies)):
+        seen = np.flatnonzero(tracks.seen[:, body])
+        smooth = _smooth(tracks.times[seen], tracks.positions[seen, body], found[seen, body], sd[seen, body], fastest)
+        found[seen[smooth], body] = False
     return found
 
 
@@ -67,3 +74,40 @@ def _far_off(
             spread = np.linalg.norm([sd[place], share * sd[second], (1 - share) * sd[first]])
             nearest[place] = min(nearest[place], float(np.linalg.norm(positions[place] - predicted) / spread))
     return np.isfinite(nearest) & (nearest > FARTHEST)
+
+
+def _smooth(
+    times: Float[np.ndarray, "seen"],
+    positions: Float[np.ndarray, "seen 2"],
+    outliers: Bool[np.ndarray, "seen"],
+    sd: Float[np.ndarray, "seen"],
+    fastest: float,
+) -> Bool[np.ndarray, "seen"]:
+    """Outliers in a row that may well be motion.
+
+    Through some a body goes over from its velocity before to that after: a soft contact. Others are all that was seen
+    of a body before its first contact or after its last one, where it is not much faster than anything else.
+    """
+    found = np.zeros(len(times), dtype=bool)
+    velocity = np.diff(positions, axis=0) / np.diff(times)[:, None]
+    velocity_sd = np.hypot(sd[1:], sd[:-1]) / np.diff(times)
+    edges = np.flatnonzero(np.diff(outliers, prepend=False, append=False))
+    for first, end in edges.reshape(-1, 2):
+        if first > 1 and end + 1 < len(times) and not outliers[first - 2] and not outliers[end + 1]:
+            middle = (velocity[first - 2] + velocity[end]) / 2
+            reach = float(np.linalg.norm(velocity[end] - velocity[first - 2])) / 2
+        elif end - first > 1 and (first == 0 or end == len(times)):
+            middle, reach = np.zeros(2), fastest
+        else:
+            continue
+        inside = slice(max(first - 1, 0), end)
+        distance = np.linalg.norm(velocity[inside] - middle, axis=-1)
+        found[first:end] = (distance <= OVERSHOOT * reach + FARTHEST * velocity_sd[inside]).all()
+    return found
+
+
+def _fastest(tracks: Tracks, body: int, trusted: Bool[np.ndarray, "time"]) -> float:
+    """Largest speed (m/s) of a body between two trusted positions in a row."""
+    seen = np.flatnonzero(tracks.seen[:, body])
+    speed = np.linalg.norm(np.diff(tracks.positions[seen, body], axis=0), axis=-1) / np.diff(tracks.times[seen])
+    return float(speed[trusted[seen[1:]] & trusted[seen[:-1]]].max(initial=0.0))

@@ -57,6 +57,8 @@ class Likelihood:
         Distribution of the measurement errors.
     model_error
         What the model leaves unexplained; None where it explains everything. It goes with Gaussian noise.
+    left_out
+        Positions that do not count, though the bodies were there; None for none.
     """
 
     tracks: Tracks
@@ -64,11 +66,12 @@ class Likelihood:
     coordinates: Coordinates
     noise: NoiseFamily = NoiseFamily.GAUSSIAN
     model_error: ModelError | None = None
+    left_out: Bool[np.ndarray, "time body"] | None = None
 
     @cached_property
     def observations(self) -> Observations:
         """What was seen, as flat lists."""
-        return Observations.of(self.tracks)
+        return Observations.of(self.tracks, self.left_out)
 
     @cached_property
     def strands(self) -> Strands:

@@ -56,9 +56,9 @@ class Observations:
     body_count: int
 
     @classmethod
-    def of(cls, tracks: Tracks) -> "Observations":
-        """What the tracks hold, whitened by their covariances where these are given."""
-        frame, body = np.nonzero(tracks.seen)
+    def of(cls, tracks: Tracks, left_out: Bool[np.ndarray, "time body"] | None = None) -> "Observations":
+        """What the tracks hold but for positions that are left out, whitened by their covariances where given."""
+        frame, body = np.nonzero(tracks.seen if left_out is None else tracks.seen & ~left_out)
         position = tracks.positions[frame, body]
         whitening, reference = _whitening(tracks, frame, body)
         angle_seen = _angles_that_tell(tracks)

@@ -253,7 +253,7 @@ def _with_misfit(
 ) -> MapFit:
     """A video's own fit with what its residuals are where it shares numbers with the others."""
     point = video.points(shared, own)
-    return replace(fit, misfit=judge(video.likelihood, point, fit.clues.noise, fit.misfit.outliers))
+    return replace(fit, misfit=judge(video.likelihood, point, fit.clues))
 
 
 def _asking_dissenters(joint: JointFit, fits: Sequence[MapFit]) -> JointFit:
@@ -313,8 +313,7 @@ def _finished(
 ) -> SharedFit:
     """The joint fit with what the model leaves unexplained, and each video's part of it."""
     misfits = [
-        judge(video.likelihood, joint.point(index), fits[index].clues.noise, fits[index].misfit.outliers)
-        for index, video in enumerate(joint.videos)
+        judge(video.likelihood, joint.point(index), fits[index].clues) for index, video in enumerate(joint.videos)
     ]
     for _ in range(TURNS if model_error else 0):
         errors = [

@@ -6,8 +6,6 @@
 >>> posterior.ask("How many collisions happen?").probability
 """
 
-__version__ = "0.1.0"
-
 from vrdp_prob.concepts.physical import Example, LearnedWord, learn_concept
 from vrdp_prob.datasets import load, load_all
 from vrdp_prob.discovery.discover import discover
@@ -18,6 +16,7 @@ from vrdp_prob.models.physics import PhysicsModel
 from vrdp_prob.reasoning import Answer, AskablePosterior, ask, infer
 from vrdp_prob.report.pipeline import Report, report
 from vrdp_prob.scene import Body, Camera, Event, Question, Tracks, Wall
+from vrdp_prob.version import __version__
 
 __all__ = [
     "Answer",
@@ -35,6 +34,7 @@ __all__ = [
     "Report",
     "Tracks",
     "Wall",
+    "__version__",
     "ask",
     "discover",
     "infer",

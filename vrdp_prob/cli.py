@@ -11,7 +11,6 @@ from typing import Annotated
 
 import typer
 
-from vrdp_prob import __version__
 from vrdp_prob.command_inputs import (
     RULES,
     check_concepts,
@@ -60,6 +59,7 @@ from vrdp_prob.report.pipeline import Report
 from vrdp_prob.report.pipeline import report as write_report
 from vrdp_prob.report.wording import with_names
 from vrdp_prob.scene import Choice, Question
+from vrdp_prob.version import __version__
 
 UNUSABLE_INPUT = 2
 FAILURE = 1

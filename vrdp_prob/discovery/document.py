@@ -8,12 +8,12 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from vrdp_prob import __version__
 from vrdp_prob.discovery.finding import Check, Finding, FoundCause, Gain
 from vrdp_prob.discovery.page import NO_FIGURES, render
 from vrdp_prob.discovery.summary import verdict_sentence
 from vrdp_prob.files import write_atomically
 from vrdp_prob.models.physics import PhysicsModel
+from vrdp_prob.version import __version__
 
 
 class FindingFiles(NamedTuple):

@@ -6,7 +6,6 @@ from typing import Any
 
 from markupsafe import Markup
 
-from vrdp_prob import __version__
 from vrdp_prob.datasets.folder import some
 from vrdp_prob.discovery.finding import Check, Description, Finding, FoundCause, Verdict
 from vrdp_prob.discovery.gain_figure import error_figure, video_figure
@@ -26,6 +25,7 @@ from vrdp_prob.discovery.wording import (
 )
 from vrdp_prob.report.templating import asset, environment
 from vrdp_prob.report.wording import counted, listed, sentence
+from vrdp_prob.version import __version__
 
 NO_FIGURES: Mapping[str, str] = {}
 ALIKE = (

@@ -5,9 +5,9 @@ from dataclasses import dataclass, fields
 from functools import cached_property, wraps
 from typing import ParamSpec
 
-from vrdp_prob import inference
 from vrdp_prob.errors import InputError
 from vrdp_prob.inference import Posterior
+from vrdp_prob.inference import infer as infer_posterior
 from vrdp_prob.progress import ProgressDisplay
 from vrdp_prob.reasoning.adaptive import answer_within
 from vrdp_prob.reasoning.answer import Answer
@@ -126,4 +126,4 @@ def _askable(infer: Callable[Options, Posterior]) -> Callable[Options, AskablePo
     return infer_askable
 
 
-infer = _askable(inference.infer)
+infer = _askable(infer_posterior)

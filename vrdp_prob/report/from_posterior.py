@@ -5,7 +5,6 @@ from collections.abc import Sequence
 import numpy as np
 from jaxtyping import UInt8
 
-from vrdp_prob import __version__
 from vrdp_prob.inference.posterior import Posterior
 from vrdp_prob.inference.prior_sensitivity import prior_sensitivity
 from vrdp_prob.progress import ProgressDisplay
@@ -16,6 +15,7 @@ from vrdp_prob.report.asked import world_of
 from vrdp_prob.report.content import AnswerContent, ReportContent
 from vrdp_prob.report.footage import footage
 from vrdp_prob.report.rollouts import player_worlds
+from vrdp_prob.version import __version__
 
 PLAYER_DRAWS = 30
 """Posterior draws that the player shows."""

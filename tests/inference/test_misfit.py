@@ -1,5 +1,7 @@
 """What a fit leaves is told from gross outliers, whatever the noise is taken for."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -12,8 +14,8 @@ from vrdp_prob.models.noise import NoiseFamily
 from vrdp_prob.scene import Tracks
 
 
-def fitted(tracks: Tracks) -> MapFit:
-    return fit_map(tracks, default_model(), np.random.default_rng(0))
+def fitted(tracks: Tracks, noise: NoiseFamily | None = None) -> MapFit:
+    return fit_map(tracks, default_model(), np.random.default_rng(0), noise=noise)
 
 
 @pytest.mark.parametrize("seed", [2, 3])
@@ -38,3 +40,22 @@ def test_a_push_that_no_model_knows_shows_among_outliers() -> None:
     assert fit.misfit.outliers
     assert not fit.misfit.fits
     assert fit.misfit.error_acceleration is not None
+
+
+def test_gaussian_noise_counts_what_stands_out() -> None:
+    fit = fitted(observe(chain(), noise=0.005, seed=2))
+    assert fit.misfit.ratio == pytest.approx(1.0, abs=0.15)
+    astray = fit.clues.tracks.positions.copy()
+    astray[30:33, 0] += 0.1
+    tracks = fit.clues.tracks
+    moved = Tracks.from_arrays("mistimed", tracks.bodies, tracks.times, astray)
+    judged = judge(replace(fit.likelihood, tracks=moved), fit.point, fit.clues)
+    squares = fit.misfit.residual_sd**2 + 3 * 0.1**2 / tracks.seen.sum()
+    assert judged.residual_sd == pytest.approx(np.sqrt(squares), rel=0.05)
+
+
+def test_gaussian_noise_that_was_asked_for_counts_outliers_and_says_so() -> None:
+    tracks = with_outliers(observe(chain(), noise=0.005, seed=2), 0.05)
+    misfit = fitted(tracks, NoiseFamily.GAUSSIAN).misfit
+    assert misfit.large
+    assert "as was asked for" in misfit.sentences[-1]

@@ -61,14 +61,34 @@ def test_soft_contacts_are_none_and_outliers_within_them_are() -> None:
     assert Clues.of(Tracks.from_arrays("struck", soft.bodies, times, positions)).outliers[41, 0]
 
 
-def test_what_comes_before_a_first_contact_is_none() -> None:
+def early_contact() -> tuple[np.ndarray, np.ndarray]:
+    """Times, and positions (time, body, 2) of a sphere that something strikes after two frames, and of another."""
     times = np.arange(40) / 25
     along = np.where(times < 0.06, 1.5 * times, 0.09 - 0.4 * (times - 0.06))
     struck = np.stack([along, 0.2 * times], axis=-1)
     other = np.stack([np.ones(40), 1.2 * times], axis=-1)
     positions = np.stack([struck, other], axis=1)
-    positions += np.random.default_rng(0).normal(0, 1e-3, positions.shape)
-    bodies = (Body("a", Shape.SPHERE), Body("b", Shape.SPHERE))
-    assert not Clues.of(Tracks.from_arrays("early", bodies, times, positions)).outliers.any()
+    return times, positions + np.random.default_rng(0).normal(0, 1e-3, positions.shape)
+
+
+def outliers(times: np.ndarray, positions: np.ndarray) -> np.ndarray:
+    bodies = tuple(Body(str(place), Shape.SPHERE) for place in range(positions.shape[1]))
+    return Clues.of(Tracks.from_arrays("spheres", bodies, times, positions)).outliers
+
+
+def test_what_comes_before_a_first_contact_is_none() -> None:
+    times, positions = early_contact()
+    assert not outliers(times, positions).any()
+
+
+@pytest.mark.parametrize("elsewhere", ["nothing", "a jump for good", "a short track"])
+def test_the_first_positions_may_be_outliers_whatever_happens_elsewhere(elsewhere: str) -> None:
+    times, positions = early_contact()
     positions[:2, 0] += [[0.5, 0.0], [0.0, 0.5]]
-    assert Clues.of(Tracks.from_arrays("spoilt", bodies, times, positions)).outliers[:2, 0].all()
+    if elsewhere == "a jump for good":
+        positions[20:, 1, 0] += 2.0
+    if elsewhere == "a short track":
+        short = np.full((40, 1, 2), np.nan)
+        short[30:35, 0] = [[0.0, 0.0], [1.0, 2.0], [-1.0, 0.5], [2.0, -1.0], [0.0, 1.0]]
+        positions = np.concatenate([positions, short], axis=1)
+    assert outliers(times, positions)[:2, 0].all()

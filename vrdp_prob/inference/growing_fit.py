@@ -194,7 +194,7 @@ class GrowingFit:
     def _active(self, frame_count: int, touched: frozenset[int] = frozenset()) -> Bool[np.ndarray, "dimension"]:
         """Coordinates that can matter in the first frames."""
         tracks = self.likelihood.tracks
-        released = np.flatnonzero(tracks.seen[:frame_count].any(axis=0)).tolist()
+        released = np.unique(self.likelihood.observations.until(frame_count).body).tolist()
         last = float(tracks.times[frame_count - 1])
         contacts = self._clues.contacts
         seen = {body for contact in contacts if contact.time <= last for body in (contact.first, contact.second)}

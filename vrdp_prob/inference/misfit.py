@@ -4,14 +4,16 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import torch
-from jaxtyping import Bool, Float
+from jaxtyping import Float
 from scipy.ndimage import median_filter
 
 from vrdp_prob.inference.clues import Clues
 from vrdp_prob.inference.outliers import FARTHEST
 from vrdp_prob.models.likelihood import Likelihood
 from vrdp_prob.models.model_error import ModelError
+from vrdp_prob.models.noise import NoiseFamily
 
+TINY = 1e-300
 NEIGHBOURS = 5
 """Residuals in a row whose median says what is usual there."""
 LARGEST_RATIO = 1.5
@@ -25,7 +27,8 @@ class Misfit:
     Parameters
     ----------
     residual_sd
-        Standard deviation (m) of the residuals per axis, gross outliers left out.
+        Standard deviation (m) of the residuals per axis. Under Student-t noise gross outliers are left out, and others
+        count for as much as the largest error that is none.
     noise_sd
         Standard deviation (m) of the measurement noise: the stated one where there is one, at least that of the
         tracks' roughness.
@@ -37,6 +40,8 @@ class Misfit:
         Id of the body with the largest residuals, and `worst_sd` their standard deviation in m.
     outliers
         Number of positions that lie far off those before and after.
+    outliers_count
+        Whether they count in full, since Gaussian noise was asked for.
     error_acceleration, error_duration
         Size (m/s^2) and duration (s) of the unknown acceleration that the intervals allow for; None where none is
         needed.
@@ -49,6 +54,7 @@ class Misfit:
     worst: str
     worst_sd: float
     outliers: int = 0
+    outliers_count: bool = False
     error_acceleration: float | None = None
     error_duration: float | None = None
 
@@ -78,9 +84,11 @@ class Misfit:
         found: tuple[str, ...] = () if self.fits else (self._misfit_sentence(),)
         if self.outliers:
             positions = "1 position lies" if self.outliers == 1 else f"{self.outliers} positions lie"
-            found += (
-                f"{positions} far off those before and after; the noise is taken as Student-t, which discounts them.",
-            )
+            if self.outliers_count:
+                taken = "Gaussian, as was asked for, so that they count in full"
+            else:
+                taken = "Student-t, which discounts them"
+            found += (f"{positions} far off those before and after; the noise is taken as {taken}.",)
         return found
 
     def with_error(self, error: ModelError, reference: float) -> "Misfit":
@@ -124,7 +132,9 @@ def judge(likelihood: Likelihood, point: Float[np.ndarray, "dimension"], clues: 
     """
     tracks = likelihood.tracks
     residuals = tracks.positions - likelihood.predicted(torch.from_numpy(point[None]))[0, :, :, :2]
-    residuals[standing_out(residuals, clues)] = np.nan
+    robust = likelihood.noise is NoiseFamily.STUDENT_T
+    if robust:
+        residuals = tempered(residuals, clues)
     squares = np.nanmean(residuals**2, axis=(0, 2))
     worst = int(np.argmax(squares))
     stated = 0.0 if tracks.position_covariance is None else likelihood.observations.position_reference
@@ -136,14 +146,15 @@ def judge(likelihood: Likelihood, point: Float[np.ndarray, "dimension"], clues: 
         worst=tracks.bodies[worst].id,
         worst_sd=float(np.sqrt(squares[worst])),
         outliers=int(clues.outliers.sum()),
+        outliers_count=not robust,
     )
 
 
-def standing_out(residuals: Float[np.ndarray, "time body 2"], clues: Clues) -> Bool[np.ndarray, "time body"]:
-    """Which residuals are errors of the measurement and no measure of the model, whatever else it leaves unexplained.
+def tempered(residuals: Float[np.ndarray, "time body 2"], clues: Clues) -> Float[np.ndarray, "time body 2"]:
+    """Residuals as a measure of what a model leaves unexplained, in spite of outliers.
 
-    These are gross outliers of the tracks, and residuals far off those before and after: where a model is wrong,
-    neighbours are off alike, which noise with heavy tails would take for outliers.
+    Gross outliers of the tracks are left out, and what lies farther off the residuals around it than noise does is
+    drawn near to them. What is off as its neighbours are off stays: heavy tails would take that for outliers.
 
     Parameters
     ----------
@@ -152,13 +163,14 @@ def standing_out(residuals: Float[np.ndarray, "time body 2"], clues: Clues) -> B
     clues
         Noise and outliers that the tracks show by themselves.
     """
-    found = clues.outliers.copy()
+    result = np.where(clues.outliers[..., None], np.nan, residuals)
     for body in range(residuals.shape[1]):
-        seen = np.flatnonzero(np.isfinite(residuals[:, body, 0]) & ~found[:, body])
-        around = median_filter(residuals[seen, body], size=(NEIGHBOURS, 1), mode="nearest")
-        distance = np.linalg.norm(residuals[seen, body] - around, axis=-1)
-        found[seen, body] = distance > FARTHEST * clues.position_sd[seen, body]
-    return found
+        seen = np.flatnonzero(np.isfinite(result[:, body, 0]))
+        around = median_filter(result[seen, body], size=(NEIGHBOURS, 1), mode="mirror")
+        off = result[seen, body] - around
+        reach = FARTHEST * clues.position_sd[seen, body] / np.maximum(np.linalg.norm(off, axis=-1), TINY)
+        result[seen, body] = around + np.minimum(reach, 1.0)[:, None] * off
+    return result
 
 
 def _neighbour_correlation(residuals: Float[np.ndarray, "time body 2"]) -> float:

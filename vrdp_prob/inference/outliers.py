@@ -9,10 +9,12 @@ FARTHEST = 7.0
 """A position is an outlier if all that its neighbours predict for it is farther off than so many standard deviations.
 A contact between two frames leaves the prediction from at least one side intact."""
 OVERSHOOT = 1.5
-"""A soft contact may throw a body back faster than it leaves; velocities lie within so many halves of their change."""
+"""A soft contact may throw a body back faster than it leaves, by so much of half the change of its velocity."""
 ROUNDS = 3
 FEWEST_LEFT = 4
 """Positions of a body that are kept in any case."""
+FEWEST_KNOWN = 8
+"""Positions of a body from which its speeds are known to be no errors of the tracker."""
 PREDICTIONS = ((-2, -1), (-1, 1), (1, 2))
 """Neighbours, counted in seen frames, through which a straight line predicts a position."""
 
@@ -32,8 +34,10 @@ def gross_outliers(tracks: Tracks, sd: Float[np.ndarray, "time body"]) -> Bool[n
     fastest = max((_fastest(tracks, body, ~found[:, body]) for body in range(len(tracks.bodies))), default=0.0)
     for body in range(len(tracks.bodies)):
         seen = np.flatnonzero(tracks.seen[:, body])
-        smooth = _smooth(tracks.times[seen], tracks.positions[seen, body], found[seen, body], sd[seen, body], fastest)
-        found[seen[smooth], body] = False
+        motion = _may_be_motion(
+            tracks.times[seen], tracks.positions[seen, body], found[seen, body], sd[seen, body], fastest
+        )
+        found[seen[motion], body] = False
     return found
 
 
@@ -76,14 +80,14 @@ def _far_off(
     return np.isfinite(nearest) & (nearest > FARTHEST)
 
 
-def _smooth(
+def _may_be_motion(
     times: Float[np.ndarray, "seen"],
     positions: Float[np.ndarray, "seen 2"],
     outliers: Bool[np.ndarray, "seen"],
     sd: Float[np.ndarray, "seen"],
     fastest: float,
 ) -> Bool[np.ndarray, "seen"]:
-    """Outliers in a row that may well be motion.
+    """Outliers, one or several in a row, that may well be motion.
 
     Through some a body goes over from its velocity before to that after: a soft contact. Others are all that was seen
     of a body before its first contact or after its last one, where it is not much faster than anything else.
@@ -107,7 +111,10 @@ def _smooth(
 
 
 def _fastest(tracks: Tracks, body: int, trusted: Bool[np.ndarray, "time"]) -> float:
-    """Largest speed (m/s) of a body between two trusted positions in a row."""
+    """Largest speed (m/s) that a body keeps from one trusted position to the next and on to the one after."""
     seen = np.flatnonzero(tracks.seen[:, body])
+    if len(seen) < FEWEST_KNOWN:
+        return 0.0
     speed = np.linalg.norm(np.diff(tracks.positions[seen, body], axis=0), axis=-1) / np.diff(tracks.times[seen])
-    return float(speed[trusted[seen[1:]] & trusted[seen[:-1]]].max(initial=0.0))
+    speed[~(trusted[seen[1:]] & trusted[seen[:-1]])] = 0.0
+    return float(np.minimum(speed[1:], speed[:-1]).max(initial=0.0))

@@ -58,7 +58,7 @@ class Likelihood:
     model_error
         What the model leaves unexplained; None where it explains everything. It goes with Gaussian noise.
     left_out
-        Positions that do not count, though the bodies were there; None for none.
+        Sights that do not count, though the bodies were there; None for none.
     """
 
     tracks: Tracks

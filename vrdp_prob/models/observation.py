@@ -57,11 +57,12 @@ class Observations:
 
     @classmethod
     def of(cls, tracks: Tracks, left_out: Bool[np.ndarray, "time body"] | None = None) -> "Observations":
-        """What the tracks hold but for positions that are left out, whitened by their covariances where given."""
-        frame, body = np.nonzero(tracks.seen if left_out is None else tracks.seen & ~left_out)
+        """What the tracks hold but for what is left out, positions whitened by their covariances where given."""
+        used = np.ones_like(tracks.seen) if left_out is None else ~left_out
+        frame, body = np.nonzero(tracks.seen & used)
         position = tracks.positions[frame, body]
         whitening, reference = _whitening(tracks, frame, body)
-        angle_seen = _angles_that_tell(tracks)
+        angle_seen = _angles_that_tell(tracks) & used
         angle_frame, angle_body = np.nonzero(angle_seen)
         angles = tracks.angles
         angle = np.zeros(0) if angles is None else angles[angle_frame, angle_body]

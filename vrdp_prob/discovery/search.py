@@ -50,7 +50,8 @@ class Step:
     beside_chance
         The same beside what the model leaves to chance.
     tried
-        Refits with one more cause, the best first; what patches several videos comes last, unless all else is doubted.
+        Refits with one more cause, the best first; what patches several videos comes last, unless the best other one
+        is in doubt.
     overdispersion
         Of each video, by what the model leaves unexplained before the step.
     """

@@ -45,9 +45,9 @@ LINGERING_SLIP = 1e-7
 STRAIGHT = 1e-9
 """Sine of the angle between velocity and acceleration below which a motion counts as straight."""
 SLOWEST = 1e-10
-"""Speed in m/s (or rad/s) below which a body rests."""
+"""Speed in m/s (or rad/s) below which a body rests, and with which it starts where there is no friction."""
 LAUNCH = 2.0 * VANISHED
-"""Speed in m/s with which a body at rest starts when a force moves it; far above the error of a step."""
+"""Speed in m/s with which a body starts in spite of friction; far above the error of a step."""
 GRIP = 1e-3
 """Relative excess of a push over friction up to which a body at rest stays.
 
@@ -131,7 +131,7 @@ def settle(world, body, t, y):
     y[3], y[4] = 0.0, 0.0
     set_push_at(world, body, t, y)
     if yields(push):
-        launch(y, push)
+        launch(y, push, LAUNCH if push[2] > 0.0 else SLOWEST)
     elif push[2] > 0.0:
         phase[MOVING] = RESTING
     if world.model[SLIPS]:
@@ -145,10 +145,10 @@ def yields(push):
 
 
 @compiled
-def launch(y, push):
+def launch(y, push, speed):
     """Let a body at rest move the way it is pushed."""
     size = math.hypot(push[0], push[1])
-    y[3], y[4] = LAUNCH * push[0] / size, LAUNCH * push[1] / size
+    y[3], y[4] = speed * push[0] / size, speed * push[1] / size
 
 
 @compiled

@@ -27,7 +27,7 @@ from vrdp_prob.models.simulator.cluster_kernel import (
     set_touch_count,
     touch_count,
 )
-from vrdp_prob.models.simulator.ending_kernel import SLOWEST, VANISHED, launch, set_push_at, settle, yields
+from vrdp_prob.models.simulator.ending_kernel import LAUNCH, SLOWEST, VANISHED, launch, set_push_at, settle, yields
 from vrdp_prob.models.simulator.laws_kernel import COUPLED, compiled
 from vrdp_prob.models.simulator.motion_kernel import add_pair_forces, cluster_derivatives, derivatives, take_states
 from vrdp_prob.models.simulator.world_kernel import (
@@ -189,7 +189,7 @@ def find_yielding(world, cluster, t, horizon):
 def start(world, body):
     """Let a body at rest move the way it is pushed."""
     world.phase[body, MOVING] = SLIDING
-    launch(world.polynomial[body, 0], world.stages[PUSH, body])
+    launch(world.polynomial[body, 0], world.stages[PUSH, body], LAUNCH)
 
 
 @compiled
@@ -324,8 +324,8 @@ def leans(world, touch, t):
 def choose_contacts(world, cluster, t):
     """Decide which contacts of a cluster last, and which of its bodies move.
 
-    A body at rest starts to move when it is pushed harder than friction holds; one that its own forces would move but
-    that is held by others leans on them, and no longer pushes them while all are at rest.
+    A body at rest starts to move when it is pushed harder than friction holds (by more than `GRIP`); one that its own
+    forces would move but that is held by others leans on them, and no longer pushes them while all are at rest.
     """
     for place in range(world.members[cluster, 0]):
         body = world.members[cluster, 1 + place]

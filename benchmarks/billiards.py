@@ -4,8 +4,9 @@
 
 Tracks of ../shared/data/billiards_three_cushion, as in the real-world table of VRDP (Ding et al., NeurIPS 2021): the
 model and what all shots share are learned on frames 0 to 39 of the training videos; of each test video frames 0 to 19
-are seen, frames 20 to 39 are predicted, and questions ask what happens there. Constant velocity is what a person
-without a simulator would say. The finding, the learned models and each test video's errors are kept in `--results` as
+are seen, frames 20 to 39 are predicted, and questions ask what happens there. Positions are those of the best fit,
+as in the paper, probabilities those of the posterior. Constant velocity is what a person without a simulator would
+say. The finding, the learned models and each test video's errors are kept in `--results` as
 they come, so that a run that was interrupted goes on; delete that folder after a change of the code. `--docs` writes
 the tables into `billiards.md` there.
 """
@@ -33,6 +34,7 @@ from vrdp_prob.discovery.document import write_finding
 from vrdp_prob.evaluation.scores import calibration_error
 from vrdp_prob.files import write_atomically
 from vrdp_prob.inference import default_model, infer
+from vrdp_prob.inference.map_fit import fit_map
 from vrdp_prob.inference.several_videos import SharedFit, fit_together
 from vrdp_prob.inference.several_videos.learned import learned_model, with_learned_walls
 from vrdp_prob.models.physics import PhysicsModel
@@ -133,7 +135,7 @@ def _fitted(training: Sequence[Tracks], model: PhysicsModel, path: Path) -> Shar
     """What the training videos tell under a model."""
     if not path.exists():
         progress = progress_display(quiet=False)
-        fit = fit_together(training, model=model, seed=0, model_error=False, progress=progress)
+        fit = fit_together(training, model=model, seed=0, progress=progress)
         with write_atomically(path) as temporary:
             temporary.write_bytes(pickle.dumps(fit))
     fit = pickle.loads(path.read_bytes())
@@ -168,11 +170,13 @@ def _event(question: Mapping[str, object]) -> frozenset[str]:
 def _simulated(
     tracks: Tracks, model: PhysicsModel
 ) -> tuple[Float[np.ndarray, "time body 2"], dict[frozenset[str], float]]:
-    """Most probable positions, and the probability of each event, from the first frames alone."""
-    posterior = infer(_up_to(SEEN, tracks), sampler="laplace", model=model, seed=0, draws=DRAWS)
-    times = torch.tensor(tracks.times[:ASKED])
-    best = simulate(posterior.map_worlds(), times, model).trajectory[0, :, :, :2].numpy()
-    drawn = simulate(posterior.worlds(DRAWS), times, model)
+    """Positions of the best fit, and the posterior probability of each event, from the first frames alone."""
+    seen = _up_to(SEEN, tracks)
+    fit = fit_map(seen, model, np.random.default_rng(0), model_error=False)
+    longer = replace(fit.likelihood, tracks=_up_to(ASKED, tracks))
+    best = longer.rollout(torch.from_numpy(fit.point[None])).trajectory[0, :, :, :2].numpy()
+    posterior = infer(seen, sampler="laplace", model=model, seed=0, draws=DRAWS)
+    drawn = simulate(posterior.worlds(DRAWS), torch.tensor(tracks.times[:ASKED]), model)
     events, names = drawn.events, [body.id for body in tracks.bodies]
     asked = (events.time > tracks.times[SEEN - 1]) & (events.time <= tracks.times[ASKED - 1])
     found: dict[frozenset[str], float] = {}

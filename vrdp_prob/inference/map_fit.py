@@ -156,8 +156,14 @@ def fit_map(
     structure = structure_at(everything, starts, clues.moving)
     likelihood = Likelihood(tracks, model, unknowns(tracks, model, structure, family), family)
     found = _refined(everything, starts, likelihood, stages)
-    misfit = judge(likelihood, found[0].point, clues)
     evaluations = sum(one.evaluations for one in attempts) + sum(one.evaluations for one in found)
+    if stages.alternatives and stages.yaws:
+        turned = other_yaws(likelihood, found[0].point)
+        elsewhere = _refined(likelihood, [one.point for one in turned], likelihood, stages)
+        evaluations += sum(one.evaluations for one in turned) + sum(one.evaluations for one in elsewhere)
+        # A model error may explain what another yaw explains, too; so both are candidates under one.
+        found = sorted([*found, *elsewhere], key=lambda one: -one.log_density)
+    misfit = judge(likelihood, found[0].point, clues)
     for _ in range(TURNS if model_error else 0):
         error = next_model_error(likelihood, found[0].point, clues, misfit)
         if error is None or error is likelihood.model_error:
@@ -167,12 +173,7 @@ def fit_map(
         likelihood = widened
         evaluations += sum(one.evaluations for one in found)
         misfit = misfit.with_error(error, likelihood.observations.position_reference)
-    if stages.alternatives and stages.yaws:
-        turned = other_yaws(likelihood, found[0].point)
-        elsewhere = _refined(likelihood, [one.point for one in turned], likelihood, stages)
-        evaluations += sum(one.evaluations for one in turned) + sum(one.evaluations for one in elsewhere)
-        found = _best([*found, *elsewhere])
-    climbed = _climbed(likelihood, found)
+    climbed = _climbed(likelihood, _best(found))
     while (wider := with_all_that_meet(likelihood, structure, [one.point for one in climbed])) is not None:
         structure, widened = wider
         climbed = _climbed(widened, _refined(likelihood, [one.point for one in climbed], widened, stages))

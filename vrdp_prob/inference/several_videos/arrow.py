@@ -87,6 +87,21 @@ class Expansion:
         return step
 
     @property
+    def promised(self) -> float:
+        """Gain (nats) that the Newton step of the own numbers promises."""
+        return float(self._pulled @ self._pulled) / 2
+
+    @cached_property
+    def separate_steps(self) -> Float[np.ndarray, "direction local"]:
+        """The Newton step of the own numbers in parts, one along each principal direction of the scaled curvature."""
+        own = self._blocks[0]
+        size = np.linalg.norm(own, axis=0)
+        _, widths, directions = np.linalg.svd(own / size)
+        along = directions @ (self.local_gradient / size) / widths**2
+        steps: np.ndarray = -along[:, None] * directions / size
+        return steps
+
+    @property
     def reduced_rows(self) -> Float[np.ndarray, "shared shared"]:
         """Derivatives of residuals by the shared numbers when the own ones follow them."""
         return self._blocks[2]

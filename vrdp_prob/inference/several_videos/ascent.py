@@ -123,8 +123,7 @@ def _inside(slopes: Expansions) -> Bool[np.ndarray, "video"]:
 
     Others are at an edge, and what they say there of the shared numbers is not to be believed.
     """
-    promised = [-float(one.local_gradient @ one.local_step) / 2 for one in slopes.videos]
-    inside = np.array([gain < STEEP for gain in promised], dtype=bool)
+    inside = np.array([one.promised < STEEP for one in slopes.videos], dtype=bool)
     return inside if inside.any() else np.ones(len(inside), dtype=bool)
 
 
@@ -147,9 +146,14 @@ def _improved(
     slopes: Expansions,
     step: Float[np.ndarray, "shared"],
 ) -> _State:
-    """The first share of a common step that brings something; where none does, what the videos' own steps bring."""
-    state = _settled(videos, state, slopes.videos)
+    """The first share of a common step that brings something; where none does, what the videos' own steps bring.
+
+    As long as videos at an edge gain much by themselves they are left to it: they would follow no common step.
+    """
+    start, state = state.total(numbers), _settled(videos, state, slopes.videos)
     before = state.total(numbers)
+    if before - start > EXPECTED and not _inside(slopes).all():
+        return state
     for share in SHARES:
         target = state.shared + share * step
         trial = _with_best_noise(numbers, videos, _followed(videos, state, target))
@@ -170,15 +174,44 @@ def _followed(videos: Sequence[LinkedVideo], state: _State, target: Float[np.nda
 
 
 def _settled(videos: Sequence[LinkedVideo], state: _State, expansions: Sequence[Expansion]) -> _State:
-    """Each video at the best share of its own Newton step."""
+    """Each video at the best that its own Newton step leads to."""
     locals_, values = [], []
     for video, local, value, one in zip(videos, state.locals, state.values, expansions, strict=True):
-        trials = local + OWN_SHARES[:, None] * one.local_step
-        found = video.log_density(np.tile(state.shared, (len(trials), 1)), trials)
+        steps = OWN_SHARES[:, None] * one.local_step
+        if one.promised > STEEP:
+            steps = np.concatenate([steps, _bent_steps(video, state.shared, local, value, one)])
+        found = _values(video, state.shared, local + steps)
         best = int(found.argmax())
-        locals_.append(trials[best] if found[best] > value else local)
+        locals_.append(local + steps[best] if found[best] > value else local)
         values.append(max(float(found[best]), value))
     return replace(state, locals=tuple(locals_), values=tuple(values))
+
+
+def _bent_steps(
+    video: LinkedVideo,
+    shared: Float[np.ndarray, "shared"],
+    local: Float[np.ndarray, "local"],
+    value: float,
+    expansion: Expansion,
+) -> Float[np.ndarray, "trial local"]:
+    """Steps made of those parts of the Newton step that bring something by themselves.
+
+    A few directions in which the density bends spoil the whole step, and damping it would hold back the flattest
+    directions most: a common factor on all masses, say, that only their priors know.
+    """
+    parts = expansion.separate_steps
+    trials = OWN_SHARES[:, None, None] * parts
+    gains = _values(video, shared, local + trials.reshape(-1, len(local))).reshape(trials.shape[:2]) - value
+    best = gains.argmax(axis=0)
+    brings = gains.max(axis=0) > 0
+    chosen = trials[best, np.arange(len(parts))]
+    return np.concatenate([OWN_SHARES[:, None] * chosen[brings].sum(axis=0), chosen[[int(gains.max(axis=0).argmax())]]])
+
+
+def _values(
+    video: LinkedVideo, shared: Float[np.ndarray, "shared"], locals_: Float[np.ndarray, "trial local"]
+) -> Float[np.ndarray, "trial"]:
+    return video.log_density(np.tile(shared, (len(locals_), 1)), locals_)
 
 
 def _with_best_noise(numbers: SharedNumbers, videos: Sequence[LinkedVideo], state: _State) -> _State:

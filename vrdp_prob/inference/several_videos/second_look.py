@@ -24,7 +24,7 @@ FAR_WORSE = 1.5
 """...and by this one the video is not asked for the shared numbers."""
 LOOKS = 4
 """Fits that are made anew of one video."""
-MOST = 3
+MOST = 2
 """One video in so many is looked at again."""
 SAME = 0.01
 """Fits whose residuals differ by a smaller share are taken for the same one, and unless they are far worse than those

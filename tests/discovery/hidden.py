@@ -137,7 +137,7 @@ _OF_THE_TABLE: Mapping[str, Callable[[Video], dict[str, float]]] = {
     "time_varying_friction": _laws(friction_trend="friction_trend"),
     "mass_dependent_friction": _exponent,
     "slip_to_roll": _laws(slip_friction="slip_friction"),
-    "contact_friction": _laws(contact_friction="contact_friction"),
+    "contact_friction": _laws(contact_friction="contact_friction", wall_friction="contact_friction"),
     "speed_dependent_restitution": _laws(
         restitution_exponent="restitution_power", restitution_speed="restitution_speed"
     ),

@@ -59,7 +59,10 @@ def scene_of(worlds: Worlds, index: int) -> reference.Scene:
         shapes=tuple(shape.value for shape in worlds.shapes),
         **{name: getattr(worlds, name)[index].numpy() for name in fields},
         parameters={name: float(values[index]) for name, values in worlds.parameters.items() if values.ndim == 1},
-        rolling_share=of_body.get("release_rolling", np.zeros(len(worlds.shapes))),
+        rolling_share=np.stack(
+            [of_body.get(name, np.zeros(len(worlds.shapes))) for name in ("release_rolling", "release_rolling_across")],
+            axis=-1,
+        ),
         walls=worlds.walls.numpy(),
         wall_restitution=worlds.restitution_of_walls[index].numpy(),
     )

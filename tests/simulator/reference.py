@@ -114,7 +114,8 @@ class _Simulation:
     def _release(self, body: int) -> None:
         scene = self.scene
         velocity = scene.velocity[body]
-        rolling = scene.rolling_share[body] * velocity
+        along, across = scene.rolling_share[body]
+        rolling = along * velocity + across * np.array([-velocity[1], velocity[0]])
         state = np.array([*scene.position[body], scene.angle[body], *velocity, scene.spin[body], *rolling])
         self.paths.append(self._path(body, scene.release_time[body], state))
         self.samples.append(self.paths[body].at(self.grid))
@@ -197,22 +198,42 @@ class _Simulation:
 
         With the inverse masses m, the inverse inertias k and the arms r across, an impulse J changes the relative
         velocity at the touching point by the matrix sum(m 1 + k r r^T) times J.
+
+        The horizontal axis of a sphere that rolls at u is z x u / R. On the first body the point at R n moves with
+        omega x R n = -(u n) z, on the second that at -R n with (u n) z. An impulse P z up on the second changes omega
+        by its lever's torque over (2/5) M R^2, so each u n by (5/2) P / M.
         """
-        across = [np.array([-(touch.point - state[:2])[1], (touch.point - state[:2])[0]]) for state in states]
+        arms = [np.array([-(touch.point - state[:2])[1], (touch.point - state[:2])[0]]) for state in states]
         inverse = sum(
             self.inverse_mass[body] * np.eye(2) + self.inverse_inertia[body] * np.outer(arm, arm)
-            for body, arm in zip((i, j), across, strict=True)
+            for body, arm in zip((i, j), arms, strict=True)
         )
-        velocities = [state[3:5] + state[5] * arm for state, arm in zip(states, across, strict=True)]
+        velocities = [state[3:5] + state[5] * arm for state, arm in zip(states, arms, strict=True)]
         normal, relative = touch.normal, velocities[1] - velocities[0]
         closing = -relative @ normal
         bounce = min(1.0, self.restitution[i] * self.restitution[j])
         size = (1 + bounce) * closing / (normal @ inverse @ normal)
         tangent = np.array([-normal[1], normal[0]])
-        limit = self.scene.parameters.get("contact_friction", 0.0) * size
-        sticking = -(tangent @ (relative + inverse @ normal * size)) / (tangent @ inverse @ tangent)
-        impulse = size * normal + np.clip(sticking, -limit, limit) * tangent
-        for body, state, arm, sign in zip((i, j), states, across, (-1, 1), strict=True):
+        coefficient = "contact_friction" if max(i, j) < self.count else "wall_friction"
+        limit = self.scene.parameters.get(coefficient, 0.0) * size
+        rolling = [(body, state) for body, state in zip((i, j), states, strict=True) if self._rolls(body)]
+        slide = np.array(
+            [tangent @ (relative + inverse @ normal * size), sum(state[6:8] @ normal for _, state in rolling)]
+        )
+        softness = np.array([tangent @ inverse @ tangent, sum(2.5 * self.inverse_mass[body] for body, _ in rolling)])
+        speed = np.hypot(*slide)
+        across, upward = [
+            -sliding * min(1 / soft, limit / speed) if sliding else 0.0
+            for sliding, soft in zip(slide, softness, strict=True)
+        ]
+        impulse = size * normal + across * tangent
+        for body, state, arm, sign in zip((i, j), states, arms, (-1, 1), strict=True):
             state[3:5] += sign * self.inverse_mass[body] * impulse
             state[5] += sign * self.inverse_inertia[body] * (arm @ impulse)
+            if self._rolls(body):
+                state[6:8] += 2.5 * self.inverse_mass[body] * upward * normal
         return float(closing)
+
+    def _rolls(self, body: int) -> bool:
+        """Whether a body has a spin about horizontal axes."""
+        return body < self.count and self.laws[body].slip_friction is not None

@@ -59,7 +59,7 @@ def test_a_law_must_not_branch() -> None:
 
 
 EXTENDED = PhysicsModel.base().with_effect(SurfaceTilt()).with_effect(LinearDrag()).with_effect(ContactFriction())
-NOTHING = {"tilt_x": 0.0, "tilt_y": 0.0, "linear_drag": 0.0, "contact_friction": 0.0}
+NOTHING = {"tilt_x": 0.0, "tilt_y": 0.0, "linear_drag": 0.0, "contact_friction": 0.0, "wall_friction": 0.0}
 
 
 def test_linear_drag() -> None:

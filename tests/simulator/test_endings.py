@@ -14,7 +14,7 @@ from vrdp_prob.models.simulator.outcome import Outcome
 from vrdp_prob.models.simulator.rollout import simulate
 from vrdp_prob.scene import Shape
 
-NOTHING_ELSE = {"linear_drag": 0.0, "contact_friction": 0.0}
+NOTHING_ELSE = {"linear_drag": 0.0, "contact_friction": 0.0, "wall_friction": 0.0}
 
 
 @pytest.mark.parametrize("share", [0.3, 0.86, 0.9, 0.98])

@@ -21,7 +21,12 @@ TIMES = torch.linspace(0, 4, 41, dtype=torch.float64)
 def _scene(speed: float = 1.0) -> Worlds:
     """Two discs that meet, and a third one that stays."""
     places, velocities = [[0, 0], [1, 0.1], [3, 3]], [[speed, 0], [0, 0], [0, 0]]
-    extra = {"linear_drag": 0.1, "slip_friction": 0.2, "release_rolling": [0.0] * 3}
+    extra = {
+        "linear_drag": 0.1,
+        "slip_friction": 0.2,
+        "release_rolling": [0.0] * 3,
+        "release_rolling_across": [0.0] * 3,
+    }
     return world(places, velocities, (DISC, DISC, DISC), extra)
 
 

@@ -10,6 +10,7 @@ from scipy.integrate import solve_ivp
 
 from tests.simulator.scenes import CUBE, DISC, FRAMES, RADIUS, SPHERE, at, tensor, world
 from vrdp_prob.errors import InputError
+from vrdp_prob.models.effects.contact_friction import ContactFriction
 from vrdp_prob.models.effects.contact_radius_error import ContactRadiusError
 from vrdp_prob.models.effects.external_impulse import ExternalImpulse
 from vrdp_prob.models.effects.friction_patch import FrictionPatch
@@ -30,6 +31,7 @@ GRAVITY = 9.81
 _ALONE = (SurfaceTilt, TimeVaryingFriction, FrictionPatch, HiddenObstacle, ContactRadiusError, ExternalImpulse)
 ALONE = PhysicsModel("alone", (*PhysicsModel.base().effects, *(effect() for effect in _ALONE)))
 TOGETHER = PhysicsModel("together", (*PhysicsModel.base().effects, PairForce(), SlipToRoll(), SurfaceTilt()))
+RUBBING = PhysicsModel("rubbing", (*PhysicsModel.base().effects, SlipToRoll(), ContactFriction()))
 GONE = {
     "tilt_x": 0.0,
     "tilt_y": 0.0,
@@ -47,8 +49,10 @@ GONE = {
     "pair_strength": 0.0,
     "pair_softening": 0.1,
     "slip_friction": 0.2,
+    "contact_friction": 0.0,
+    "wall_friction": 0.0,
 }
-OF_BODIES = {"impulse_x": 0.0, "impulse_y": 0.0, "release_rolling": 0.0}
+OF_BODIES = {"impulse_x": 0.0, "impulse_y": 0.0, "release_rolling": 0.0, "release_rolling_across": 0.0}
 
 
 def scene(
@@ -154,6 +158,36 @@ def test_a_rolling_sphere_on_a_slope_accelerates_with_five_sevenths_of_gravity_a
     assert at(worlds, 2.0, model=TOGETHER).trajectory[0, -1, 0, 0].item() == pytest.approx(
         1.0 + 5 / 7 * 0.02 * GRAVITY * 2, abs=1e-9
     )
+
+
+@pytest.mark.parametrize("friction", [0.1, 10.0])
+def test_a_sphere_that_rolls_into_a_wall_loses_rolling_by_friction_there(friction: float) -> None:
+    speed, bounce = 0.8, 0.7
+    worlds = scene(
+        [[0, 0]], [[speed, 0]], [SPHERE], restitution=[bounce], release_rolling=[1.0], wall_friction=friction
+    )
+    worlds = replace(worlds, walls=tensor([[1.0, -2.0, 1.0, 2.0]]), wall_restitution=tensor([[1.0]]))
+    velocity = at(worlds, 8.0, model=RUBBING).velocity[0, -1, 0, 0].item()
+    # Little friction gives all it can; much stops the sphere's surface where it touches, so it rolls no more.
+    rolling = max(speed - 2.5 * friction * (1 + bounce) * speed, 0.0)
+    assert velocity == pytest.approx((-5 * bounce * speed + 2 * rolling) / 7)
+
+
+def test_spheres_that_roll_against_each_other_take_up_rolling() -> None:
+    friction, speed, bounce = 0.05, 0.5, 0.9
+    worlds = scene(
+        [[0, 0], [1, 0]],
+        [[speed, 0], [0, 0]],
+        [SPHERE, SPHERE],
+        restitution=[bounce, 1.0],
+        release_rolling=[1.0, 0.0],
+        contact_friction=friction,
+    )
+    velocity = at(worlds, 6.0, model=RUBBING).velocity[0, -1, :, 0]
+    after = speed * (1 - bounce) / 2, speed * (1 + bounce) / 2
+    change = 2.5 * friction * after[1]
+    expected = [(5 * after[0] + 2 * (speed - change)) / 7, (5 * after[1] - 2 * change) / 7]
+    assert velocity.tolist() == pytest.approx(expected)
 
 
 def test_after_a_central_hit_between_rolling_spheres_both_slip() -> None:

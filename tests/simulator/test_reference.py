@@ -27,6 +27,7 @@ STRENGTHS = {
     "tilt_y": (-0.005, 0.005),
     "linear_drag": (0, 0.3),
     "contact_friction": (0, 0.5),
+    "wall_friction": (0, 0.5),
     "slip_friction": (0.1, 0.4),
 }
 SLIPPING = EXTENDED.with_effect(SlipToRoll())
@@ -42,6 +43,7 @@ def random_strengths(worlds: Worlds, model: PhysicsModel, seed: int) -> Worlds:
     more = {name: tensor(generator.uniform(*STRENGTHS[name], len(worlds))) for name in names if name in STRENGTHS}
     if "release_rolling" in names:
         more["release_rolling"] = tensor(generator.uniform(-0.2, 1.2, worlds.mass.shape))
+        more["release_rolling_across"] = tensor(generator.uniform(-0.5, 0.5, worlds.mass.shape))
     return replace(worlds, parameters={**worlds.parameters, **more})
 
 

@@ -130,6 +130,8 @@ class Parameter:
         Whether there is one value per video, per body or per material.
     shapes
         Shapes of the bodies whose motion depends on it; all where none are given.
+    needs_walls
+        Whether motion depends on it only where there is something fixed to touch.
     """
 
     name: str
@@ -140,6 +142,7 @@ class Parameter:
     default: float
     scope: Scope = Scope.SHARED
     shapes: frozenset[Shape] = frozenset(Shape)
+    needs_walls: bool = False
 
     def __post_init__(self) -> None:
         low, high = self.transform.support

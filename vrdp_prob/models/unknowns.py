@@ -21,7 +21,7 @@ from vrdp_prob.models.parameters import (
     Transform,
 )
 from vrdp_prob.models.physics import PhysicsModel
-from vrdp_prob.scene import Shape, Tracks
+from vrdp_prob.scene import Body, Shape, Tracks
 
 NOISE = "noise_scale"
 ANGLE_NOISE = "angle_noise_scale"
@@ -35,7 +35,9 @@ NOT_STATED = "unknown material"
 SPEED_SD = 3.0
 """Prior standard deviation in m/s of a release velocity."""
 SPIN_SD = 2.0
-"""Prior standard deviation in rad/s of a release spin."""
+"""Prior standard deviation in rad/s of a release spin..."""
+SURFACE_SPEED_SD = 1.0
+"""...or that of the speed in m/s at which the side of a round body turns, if that is more."""
 YAW_SD = 1.5
 """Prior standard deviation in rad of a cube's yaw: flat over the quarter turn after which a square looks the same."""
 ANGLE_ZERO_SD = 3.0
@@ -124,11 +126,19 @@ def _turning(tracks: Tracks, model: PhysicsModel, structure: Structure) -> Itera
             yield Coordinate("angle", body, Transform.IDENTITY, Prior(0.0, YAW_SD), scale=0.1)
         spin_matters = bends or (meets and (rubs or description.shape is Shape.CUBE))
         if body in structure.moving and (spin_matters or body in measured):
-            yield Coordinate("spin", body, Transform.IDENTITY, Prior(0.0, SPIN_SD), scale=0.1)
+            prior = Prior(0.0, _spin_sd(description))
+            yield Coordinate("spin", body, Transform.IDENTITY, prior, scale=0.1)
         if body in measured and angles is not None:
             seen = angles[:, body]
             first = float(seen[np.isfinite(seen)][0])
             yield Coordinate("angle_zero", body, Transform.IDENTITY, Prior(first, ANGLE_ZERO_SD), scale=0.1)
+
+
+def _spin_sd(body: Body) -> float:
+    """Prior standard deviation in rad/s of the spin of a body: small round ones turn fast."""
+    if body.radius is None or not body.shape.is_disc:
+        return SPIN_SD
+    return max(SPIN_SD, SURFACE_SPEED_SD / body.radius)
 
 
 def _matter(tracks: Tracks, model: PhysicsModel, structure: Structure) -> Iterator[Coordinate]:
@@ -149,7 +159,10 @@ def _physics(tracks: Tracks, model: PhysicsModel, structure: Structure) -> Itera
     turning = any(tracks.bodies[body].shape is Shape.CUBE for body in structure.meeting)
     bends = any(effect.spin_matters for effect in model.effects)
     spin_matters = turning or bends or bool(Observations.of(tracks).angle_bodies)
+    walls = bool(tracks.walls) or any(effect.overrides("obstacles") for effect in model.effects)
     for parameter in model.parameters:
+        if parameter.needs_walls and not walls:
+            continue
         concerned = [index for index, body in enumerate(tracks.bodies) if body.shape in parameter.shapes]
         if parameter.scope.per_video and concerned and (spin_matters or parameter.name != ANGULAR_DRAG.name):
             yield Coordinate.of(parameter)

@@ -7,7 +7,7 @@ from typing import ClassVar
 from vrdp_prob.models.effects.effect import BodyView, ContactView, Effect
 from vrdp_prob.models.parameters import Parameter, Prior, Transform
 from vrdp_prob.models.simulator.formula import Scalar
-from vrdp_prob.models.simulator.mathematics import maximum, minimum
+from vrdp_prob.models.simulator.mathematics import length, maximum, minimum, where
 
 CONTACT_FRICTION = Parameter(
     "contact_friction",
@@ -17,22 +17,63 @@ CONTACT_FRICTION = Parameter(
     Prior(math.log(0.1), 1.0),
     default=0.1,
 )
+WALL_FRICTION = Parameter(
+    "wall_friction",
+    "1",
+    "friction coefficient between a body and a wall that it touches",
+    Transform.LOG,
+    Prior(math.log(0.1), 1.0),
+    default=0.1,
+    needs_walls=True,
+)
+LEAST_INVERSE_MASS, SLOWEST_SLIDE = 1e-9, 1e-12
+"""In 1/kg and m/s: by what denominators that vanish are replaced."""
 
 
 class ContactFriction(Effect):
-    """A tangential impulse that exchanges spin, up to sticking."""
+    """An impulse across the normal that exchanges spin, up to sticking.
+
+    Where spheres slip on the table, the touching point of a rolling sphere moves up or down, too: a ball that rolls
+    into a wall loses some of its rolling.
+    """
 
     name: ClassVar = "contact_friction"
     sentence: ClassVar = "Bodies that touch rub on each other and exchange spin."
-    law: ClassVar = "|J_t| <= contact_friction J_n, against the sliding at the touching point, up to sticking"
+    law: ClassVar = (
+        "|J_t| <= contact_friction J_n (wall_friction J_n at walls), against the sliding at the touching point, also "
+        "where spheres roll, up to sticking"
+    )
     source: ClassVar = "Coulomb friction in an impact: J. B. Keller, Impact with friction, J. Appl. Mech. 53 (1986)"
-    parameters: ClassVar = (CONTACT_FRICTION,)
-    vanishes_at: ClassVar = {"contact_friction": 0.0}
+    parameters: ClassVar = (CONTACT_FRICTION, WALL_FRICTION)
+    vanishes_at: ClassVar = {"contact_friction": 0.0, "wall_friction": 0.0}
 
     def tangential_impulse(
         self, contact: ContactView, first: BodyView, second: BodyView, parameters: Mapping[str, Scalar]
     ) -> Scalar:
         """Impulse in kg m/s on the second body along the tangent."""
-        limit = parameters["contact_friction"] * contact.normal_impulse
-        sticking = -contact.tangential_speed_after_normal / contact.tangential_inverse_mass
-        return maximum(-limit, minimum(limit, sticking))
+        slide = contact.tangential_speed_after_normal
+        coefficient = _coefficient(first, second, parameters)
+        return -slide * _impulse_per_slide(contact, contact.tangential_inverse_mass, coefficient)
+
+    def vertical_impulse(
+        self, contact: ContactView, first: BodyView, second: BodyView, parameters: Mapping[str, Scalar]
+    ) -> Scalar:
+        """Upward impulse in kg m/s on the second body."""
+        coefficient = _coefficient(first, second, parameters)
+        return -contact.vertical_speed * _impulse_per_slide(contact, contact.vertical_inverse_mass, coefficient)
+
+
+def _coefficient(first: BodyView, second: BodyView, parameters: Mapping[str, Scalar]) -> Scalar:
+    """Friction coefficient of what touches."""
+    both_move = first.inverse_mass * second.inverse_mass > 0.0
+    return where(both_move, parameters["contact_friction"], parameters["wall_friction"])
+
+
+def _impulse_per_slide(contact: ContactView, inverse_mass: Scalar, coefficient: Scalar) -> Scalar:
+    """Impulse in kg by the speed of sliding in one direction that it stops: what ends it, or what friction can give.
+
+    While a body slides friction acts against the whole sliding, along the tangent and up or down.
+    """
+    slide = length(contact.tangential_speed_after_normal, contact.vertical_speed)
+    limit = coefficient * contact.normal_impulse
+    return minimum(1 / maximum(inverse_mass, LEAST_INVERSE_MASS), limit / maximum(slide, SLOWEST_SLIDE))

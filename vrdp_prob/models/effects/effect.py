@@ -90,6 +90,11 @@ class ContactView:
         The same after the normal impulse alone.
     tangential_inverse_mass
         Change of the tangential speed per tangential impulse, in 1/kg.
+    vertical_speed
+        Speed in m/s at which the second body's touching point moves upwards relative to the first's, by which spheres
+        roll; in models where spheres slip, else 0.
+    vertical_inverse_mass
+        Change of the vertical speed per vertical impulse, in 1/kg; 0 where neither body is such a sphere.
     """
 
     closing_speed: Scalar
@@ -97,6 +102,8 @@ class ContactView:
     tangential_speed: Scalar
     tangential_speed_after_normal: Scalar
     tangential_inverse_mass: Scalar
+    vertical_speed: Scalar = 0.0
+    vertical_inverse_mass: Scalar = 0.0
 
 
 @dataclass(frozen=True)
@@ -199,6 +206,15 @@ class Effect:
         self, contact: ContactView, first: BodyView, second: BodyView, parameters: Mapping[str, Scalar]
     ) -> Scalar:
         """Impulse in kg m/s on the second body along the tangent of a contact."""
+        return 0.0
+
+    def vertical_impulse(
+        self, contact: ContactView, first: BodyView, second: BodyView, parameters: Mapping[str, Scalar]
+    ) -> Scalar:
+        """Upward impulse in kg m/s on the second body of a contact; the table keeps both bodies on it.
+
+        It changes how spheres roll, in models where they slip, and nothing else.
+        """
         return 0.0
 
     def obstacles(self, parameters: Mapping[str, Float[Tensor, "..."]]) -> Sequence[Obstacle]:

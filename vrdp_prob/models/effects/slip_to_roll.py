@@ -4,6 +4,7 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import ClassVar
 
+import torch
 from jaxtyping import Float
 from torch import Tensor
 
@@ -31,6 +32,16 @@ RELEASE_ROLLING = Parameter(
     scope=Scope.BODY,
     shapes=frozenset({Shape.SPHERE}),
 )
+RELEASE_ROLLING_ACROSS = Parameter(
+    "release_rolling_across",
+    "1",
+    "the same across its velocity, to the left: a spin about the direction of motion, which bends the path",
+    Transform.IDENTITY,
+    Prior(0.0, 0.3),
+    default=0.0,
+    scope=Scope.BODY,
+    shapes=frozenset({Shape.SPHERE}),
+)
 
 
 class SlipToRoll(Effect):
@@ -40,15 +51,15 @@ class SlipToRoll(Effect):
     sentence: ClassVar = "Spheres slide after they start and after they are hit, until they roll."
     law: ClassVar = (
         "while a sphere slips with s = v - u on the table, v changes at -slip_friction g s/|s| and u, the velocity at "
-        "which it would roll by its spin, at 5/2 of the opposite; contacts change v only"
+        "which it would roll by its spin, at 5/2 of the opposite; contacts change u only by their friction"
     )
     source: ClassVar = "A. Sommerfeld, Mechanics (Lectures on theoretical physics 1), section 27: the billiard ball"
-    parameters: ClassVar = (SLIP_FRICTION, RELEASE_ROLLING)
+    parameters: ClassVar = (SLIP_FRICTION, RELEASE_ROLLING, RELEASE_ROLLING_ACROSS)
     vanishes_like: ClassVar = {"slip_friction": "rolling_resistance"}
 
     def search_points(self, videos: Sequence[Tracks]) -> Sequence[Mapping[str, float]]:
         """With spheres that are released without rolling; they slow down as rolling ones do if the frictions agree."""
-        return ({"release_rolling": 0.0},)
+        return ({"release_rolling": 0.0, "release_rolling_across": 0.0},)
 
     def slip_friction(self, time: Scalar, body: BodyView, parameters: Mapping[str, Scalar]) -> Scalar:
         """Friction coefficient while the sphere slips."""
@@ -57,5 +68,7 @@ class SlipToRoll(Effect):
     def rolling_velocity(
         self, velocity: Float[Tensor, "world body 2"], parameters: Mapping[str, Float[Tensor, "..."]]
     ) -> Float[Tensor, "world body 2"]:
-        """Share of the velocity with which a sphere rolls when it is released."""
-        return parameters["release_rolling"][..., None] * velocity
+        """Shares of the velocity with which a sphere rolls along and across it when it is released."""
+        left = torch.stack([-velocity[..., 1], velocity[..., 0]], dim=-1)
+        along, across = parameters["release_rolling"], parameters["release_rolling_across"]
+        return along[..., None] * velocity + across[..., None] * left

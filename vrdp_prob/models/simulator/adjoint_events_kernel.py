@@ -16,6 +16,7 @@ from vrdp_prob.models.simulator.adjoint_kernel import (
     clear,
     continue_legs,
     end_legs,
+    fold_state,
     load,
     load_touches,
     product,
@@ -30,6 +31,7 @@ from vrdp_prob.models.simulator.cluster_kernel import (
     set_constraints,
 )
 from vrdp_prob.models.simulator.laws_kernel import (
+    AFTER_CONTACT,
     CONTACT_LAW_VJP,
     GAP_LAW_VJP,
     STATE_SIZE,
@@ -79,6 +81,7 @@ from vrdp_prob.models.simulator.world_kernel import (
     SLIPPING,
     clear_world,
     evaluate,
+    roll_along,
     share_of,
 )
 
@@ -196,10 +199,10 @@ def take_velocities(world, adjoint, body, of_body, bar):
     """Move the adjoints of a body's state after a contact: positions pass through, velocities go to the law."""
     for c in range(STATE_SIZE):
         of_body[c] = 0.0
-    for c in range(3):
+    for c in range(AFTER_CONTACT):
         bar[c] = 0.0
     if not world.kind[body, FIXED]:
-        for c in range(3):
+        for c in range(AFTER_CONTACT):
             bar[c] = adjoint.state[body, 3 + c]
             adjoint.state[body, 3 + c] = 0.0
 
@@ -221,14 +224,18 @@ def reverse_contact(world, adjoint, kind, a, b, together, numbers, t):
     of_a, of_b, bar, one = adjoint.local[OF_A], adjoint.local[OF_B], adjoint.local[VELOCITIES], adjoint.local[ONE]
     evaluate(world.polynomial[a], share_of(world, a, t), ya)
     evaluate(world.polynomial[b], share_of(world, b, t), yb)
+    roll_along(world, a, ya)
+    roll_along(world, b, yb)
     feature = numbers[FEATURE : FEATURE + 7]
-    take_velocities(world, adjoint, a, of_a, bar[0:3])
-    take_velocities(world, adjoint, b, of_b, bar[3:6])
+    take_velocities(world, adjoint, a, of_a, bar[0:AFTER_CONTACT])
+    take_velocities(world, adjoint, b, of_b, bar[AFTER_CONTACT : 2 * AFTER_CONTACT])
     body, shared = adjoint.body, adjoint.shared
     law, gap = world.model[CONTACT_LAW_VJP + kind], world.model[GAP_LAW_VJP + kind]
     contact_vjp(
         law, ya, yb, world.body[a], world.body[b], feature, world.shared, bar, of_a, of_b, body[a], body[b], shared
     )
+    fold_state(world, a, of_a)
+    fold_state(world, b, of_b)
     of_time = product(world, adjoint, a, of_a, t) + product(world, adjoint, b, of_b, t)
     of_first = not world.kind[a, FIXED]
     of_second = not world.kind[b, FIXED] and not (of_first and together)

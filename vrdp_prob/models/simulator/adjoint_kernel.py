@@ -197,10 +197,15 @@ def fold(world, adjoint, cluster):
     """While a body does not slip, its rolling velocity is its velocity; so are their adjoints before an event."""
     for place in range(world.members[cluster, 0]):
         body = world.members[cluster, 1 + place]
-        bar = adjoint.state[body]
-        if world.phase[body, MOVING] != SLIPPING:
-            bar[3], bar[4] = bar[3] + bar[6], bar[4] + bar[7]
-            bar[6], bar[7] = 0.0, 0.0
+        fold_state(world, body, adjoint.state[body])
+
+
+@compiled
+def fold_state(world, body, bar):
+    """Adjoint of `roll_along`."""
+    if world.phase[body, MOVING] != SLIPPING:
+        bar[3], bar[4] = bar[3] + bar[6], bar[4] + bar[7]
+        bar[6], bar[7] = 0.0, 0.0
 
 
 @compiled

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 from vrdp_prob.models.effects.effect import BodyView, ContactView
 from vrdp_prob.models.simulator.formula import Scalar
 from vrdp_prob.models.simulator.mathematics import absolute, cos, length, maximum, minimum, sin, where
+from vrdp_prob.models.simulator.motion import ROLLING_GAIN, slips
 
 if TYPE_CHECKING:
     from vrdp_prob.models.effects.effect import Effect
@@ -96,10 +97,14 @@ def room_on_feature(kind: ContactKind, a: BodyView, b: BodyView, of_a: Feature, 
 
 @dataclass(frozen=True)
 class ContactResult:
-    """Velocities (vx, vy, spin) of both bodies after a contact, the impulse along the normal and the closing speed."""
+    """What both bodies do after a contact, the impulse along the normal and the closing speed.
 
-    a: tuple[Scalar, Scalar, Scalar]
-    b: tuple[Scalar, Scalar, Scalar]
+    Of each body the velocity, the spin and the rolling velocity (2 numbers), which means something for spheres that may
+    slip.
+    """
+
+    a: tuple[Scalar, ...]
+    b: tuple[Scalar, ...]
     normal_impulse: Scalar
     closing_speed: Scalar
     geometry: ContactGeometry
@@ -163,7 +168,7 @@ def contact(
     *,
     pressing: Scalar = 0.0,
 ) -> ContactResult:
-    """What a contact does: a normal impulse with restitution, then the tangential impulses that effects add.
+    """What a contact does: a normal impulse with restitution, then the impulses across it that effects add.
 
     Bodies that begin to press on each other (`pressing` is 1) do not rebound, or hop where they also rub.
     Momentum and angular momentum are kept, because one impulse acts on both bodies at one point. Source: J. K. Hahn,
@@ -188,15 +193,50 @@ def contact(
         tangential_speed=sliding,
         tangential_speed_after_normal=sliding + impulse * arms.inverse_mass(normal, tangent),
         tangential_inverse_mass=arms.inverse_mass(tangent),
+        **_vertical(effects, normal, a, b),
     )
     across: Scalar = 0.0
+    upward: Scalar = 0.0
     for effect in effects:
         across = across + effect.tangential_impulse(view, a, b, parameters)
+        upward = upward + effect.vertical_impulse(view, a, b, parameters)
     more_a, more_b = arms.after(tangent, across)
+    velocity_a = (a.vx + change_a[0] + more_a[0], a.vy + change_a[1] + more_a[1], a.spin + change_a[2] + more_a[2])
+    velocity_b = (b.vx + change_b[0] + more_b[0], b.vy + change_b[1] + more_b[1], b.spin + change_b[2] + more_b[2])
     return ContactResult(
-        a=(a.vx + change_a[0] + more_a[0], a.vy + change_a[1] + more_a[1], a.spin + change_a[2] + more_a[2]),
-        b=(b.vx + change_b[0] + more_b[0], b.vy + change_b[1] + more_b[1], b.spin + change_b[2] + more_b[2]),
+        a=(*velocity_a, *_rolling_after(effects, normal, a, upward)),
+        b=(*velocity_b, *_rolling_after(effects, normal, b, upward)),
         normal_impulse=impulse,
         closing_speed=closing,
         geometry=geometry,
     )
+
+
+def _vertical(
+    effects: "Sequence[Effect]", normal: tuple[Scalar, Scalar], a: BodyView, b: BodyView
+) -> dict[str, Scalar]:
+    """How spheres that roll move up and down where they touch, as a contact's law sees it.
+
+    A sphere that rolls at u turns so that its foremost point goes down at |u|. So with the normal n from a to b the
+    touching point goes down at u_a n on a and up at u_b n on b. An impulse J up on b and down on a changes both u along
+    n by (5/2) J/m, as that of a solid sphere's surface.
+    """
+    if not slips(effects):
+        return {}
+    speed: Scalar = 0.0
+    inverse_mass: Scalar = 0.0
+    for body in (a, b):
+        rolling = (body.vx - body.slip_x) * normal[0] + (body.vy - body.slip_y) * normal[1]
+        speed = speed + body.is_sphere * rolling
+        inverse_mass = inverse_mass + ROLLING_GAIN * body.is_sphere * body.inverse_mass
+    return {"vertical_speed": speed, "vertical_inverse_mass": inverse_mass}
+
+
+def _rolling_after(
+    effects: "Sequence[Effect]", normal: tuple[Scalar, Scalar], body: BodyView, upward: Scalar
+) -> tuple[Scalar, Scalar]:
+    """Rolling velocity of a body after a vertical impulse, see `_vertical`."""
+    if not slips(effects):
+        return 0.0, 0.0
+    change = ROLLING_GAIN * body.is_sphere * body.inverse_mass * upward
+    return body.vx - body.slip_x + change * normal[0], body.vy - body.slip_y + change * normal[1]

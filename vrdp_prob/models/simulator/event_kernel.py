@@ -38,6 +38,7 @@ from vrdp_prob.models.simulator.detection_kernel import (
 )
 from vrdp_prob.models.simulator.ending_kernel import LINGERING, set_sides, settle
 from vrdp_prob.models.simulator.laws_kernel import (
+    AFTER_CONTACT,
     BOUNDARIES,
     COUPLED,
     RUBS,
@@ -98,7 +99,11 @@ from vrdp_prob.models.simulator.world_kernel import (
     YIELDS,
     evaluate_at,
     hold,
+    roll_along,
 )
+
+CLOSING = 2 * AFTER_CONTACT
+"""Place of the closing speed in the result of a contact's law, behind what both bodies do."""
 
 
 @compiled
@@ -269,7 +274,7 @@ def change_contacts(world, pairs, tape, cluster, t, ending, what):
 def resume(world, body, t, result):
     """Give a body the velocities after a contact."""
     y = world.polynomial[body, 0]
-    for c in range(3):
+    for c in range(AFTER_CONTACT):
         y[3 + c] = result[c]
     settle(world, body, t, y)
 
@@ -298,11 +303,13 @@ def collide(world, pairs, tape, i, j, horizon):
     result, ya, yb = tape.local[RESULT], tape.local[STATE_A], tape.local[STATE_B]
     evaluate_at(world, a, t, ya)
     evaluate_at(world, b, t, yb)
+    roll_along(world, a, ya)
+    roll_along(world, b, yb)
     contact_law(world.model, kind, ya, yb, world.body[a], world.body[b], feature, world.shared, result)
-    if not result[6] > 0.0:
+    if not result[CLOSING] > 0.0:
         search_pair_apart(world, pairs, i, j, t + CRAWL, horizon)
         return OK
-    if feature[6] != 0.0 and world.model[RUBS] == 0 and result[6] > gentle_speed(world, a, b):
+    if feature[6] != 0.0 and world.model[RUBS] == 0 and result[CLOSING] > gentle_speed(world, a, b):
         feature[6] = 0.0
         contact_law(world.model, kind, ya, yb, world.body[a], world.body[b], feature, world.shared, result)
     pairs.table[i, j, LAST_CONTACT] = t
@@ -312,7 +319,7 @@ def collide(world, pairs, tape, i, j, horizon):
     for c in range(7):
         tape.numbers[row, FEATURE + c] = feature[c]
     for c in range(7):
-        tape.numbers[row, CLOSING_SPEED + c] = result[6 + c]
+        tape.numbers[row, CLOSING_SPEED + c] = result[CLOSING + c]
     cluster = cluster_of(world, a if world.kind[b, FIXED] else b)
     if not world.kind[a, FIXED] and cluster_of(world, a) != cluster:
         leave_pieces(world, tape, cluster_of(world, a), t)
@@ -322,7 +329,7 @@ def collide(world, pairs, tape, i, j, horizon):
     if feature[6] != 0.0 and world.model[RUBS] == 0:
         hold_contact(world, a, b, kind, feature)
     if not world.kind[a, FIXED]:
-        resume(world, a, t, result[0:3])
+        resume(world, a, t, result[0:AFTER_CONTACT])
     if not world.kind[b, FIXED]:
-        resume(world, b, t, result[3:6])
+        resume(world, b, t, result[AFTER_CONTACT:CLOSING])
     return restart_apart(world, pairs, tape, cluster, t, horizon)

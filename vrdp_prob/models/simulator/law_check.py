@@ -22,6 +22,7 @@ _RESULTS = {
     "boundary": 1,
     "restitution": 1,
     "tangential_impulse": 1,
+    "vertical_impulse": 1,
 }
 """Number of results of each law."""
 
@@ -37,7 +38,7 @@ def check_laws(effects: "Sequence[Effect]", layout: Layout) -> None:
     inputs = LawInputs(effects, layout)
     moving = inputs.view(inputs.state("y"), inputs.constants("body"), inputs.phase())
     body, other = (inputs.view(inputs.state(name), inputs.constants(name)) for name in ("first", "second"))
-    contact = ContactView(*inputs.array("contact", 5))
+    contact = ContactView(*inputs.array("contact", 7))
     number, shared = inputs.recorder.input("number"), inputs.shared
     arguments: dict[str, tuple[Any, ...]] = {
         **dict.fromkeys(("acceleration", "friction_factor", "spin_deceleration"), (inputs.time, moving, shared)),
@@ -47,7 +48,7 @@ def check_laws(effects: "Sequence[Effect]", layout: Layout) -> None:
         "kick": (inputs.time, body, shared),
         "boundary": (body, shared),
         "restitution": (number, number, body, other, shared),
-        "tangential_impulse": (contact, body, other, shared),
+        **dict.fromkeys(("tangential_impulse", "vertical_impulse"), (contact, body, other, shared)),
     }
     for effect in effects:
         for hook, count in _RESULTS.items():

@@ -27,6 +27,8 @@ call, numba compiles a variant each.
 """
 STATE_SIZE = 8
 """Numbers in a body's state."""
+AFTER_CONTACT = 5
+"""Numbers of a body that a contact changes: the velocity, the spin and the rolling velocity, behind its position."""
 # Entries of a model. Whether spheres may slip, so that their rolling velocity means something; whether contacts have
 # friction, so that bodies which press do not move together but hop; whether forces act between bodies that do not
 # touch, so that all of them move together; whether what pushes a body at rest, or friction, changes with time; how many
@@ -211,7 +213,10 @@ def boundary_vjp(model, which, y, body, shared, bar, y_bar, body_bar, shared_bar
 
 @compiled
 def contact_law(model, kind, ya, yb, body_a, body_b, feature, shared, out):
-    """Write (vx, vy, spin) of both after a contact, closing speed, impulse, point (2), normal (2) and gap."""
+    """Write what both bodies do after a contact, closing speed, impulse, point (2), normal (2) and gap.
+
+    Of each body these are the `AFTER_CONTACT` numbers (vx, vy, spin, rolling_x, rolling_y).
+    """
     call(model[CONTACT_LAW + kind], ya, yb, body_a, body_b, feature, shared, out)
 
 
@@ -229,7 +234,7 @@ def constraint_law(model, kind, ya, yb, body_a, body_b, feature, shared, out):
 def contact_vjp(
     address, ya, yb, body_a, body_b, feature, shared, bar, ya_bar, yb_bar, body_a_bar, body_b_bar, shared_bar
 ):
-    """Derivative of something of a contact: of the six velocities after it, its gap, or what keeps its gap.
+    """Derivative of something of a contact: of both bodies' velocities after it, its gap, or what keeps its gap.
 
     The address is that of an entry `CONTACT_LAW_VJP`, `GAP_LAW_VJP` or `CONSTRAINT_LAW_VJP` (all but its last number).
     """

@@ -29,11 +29,11 @@ from vrdp_prob.models.simulator.world_kernel import (
     NOT_SOLVED,
     OK,
     RESTING,
-    SLIPPING,
     SPIN_SENSE,
     STEP,
     evaluate,
     hold,
+    roll_along,
     share_of,
 )
 
@@ -48,8 +48,7 @@ def leave_piece(world, tape, body, t):
         y[3], y[4] = 0.0, 0.0
     if phase[SPIN_SENSE] == 0.0:
         y[5] = 0.0
-    if phase[MOVING] != SLIPPING:
-        y[6], y[7] = y[3], y[4]
+    roll_along(world, body, y)
     for c in range(STATE_SIZE):
         world.polynomial[body, 0, c] = y[c]
     hold(world, body, t)

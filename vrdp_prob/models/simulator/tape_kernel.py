@@ -58,7 +58,7 @@ Tape = Bundle(
     velocity=floats("moving_frame", "shown", 3),  # the same of (vx, vy, spin); its adjoint may be empty
     counts=integer_room(2),  # [(rows, events)]
     place=integer_room("body", 2),  # [body, (frame, row)]
-    local=room(4, 16),  # [(result, state a, state b, state to show), 16]
+    local=room(4, 20),  # [(result, state a, state b, state to show), 20]
 )
 """Rows of the record, of all worlds behind each other, and where the output of a world goes."""
 

@@ -97,6 +97,13 @@ def evaluate_at(world, body, t, out):
 
 
 @compiled
+def roll_along(world, body, y):
+    """While a body does not slip, its rolling velocity is its velocity, and only that is integrated."""
+    if world.phase[body, MOVING] != SLIPPING:
+        y[6], y[7] = y[3], y[4]
+
+
+@compiled
 def clear_world(world):
     """Nothing released; what cannot move is always at hand."""
     count = world.kind.shape[0]

@@ -152,7 +152,10 @@ def fixed_of(xp: Any, system: System, kind: str, inputs: Inputs, inverse_inertia
     outer = [np.sqrt(2.0) if name == "square" else 1.0 for name in kind.split("_")]
     radius, factor, mass = inputs.radius, inputs.restitution, inputs.mass
     mobility = 1 / mass[pairs.first] + 1 / mass[pairs.second]
-    friction = inputs.parameters["contact_friction"] if system.laws.contact_friction else 0.0
+    coefficient = "wall_friction" if kind.startswith("wall") else "contact_friction"
+    friction = inputs.parameters[coefficient] if system.laws.contact_friction else 0.0
+    spheres = xp.asarray(np.array([float(shape is Shape.SPHERE) for shape in system.shapes])[:, None])
+    rolls = spheres[pairs.first] / mass[pairs.first] + spheres[pairs.second] / mass[pairs.second]
     return Fixed(
         (outer[0] * radius[pairs.first] + outer[1] * radius[pairs.second]) ** 2,
         radius[pairs.first],
@@ -162,6 +165,7 @@ def fixed_of(xp: Any, system: System, kind: str, inputs: Inputs, inverse_inertia
         mobility,
         1 + xp.clip(factor[pairs.first] * factor[pairs.second], max=1.0),
         friction + 0.0 * mobility,
+        rolls / ROLLING_INERTIA,
     )
 
 
@@ -177,7 +181,7 @@ def step(
     constants: Constants,
     motion: Motion,
     *,
-    contacts: Callable[..., tuple[Array, Array]],
+    contacts: Callable[..., Motion],
     resistance: Callable[..., tuple[Array, Array]],
 ) -> Motion:
     """One step, with `meet` and `resist` or what does the same in other operations."""
@@ -186,9 +190,9 @@ def step(
     if system.turns:
         spin = spin * xp.clip(1 - constants.spin_braking / (abs(spin) + TINY), min=0.0)
     motion = Motion(motion.position, velocity, motion.angle, spin, rolling)
-    velocity, spin = contacts(xp, system, constants, motion)
-    angle = motion.angle + STEP * spin if system.turns else motion.angle
-    return Motion(motion.position + STEP * velocity, velocity, angle, spin, rolling)
+    motion = contacts(xp, system, constants, motion)
+    angle = motion.angle + STEP * motion.spin if system.turns else motion.angle
+    return motion._replace(position=motion.position + STEP * motion.velocity, angle=angle)
 
 
 def resist(xp: Any, laws: Laws, constants: Constants, motion: Motion) -> tuple[Array, Array]:
@@ -207,28 +211,38 @@ def resist(xp: Any, laws: Laws, constants: Constants, motion: Motion) -> tuple[A
     return velocity, xp.where(rolls[:, None], velocity, motion.rolling + change)
 
 
-def meet(xp: Any, system: System, constants: Constants, motion: Motion) -> tuple[Array, Array]:
-    """Velocities and spins after the contacts of all pairs, touching or not."""
-    push, twist = 0.0, 0.0
+def meet(xp: Any, system: System, constants: Constants, motion: Motion) -> Motion:
+    """The motion after the contacts of all pairs, touching or not."""
+    push, twist, lift = 0.0, 0.0, 0.0
     angle = system.boxes @ motion.angle if len(system.boxes) else None
     turns = None if angle is None else (xp.cos(angle), xp.sin(angle))
     for kind, pairs in system.pairs.items():
-        pair = pair_of(system, constants.pairs[kind], motion, pairs, turns)
-        impulse, on_first, on_second = CONTACTS[kind](xp, system.laws, pair)
-        push = push + matmul(pairs.difference.T, impulse)
-        twist = twist if on_first is None else twist + pairs.pick_first.T @ on_first
-        twist = twist if on_second is None else twist + pairs.pick_second.T @ on_second
+        pair = pair_of(system, constants, kind, motion, turns)
+        found = CONTACTS[kind](xp, system.laws, pair)
+        push = push + matmul(pairs.difference.T, found.push)
+        twist = twist if found.twist_0 is None else twist + pairs.pick_first.T @ found.twist_0
+        twist = twist if found.twist_1 is None else twist + pairs.pick_second.T @ found.twist_1
+        lift = lift if found.lift is None else lift + matmul((pairs.pick_first + pairs.pick_second).T, found.lift)
     spin = motion.spin + twist * constants.inverse_inertia if system.turns else motion.spin
-    return motion.velocity + push * constants.inverse_mass[:, None], spin
+    rolling = motion.rolling
+    if rolling is not None:
+        rolling = rolling + lift * constants.is_sphere * constants.inverse_mass[:, None] / ROLLING_INERTIA
+    return motion._replace(
+        velocity=motion.velocity + push * constants.inverse_mass[:, None], spin=spin, rolling=rolling
+    )
 
 
-def pair_of(system: System, fixed: Fixed, motion: Motion, pairs: Pairs, turns: Any) -> Pair:
+def pair_of(system: System, constants: Constants, kind: str, motion: Motion, turns: Any) -> Pair:
     """All pairs of a kind, with cosine and sine of all boxes."""
+    pairs = system.pairs[kind]
     of_boxes = [None if box is None else (box @ turns[0], box @ turns[1]) for box in pairs.boxes]
     return Pair(
         offset=matmul(pairs.difference, motion.position),
         closing=matmul(pairs.difference, motion.velocity),
         turns=(of_boxes[0], of_boxes[1]),
         spin=(pairs.pick_first @ motion.spin, pairs.pick_second @ motion.spin) if system.turns else (None, None),
-        fixed=fixed,
+        rolling=None
+        if motion.rolling is None
+        else matmul(pairs.pick_first + pairs.pick_second, motion.rolling * constants.is_sphere),
+        fixed=constants.pairs[kind],
     )

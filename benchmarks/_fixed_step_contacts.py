@@ -1,7 +1,6 @@
 """Contacts of the fixed-step simulator: what touches, and the impulse; for torch and for JAX.
 
-Arrays as in `_fixed_step.py`. A contact law takes pairs of one kind and returns the impulse on the second bodies
-[..., 2, world] and the angular impulses on both [..., world] (None where there is none).
+Arrays as in `_fixed_step.py`. A contact law takes pairs of one kind and returns what it does to both bodies.
 """
 
 from typing import Any, NamedTuple
@@ -36,6 +35,7 @@ class Fixed(NamedTuple):
     mobility: Array  # sum of the inverse masses
     bounce: Array  # 1 + e
     contact_friction: Array
+    roll_give: Array  # change of the vertical sliding per vertical impulse, 0 where nothing rolls
 
 
 class Pair(NamedTuple):
@@ -48,7 +48,17 @@ class Pair(NamedTuple):
     closing: Array
     turns: tuple[Any, ...]
     spin: tuple[Array, Array]
+    rolling: Array  # sum of the rolling velocities of both, of spheres; None without slip_to_roll
     fixed: Fixed
+
+
+class Impulses(NamedTuple):
+    """What a contact does; None where there is nothing of a sort."""
+
+    push: Array  # impulse on the second body, [..., 2, world]
+    twist_0: Array  # angular impulse about the vertical, [..., world]
+    twist_1: Array
+    lift: Array  # upward impulse on the second body times the normal, [..., 2, world]
 
 
 def matmul(matrix: Array, vectors: Array) -> Array:
@@ -86,11 +96,11 @@ def impulse_of(
     *,
     along: tuple[Array, Array],
     beside: tuple[Array, Array] | None,
-) -> tuple[Array, Array, Array]:
-    """Impulse on the second bodies of pairs, and the angular impulses on both.
+) -> Impulses:
+    """Impulses along the normal (from the first to the second) with restitution, then across it.
 
-    Along the normal (from the first to the second) with restitution; then, where levers `beside` it are given, along
-    the tangent up to sticking. Levers that are None are 0.
+    Where levers `beside` the normal are given there is friction against the sliding along the tangent and, of spheres
+    that roll, up or down, up to sticking. Levers that are None are 0.
     """
     fixed = pair.fixed
     inertias = (fixed.inverse_inertia_0, fixed.inverse_inertia_1)
@@ -103,7 +113,7 @@ def impulse_of(
     vector = normal * size[..., None, :]
     twists = [None if lever is None else sign * lever * size for lever, sign in zip(along, (-1.0, 1.0), strict=True)]
     if beside is None:
-        return vector, twists[0], twists[1]
+        return Impulses(vector, twists[0], twists[1], None)
     tangent = across(xp, normal)
     slide, give = dot(tangent, pair.closing), pair.fixed.mobility
     for side, sign in ((0, -1.0), (1, 1.0)):
@@ -112,14 +122,21 @@ def impulse_of(
         if along[side] is not None:
             slide = slide + beside[side] * along[side] * inertias[side] * size
     limit = pair.fixed.contact_friction * size
-    rub = xp.maximum(-limit, xp.minimum(limit, -slide / give))
+    rise, total = None, abs(slide) + TINY
+    if pair.rolling is not None:
+        rise = dot(normal, pair.rolling)
+        total = xp.sqrt(slide * slide + rise * rise + TINY)
+    rub = -slide * xp.minimum(1 / give, limit / total)
     for side, sign in ((0, -1.0), (1, 1.0)):
         more = sign * beside[side] * rub
         twists[side] = more if twists[side] is None else twists[side] + more
-    return vector + tangent * rub[..., None, :], twists[0], twists[1]
+    lift = None
+    if rise is not None:
+        lift = normal * (-rise * xp.minimum(1 / (pair.fixed.roll_give + TINY), limit / total))[..., None, :]
+    return Impulses(vector + tangent * rub[..., None, :], twists[0], twists[1], lift)
 
 
-def discs_meet(xp: Any, laws: Laws, pair: Pair) -> tuple[Array, Array, Array]:
+def discs_meet(xp: Any, laws: Laws, pair: Pair) -> Impulses:
     """Contact of two discs."""
     square = dot(pair.offset, pair.offset)
     touches = square < pair.fixed.reach
@@ -127,12 +144,12 @@ def discs_meet(xp: Any, laws: Laws, pair: Pair) -> tuple[Array, Array, Array]:
         # No root and no spin is needed.
         closing = dot(pair.offset, pair.closing)
         size = xp.where(touches & (closing < 0), -closing, 0.0) * pair.fixed.bounce / pair.fixed.mobility / square
-        return pair.offset * size[..., None, :], None, None
+        return Impulses(pair.offset * size[..., None, :], None, None, None)
     normal = pair.offset / xp.sqrt(square)[..., None, :]
     return impulse_of(xp, pair, touches, normal, along=(None, None), beside=(pair.fixed.radius_0, -pair.fixed.radius_1))
 
 
-def box_meets_disc(xp: Any, laws: Laws, pair: Pair, height: float = 1.0) -> tuple[Array, Array, Array]:
+def box_meets_disc(xp: Any, laws: Laws, pair: Pair, height: float = 1.0) -> Impulses:
     """Contact of a square (or of a wall, whose `height` is 0) and a disc, at the nearest point of the box."""
     cosine, sine = pair.turns[0]
     seen = turned(xp, (cosine, -sine), pair.offset)
@@ -148,7 +165,7 @@ def box_meets_disc(xp: Any, laws: Laws, pair: Pair, height: float = 1.0) -> tupl
     return impulse_of(xp, pair, touches, turned(xp, (cosine, sine), flat), along=along, beside=beside)
 
 
-def wall_meets_disc(xp: Any, laws: Laws, pair: Pair) -> tuple[Array, Array, Array]:
+def wall_meets_disc(xp: Any, laws: Laws, pair: Pair) -> Impulses:
     """Contact of a wall and a disc."""
     return box_meets_disc(xp, laws, pair, 0.0)
 
@@ -183,7 +200,7 @@ def deepest(xp: Any, depth: Array) -> tuple[Array, Array]:
     return (depth * choice).sum(-2) > 0, choice
 
 
-def squares_meet(xp: Any, laws: Laws, pair: Pair) -> tuple[Array, Array, Array]:
+def squares_meet(xp: Any, laws: Laws, pair: Pair) -> Impulses:
     """Contact of two squares, at the corner that is deepest in the other, along the nearest side's normal."""
     offset = constant(pair.offset)[..., None, :, :]
     in_first = seen_from(xp, pair, 0, corners_of(xp, pair, 1) + offset)
@@ -207,7 +224,7 @@ def squares_meet(xp: Any, laws: Laws, pair: Pair) -> tuple[Array, Array, Array]:
     return impulse_of(xp, pair, touches, normal, along=levers, beside=beside)
 
 
-def wall_meets_square(xp: Any, laws: Laws, pair: Pair) -> tuple[Array, Array, Array]:
+def wall_meets_square(xp: Any, laws: Laws, pair: Pair) -> Impulses:
     """Contact of a wall (not of its ends) and a square, at the square's corner that is deepest behind the wall."""
     centre = constant(pair.offset)[..., None, :, :]
     behind = xp.sign(seen_from(xp, pair, 0, centre)[..., 1, :])

@@ -44,7 +44,7 @@ from vrdp_prob.scene import Shape
 jax.config.update("jax_enable_x64", True)
 
 
-def meet_if_near(xp: Any, system: System, constants: Constants, motion: Motion) -> tuple[Any, Any]:
+def meet_if_near(xp: Any, system: System, constants: Constants, motion: Motion) -> Motion:
     """What `meet` does, where in any world the outer circles of a pair overlap and, for discs, close."""
     near = jnp.zeros((), bool)
     for kind, pairs in system.pairs.items():
@@ -54,11 +54,11 @@ def meet_if_near(xp: Any, system: System, constants: Constants, motion: Motion) 
             overlap &= dot(offset, matmul(pairs.difference, motion.velocity)) < 0
         near |= overlap.any()
 
-    def all_pairs() -> tuple[Any, Any]:
+    def all_pairs() -> Motion:
         return meet(xp, system, constants, motion)
 
-    def nothing() -> tuple[Any, Any]:
-        return motion.velocity, motion.spin
+    def nothing() -> Motion:
+        return motion
 
     return jax.lax.cond(near, all_pairs, nothing)
 

@@ -22,6 +22,7 @@ from typing import Any
 
 import torch
 from _fixed_step import (
+    ROLLING_INERTIA,
     STEPS_PER_FRAME,
     Constants,
     Inputs,
@@ -40,7 +41,7 @@ from torch import Tensor
 from vrdp_prob.models.simulator.worlds import Worlds
 
 BODY_FIELDS = ("position", "velocity", "angle", "spin", "mass", "restitution", "radius")
-Contacts = Callable[[Any, System, Constants, Motion], tuple[Tensor, Tensor]]
+Contacts = Callable[[Any, System, Constants, Motion], Motion]
 
 
 def inputs_of(worlds: Worlds) -> Inputs:
@@ -99,9 +100,9 @@ def _resist(xp: Any, laws: Laws, constants: Constants, motion: Motion) -> tuple[
     return velocity * torch.addcmul(share, constants.drag, speed, value=-1).relu()[:, None], None
 
 
-def meet_near(xp: Any, system: System, constants: Constants, motion: Motion) -> tuple[Tensor, Tensor]:
+def meet_near(xp: Any, system: System, constants: Constants, motion: Motion) -> Motion:
     """What `meet` does, for those pairs alone whose outer circles overlap."""
-    velocity, spin = motion.velocity, motion.spin
+    velocity, spin, rolling = motion.velocity, motion.spin, motion.rolling
     worlds = velocity.shape[-1]
     for kind, pairs in system.pairs.items():
         fixed = constants.pairs[kind]
@@ -118,16 +119,23 @@ def meet_near(xp: Any, system: System, constants: Constants, motion: Motion) -> 
             None if box is None else _turn(motion.angle.reshape(-1)[at])
             for box, at in zip(pairs.boxes, numbers, strict=True)
         )
+        turning = None
+        if rolling is not None:
+            turning = (rolling * constants.is_sphere).reshape(-1)[vectors].sum(0)
         own = Fixed(*(values.expand(len(pairs.first), worlds).reshape(-1)[near] for values in fixed))
-        pair = Pair(place[1] - place[0], speed[1] - speed[0], turns, own_spin, own)
-        impulse, on_first, on_second = CONTACTS[kind](xp, system.laws, pair)
-        change = torch.stack([-impulse, impulse]) * constants.inverse_mass.reshape(-1)[numbers][:, None]
+        pair = Pair(place[1] - place[0], speed[1] - speed[0], turns, own_spin, turning, own)
+        found = CONTACTS[kind](xp, system.laws, pair)
+        mobility = constants.inverse_mass.reshape(-1)[numbers][:, None]
+        change = torch.stack([-found.push, found.push]) * mobility
         velocity = velocity.reshape(-1).index_add(0, vectors.reshape(-1), change.reshape(-1)).view(velocity.shape)
-        for at, twist in ((numbers[0], on_first), (numbers[1], on_second)):
+        if found.lift is not None:
+            change = torch.stack([found.lift, found.lift]) * mobility / ROLLING_INERTIA
+            rolling = rolling.reshape(-1).index_add(0, vectors.reshape(-1), change.reshape(-1)).view(rolling.shape)
+        for at, twist in ((numbers[0], found.twist_0), (numbers[1], found.twist_1)):
             if twist is not None:
                 change = twist * constants.inverse_inertia.reshape(-1)[at]
                 spin = spin.reshape(-1).index_add(0, at, change).view(spin.shape)
-    return velocity, spin
+    return motion._replace(velocity=velocity, spin=spin, rolling=rolling)
 
 
 def _turn(angle: Tensor) -> tuple[Tensor, Tensor]:

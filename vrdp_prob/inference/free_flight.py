@@ -21,6 +21,8 @@ SIGNIFICANT = 3.5
 """A velocity jump counts from this many standard deviations on."""
 SMALLEST_JUMP = 0.02
 """...and from this share of the fastest speed of the two bodies on."""
+FEWEST_BEFORE, FEWEST_AFTER = 2, 3
+"""Positions on either side of a kink; of a body that was just released few come before its first contact."""
 CUBIC_NOISE_GAIN = 20.0
 """Variance of a third difference of independent noise of unit variance: 1 + 9 + 9 + 1."""
 NORMAL_MAD = 0.6745
@@ -240,7 +242,7 @@ def _kink(tracks: Tracks, body: int, at: float, noise: float) -> _Kink | None:
     offset = times - at
     chosen = np.isfinite(positions).all(axis=1) & (np.abs(offset) <= SPAN)
     offset, seen = offset[chosen], positions[chosen]
-    if (offset < 0).sum() < 3 or (offset >= 0).sum() < 3:
+    if (offset < 0).sum() < FEWEST_BEFORE or (offset >= 0).sum() < FEWEST_AFTER:
         return None
     after = np.maximum(offset, 0)
     before = np.minimum(offset, 0)

@@ -187,13 +187,15 @@ def contact(
     impulse = (closing + rebound) / arms.inverse_mass(normal)
     change_a, change_b = arms.after(normal, impulse)
     sliding = arms.relative_speed(tangent)
+    rising, mobility = _rising(effects, normal, a, b)
     view = ContactView(
         closing_speed=closing,
         normal_impulse=impulse,
         tangential_speed=sliding,
         tangential_speed_after_normal=sliding + impulse * arms.inverse_mass(normal, tangent),
         tangential_inverse_mass=arms.inverse_mass(tangent),
-        **_vertical(effects, normal, a, b),
+        vertical_speed=rising,
+        vertical_inverse_mass=mobility,
     )
     across: Scalar = 0.0
     upward: Scalar = 0.0
@@ -201,41 +203,43 @@ def contact(
         across = across + effect.tangential_impulse(view, a, b, parameters)
         upward = upward + effect.vertical_impulse(view, a, b, parameters)
     more_a, more_b = arms.after(tangent, across)
-    velocity_a = (a.vx + change_a[0] + more_a[0], a.vy + change_a[1] + more_a[1], a.spin + change_a[2] + more_a[2])
-    velocity_b = (b.vx + change_b[0] + more_b[0], b.vy + change_b[1] + more_b[1], b.spin + change_b[2] + more_b[2])
     return ContactResult(
-        a=(*velocity_a, *_rolling_after(effects, normal, a, upward)),
-        b=(*velocity_b, *_rolling_after(effects, normal, b, upward)),
+        a=(*_velocities_after(a, change_a, more_a), *_rolling_after(effects, normal, a, upward)),
+        b=(*_velocities_after(b, change_b, more_b), *_rolling_after(effects, normal, b, upward)),
         normal_impulse=impulse,
         closing_speed=closing,
         geometry=geometry,
     )
 
 
-def _vertical(
+def _velocities_after(body: BodyView, *changes: tuple[Scalar, Scalar, Scalar]) -> tuple[Scalar, Scalar, Scalar]:
+    """Velocity and spin of a body after some changes."""
+    x, y, spin = (sum(parts, start) for start, *parts in zip((body.vx, body.vy, body.spin), *changes, strict=True))
+    return x, y, spin
+
+
+def _rising(
     effects: "Sequence[Effect]", normal: tuple[Scalar, Scalar], a: BodyView, b: BodyView
-) -> dict[str, Scalar]:
-    """How spheres that roll move up and down where they touch, as a contact's law sees it.
+) -> tuple[Scalar, Scalar]:
+    """Speed at which b's touching point moves up relative to a's as spheres roll, and its change per upward impulse.
 
     A sphere that rolls at u turns so that its foremost point goes down at |u|. So with the normal n from a to b the
     touching point goes down at u_a n on a and up at u_b n on b. An impulse J up on b and down on a changes both u along
     n by (5/2) J/m, as that of a solid sphere's surface.
     """
-    if not slips(effects):
-        return {}
     speed: Scalar = 0.0
     inverse_mass: Scalar = 0.0
-    for body in (a, b):
+    for body in (a, b) if slips(effects) else ():
         rolling = (body.vx - body.slip_x) * normal[0] + (body.vy - body.slip_y) * normal[1]
         speed = speed + body.is_sphere * rolling
         inverse_mass = inverse_mass + ROLLING_GAIN * body.is_sphere * body.inverse_mass
-    return {"vertical_speed": speed, "vertical_inverse_mass": inverse_mass}
+    return speed, inverse_mass
 
 
 def _rolling_after(
     effects: "Sequence[Effect]", normal: tuple[Scalar, Scalar], body: BodyView, upward: Scalar
 ) -> tuple[Scalar, Scalar]:
-    """Rolling velocity of a body after a vertical impulse, see `_vertical`."""
+    """Rolling velocity of a body after an upward impulse on b, see `_rising`."""
     if not slips(effects):
         return 0.0, 0.0
     change = ROLLING_GAIN * body.is_sphere * body.inverse_mass * upward

@@ -6,9 +6,11 @@ from scipy.stats import chi2
 
 from tests.discovery.fitted import fitted
 from vrdp_prob.discovery.estimates import upper_bounds
+from vrdp_prob.discovery.linear import Score
 from vrdp_prob.discovery.residual_model import ResidualModel
-from vrdp_prob.discovery.scores import CauseScore, happens_once, score_causes
+from vrdp_prob.discovery.scores import CauseScore, _one_sided, happens_once, score_causes
 from vrdp_prob.models.effects.clock_error import ClockError
+from vrdp_prob.models.effects.contact_friction import ContactFriction
 from vrdp_prob.models.effects.external_impulse import ExternalImpulse
 from vrdp_prob.models.effects.linear_drag import LinearDrag
 from vrdp_prob.models.effects.surface_tilt import SurfaceTilt
@@ -51,6 +53,29 @@ def test_a_strength_that_cannot_be_negative_is_tested_on_one_side() -> None:
         if one.chi_square == 0:
             assert one.p_value == 1.0
         assert all(value > 0 for value in one.start.values())
+
+
+@pytest.mark.parametrize(
+    ("gradient", "expected"),
+    [
+        ([2.0, 1.0], None),  # both are asked for
+        ([-2.0, 1.0], [0.0, 1.0]),  # less than none of the first: the second as if there were no other
+        ([-2.0, -1.0], [0.0, 0.0]),
+        ([3.0, -0.5], [3.0, 0.0]),
+    ],
+)
+def test_several_strengths_that_cannot_be_negative_are_each_tested_on_one_side(
+    gradient: list[float], expected: list[float] | None
+) -> None:
+    free = Score(np.array(gradient), np.array([[1.0, 0.2], [0.2, 1.0]]))
+    found = _one_sided(free, ["contact_friction", "wall_friction"], ContactFriction())
+    if expected is None:
+        assert found is free
+        return
+    assert found.estimate == pytest.approx(expected)
+    assert found.chi_square == pytest.approx(sum(value**2 for value in expected))
+    assert found.chi_square <= free.chi_square
+    assert _one_sided(free, ["tilt_x", "tilt_y"], SurfaceTilt()) is free
 
 
 def test_the_p_value_of_a_single_place_is_that_of_chi_square() -> None:

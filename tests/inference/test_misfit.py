@@ -8,8 +8,9 @@ import pytest
 from tests.inference.generator import observe
 from tests.inference.test_infer import chain, with_outliers
 from vrdp_prob.inference import default_model
+from vrdp_prob.inference.clues import Clues
 from vrdp_prob.inference.map_fit import MapFit, fit_map
-from vrdp_prob.inference.misfit import judge
+from vrdp_prob.inference.misfit import judge, tempered
 from vrdp_prob.models.noise import NoiseFamily
 from vrdp_prob.scene import Tracks
 
@@ -59,3 +60,14 @@ def test_gaussian_noise_that_was_asked_for_counts_outliers_and_says_so() -> None
     misfit = fitted(tracks, NoiseFamily.GAUSSIAN).misfit
     assert misfit.large
     assert "as was asked for" in misfit.sentences[-1]
+
+
+def test_residuals_without_outliers_stay_as_they_are() -> None:
+    tracks = observe(chain(), noise=0.01, dropout=0.0, frames=60, seed=3)
+    clues = Clues.of(tracks)
+    noise = 0.01 * np.random.default_rng(0).standard_normal(tracks.positions.shape)
+    residuals = np.where(clues.outliers[..., None], np.nan, noise)
+    assert np.array_equal(tempered(residuals, clues), residuals, equal_nan=True)
+    residuals[30, 1] += 1.0
+    changed = (tempered(residuals, clues) != residuals).any(axis=-1) & np.isfinite(residuals[..., 0])
+    assert np.argwhere(changed).tolist() == [[30, 1]]

@@ -190,6 +190,17 @@ def test_spheres_that_roll_against_each_other_take_up_rolling() -> None:
     assert velocity.tolist() == pytest.approx(expected)
 
 
+def test_a_spin_about_the_direction_of_motion_bends_the_path() -> None:
+    speed, across, friction = 1.0, 0.6, 0.2
+    worlds = scene([[0, 0]], [[speed, 0]], [SPHERE], slip_friction=friction, release_rolling_across=[across])
+    rolls_at = 2 / 7 * speed * math.hypot(1.0, across) / (friction * GRAVITY)
+    result = at(worlds, rolls_at + 1.0, model=TOGETHER)
+    # It slips along (1, -across), the other way of which friction pushes it until v = (5 v + 2 u) / 7.
+    rolling = speed * np.array([5.0, 2.0 * across]) / 7
+    slipped = (np.array([speed, 0.0]) + rolling) / 2 * rolls_at
+    assert result.trajectory[0, -1, 0, :2].numpy() == pytest.approx(slipped + rolling * 1.0)
+
+
 def test_after_a_central_hit_between_rolling_spheres_both_slip() -> None:
     speed, restitution = 1.0, 0.9**2
     worlds = scene(

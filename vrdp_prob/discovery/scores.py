@@ -128,13 +128,16 @@ def _scan_shared(
             columns.setdefault(_name(probe, index), len(columns))
     if not columns:
         return None
+    names = [name for name, _ in columns]
     directions = []
     for index, (linear_video, found) in enumerate(zip(model.linear.videos, probed, strict=True)):
         block = np.zeros((linear_video.data, len(points), len(columns)))
         for probe in found:
             block[:, :, columns[_name(probe, index)]] = probe.directions.T
         directions.append(block)
-    scores = [_one_sided(model.linear.score([one[:, p] for one in directions]), effect) for p in range(len(points))]
+    scores = [
+        _one_sided(model.linear.score([one[:, p] for one in directions]), names, effect) for p in range(len(points))
+    ]
     statistics = np.array([score.chi_square for score in scores])
     best = int(np.argmax(statistics))
     degrees = scores[best].degrees
@@ -145,7 +148,6 @@ def _scan_shared(
         for linear_video, one in zip(model.linear.videos, directions, strict=True)
     ]
     p_value = min(1.0, _independent(blocks, degrees, generator) * float(chi2.sf(statistics[best], degrees)))
-    names = [name for name, _ in columns]
     estimate = dict(zip(names, scores[best].estimate.tolist(), strict=True))
     start = dict(points[best]) | (_starting(effect, estimate) if len(estimate) == len(names) else {})
     sd = dict(zip(names, scores[best].sd.tolist(), strict=True))
@@ -157,14 +159,26 @@ def _name(probe: Probe, video: int) -> Key:
     return probe.key or (probe.field, (f"video {video}", str(probe.owner)))
 
 
-def _one_sided(score: Score, effect: Effect) -> Score:
-    """The score of a strength that cannot be negative: nothing where the data ask for less than none of it."""
-    positive = any(
-        one.transform is Transform.LOG and effect.vanishes_at.get(one.name) == 0.0 for one in effect.parameters
-    )
-    if positive and len(score.gradient) == 1 and score.gradient[0] < 0:
-        return Score(np.zeros(1), score.information)
-    return score
+def _one_sided(score: Score, names: Sequence[str], effect: Effect) -> Score:
+    """The score with strengths that cannot be negative at zero where the data ask for less than none of them."""
+    positive = {
+        one.name
+        for one in effect.parameters
+        if one.transform is Transform.LOG and effect.vanishes_at.get(one.name) == 0.0
+    }
+    left = list(range(len(names)))
+    while left:
+        estimate = score.of(left).estimate
+        negative = [k for k, value in zip(left, estimate, strict=True) if value < 0 and names[k] in positive]
+        if not negative:
+            break
+        left.remove(min(negative, key=lambda k: score.gradient[k]))
+    if len(left) == len(names):
+        return score
+    bounded = np.zeros(len(names))
+    if left:
+        bounded[left] = score.of(left).estimate
+    return Score(score.information @ bounded, score.information)
 
 
 def _starting(effect: Effect, estimate: Mapping[str, float]) -> dict[str, float]:

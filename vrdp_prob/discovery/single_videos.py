@@ -27,7 +27,14 @@ NEARLY, MOST_TOLD = 0.6, 2
 """Share of the largest gain from which another cause is told of, too, and number of causes that are."""
 EXPLAINED = 1.1
 """Residuals in units of the noise from which a cause explains a video; no further ones are tried then."""
-CONTACT_HOOKS = ("tangential_impulse", "contact_radius", "slip_friction", "restitution", "pair_force")
+CONTACT_HOOKS = (
+    "tangential_impulse",
+    "vertical_impulse",
+    "contact_radius",
+    "slip_friction",
+    "restitution",
+    "pair_force",
+)
 """What an effect overrides that acts in contacts or on what follows from them."""
 AT_ONCE = 4
 """Causes that are tried side by side."""

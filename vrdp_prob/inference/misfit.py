@@ -154,7 +154,8 @@ def tempered(residuals: Float[np.ndarray, "time body 2"], clues: Clues) -> Float
     """Residuals as a measure of what a model leaves unexplained, in spite of outliers.
 
     Gross outliers of the tracks are left out, and what lies farther off the residuals around it than noise does is
-    drawn near to them. What is off as its neighbours are off stays: heavy tails would take that for outliers.
+    drawn to the farthest that noise reaches. What is off as its neighbours are off stays: heavy tails would take that
+    for outliers.
 
     Parameters
     ----------
@@ -169,7 +170,7 @@ def tempered(residuals: Float[np.ndarray, "time body 2"], clues: Clues) -> Float
         around = median_filter(result[seen, body], size=(NEIGHBOURS, 1), mode="mirror")
         off = result[seen, body] - around
         reach = FARTHEST * clues.position_sd[seen, body] / np.maximum(np.linalg.norm(off, axis=-1), TINY)
-        result[seen, body] = around + np.minimum(reach, 1.0)[:, None] * off
+        result[seen, body] = np.where(reach[:, None] < 1.0, around + reach[:, None] * off, result[seen, body])
     return result
 
 

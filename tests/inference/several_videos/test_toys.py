@@ -81,6 +81,20 @@ def by_quadrature(seen: np.ndarray) -> tuple[float, float, float, float]:
     return mean, sd, float(weights @ conditional), float(logsumexp(log_joint))
 
 
+def test_parts_of_a_newton_step_make_it_up() -> None:
+    generator = np.random.default_rng(1)
+    rows, gradient = generator.standard_normal((9, 6)), generator.standard_normal(4)
+    # The last number is known a million times worse than the others.
+    rows[:, 5] *= 1e-6
+    expansion = Expansion(np.zeros(2), gradient, rows[:, :2], rows[:, 2:])
+    parts = expansion.separate_steps
+    assert parts.sum(axis=0) == pytest.approx(expansion.local_step, rel=1e-6)
+    curvature = rows[:, 2:].T @ rows[:, 2:]
+    promised = -(parts @ gradient) - np.einsum("ki,ij,kj->k", parts, curvature, parts) / 2
+    assert promised.sum() == pytest.approx(expansion.promised, rel=1e-6)
+    assert (promised >= 0).all()
+
+
 def test_an_arrow_is_the_whole_matrix() -> None:
     generator = np.random.default_rng(0)
     shared, owns = 3, (2, 4, 1)

@@ -98,15 +98,19 @@ def climb(
         raise ImpossibleStartError
     slopes = _expanded(numbers, videos, state)
     if towards is not None and not np.array_equal(towards, shared):
-        state = _improved(numbers, videos, state, slopes, towards - shared)
+        settled = _settled(videos, state, slopes.videos)
+        state = _improved(numbers, videos, settled, towards - shared)
         slopes = _expanded(numbers, videos, state)
     for _ in range(rounds):
-        smooth = _of(slopes, _inside(slopes))
+        inside = _inside(slopes)
+        smooth = _of(slopes, inside) if inside.any() else slopes
         expected = smooth.expected_gain
         converged = expected < TOLERANCE
         if converged:
             break
-        trial = _improved(numbers, videos, state, slopes, smooth.shared_step)
+        trial = _settled(videos, state, slopes.videos)
+        if _gained(trial, state, ~inside) < EXPECTED:
+            trial = _improved(numbers, videos, trial, smooth.shared_step)
         gain = trial.total(numbers) - state.total(numbers)
         if gain > 0:
             state = trial
@@ -123,8 +127,12 @@ def _inside(slopes: Expansions) -> Bool[np.ndarray, "video"]:
 
     Others are at an edge, and what they say there of the shared numbers is not to be believed.
     """
-    inside = np.array([one.promised < STEEP for one in slopes.videos], dtype=bool)
-    return inside if inside.any() else np.ones(len(inside), dtype=bool)
+    return np.array([one.promised < STEEP for one in slopes.videos], dtype=bool)
+
+
+def _gained(trial: _State, state: _State, chosen: Bool[np.ndarray, "video"]) -> float:
+    """What some of the videos have gained; as long as those at an edge gain much they would follow no common step."""
+    return float((np.array(trial.values) - np.array(state.values))[chosen].sum())
 
 
 def _of(slopes: Expansions, chosen: Bool[np.ndarray, "video"]) -> Expansions:
@@ -143,17 +151,10 @@ def _improved(
     numbers: SharedNumbers,
     videos: Sequence[LinkedVideo],
     state: _State,
-    slopes: Expansions,
     step: Float[np.ndarray, "shared"],
 ) -> _State:
-    """The first share of a common step that brings something; where none does, what the videos' own steps bring.
-
-    As long as videos at an edge gain much by themselves they are left to it: they would follow no common step.
-    """
-    start, state = state.total(numbers), _settled(videos, state, slopes.videos)
+    """The first share of a common step that brings something; where none does, the state itself."""
     before = state.total(numbers)
-    if before - start > EXPECTED and not _inside(slopes).all():
-        return state
     for share in SHARES:
         target = state.shared + share * step
         trial = _with_best_noise(numbers, videos, _followed(videos, state, target))

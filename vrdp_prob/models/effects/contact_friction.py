@@ -20,7 +20,7 @@ CONTACT_FRICTION = Parameter(
 WALL_FRICTION = Parameter(
     "wall_friction",
     "1",
-    "friction coefficient between a body and a wall that it touches",
+    "friction coefficient between a body and something fixed that it touches",
     Transform.LOG,
     Prior(math.log(0.1), 1.0),
     default=0.1,
@@ -40,7 +40,7 @@ class ContactFriction(Effect):
     name: ClassVar = "contact_friction"
     sentence: ClassVar = "Bodies that touch rub on each other and exchange spin."
     law: ClassVar = (
-        "|J_t| <= contact_friction J_n (wall_friction J_n at walls), against the sliding at the touching point, also "
+        "|J_t| <= contact_friction J_n (wall_friction J_n at what is fixed), against the sliding at the touching point, also "
         "where spheres roll, up to sticking"
     )
     source: ClassVar = "Coulomb friction in an impact: J. B. Keller, Impact with friction, J. Appl. Mech. 53 (1986)"

@@ -35,7 +35,7 @@ RELEASE_ROLLING = Parameter(
 RELEASE_ROLLING_ACROSS = Parameter(
     "release_rolling_across",
     "1",
-    "the same across its velocity, to the left: a spin about the direction of motion, which bends the path",
+    "velocity across its own, to the left, at which a sphere would roll by its spin when released, over its velocity then",
     Transform.IDENTITY,
     Prior(0.0, 0.3),
     default=0.0,

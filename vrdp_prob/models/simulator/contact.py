@@ -155,8 +155,8 @@ class _Arms:
 
 
 def rubs(effects: "Sequence[Effect]") -> bool:
-    """Whether an effect adds tangential impulses to contacts."""
-    return any(effect.overrides("tangential_impulse") for effect in effects)
+    """Whether an effect adds impulses across the normal to contacts."""
+    return any(effect.overrides(hook) for effect in effects for hook in ("tangential_impulse", "vertical_impulse"))
 
 
 def contact(

@@ -1,0 +1,48 @@
+"""Which numbers are unknown, and what is believed of them."""
+
+import numpy as np
+import pytest
+
+from vrdp_prob.models.effects.contact_friction import ContactFriction
+from vrdp_prob.models.effects.wall import Wall as HiddenWall
+from vrdp_prob.models.physics import PhysicsModel
+from vrdp_prob.models.unknowns import SPIN_SD, SURFACE_SPEED_SD, Structure, unknowns
+from vrdp_prob.scene import Body, Shape, Tracks, Wall
+
+RUBBING = PhysicsModel.base().with_effect(ContactFriction())
+EVERYTHING = Structure(moving=frozenset({0, 1}), colliding=frozenset({0, 1}))
+
+
+def seen(shape: Shape, radius: float, walls: tuple[Wall, ...] = ()) -> Tracks:
+    """Two bodies that move side by side."""
+    times = np.arange(10) * 0.04
+    positions = np.array([[[time, 0.0], [time, 5.0]] for time in times])
+    bodies = tuple(Body(id=name, shape=shape, radius=radius) for name in "ab")
+    return Tracks.from_arrays("seen", bodies, times, positions, walls=walls)
+
+
+@pytest.mark.parametrize(
+    ("shape", "radius", "sd"),
+    [
+        (Shape.SPHERE, 0.03, SURFACE_SPEED_SD / 0.03),
+        (Shape.CYLINDER, 0.2, SURFACE_SPEED_SD / 0.2),
+        (Shape.CYLINDER, 0.8, SPIN_SD),
+        (Shape.CUBE, 0.03, SPIN_SD),
+    ],
+)
+def test_small_round_bodies_may_spin_fast(shape: Shape, radius: float, sd: float) -> None:
+    coordinates = unknowns(seen(shape, radius), RUBBING, EVERYTHING)
+    assert coordinates.entries[coordinates.places["spin", 0]].prior.sd == pytest.approx(sd)
+
+
+def test_friction_of_walls_is_unknown_only_where_something_is_fixed() -> None:
+    wall = Wall(-1.0, -1.0, 3.0, -1.0)
+    without, beside = seen(Shape.CYLINDER, 0.2), seen(Shape.CYLINDER, 0.2, (wall,))
+    for tracks, model, expected in (
+        (without, RUBBING, False),
+        (beside, RUBBING, True),
+        (without, RUBBING.with_effect(HiddenWall()), True),
+    ):
+        coordinates = unknowns(tracks, model, EVERYTHING)
+        assert (("wall_friction", None) in coordinates.places) is expected
+        assert ("contact_friction", None) in coordinates.places

@@ -40,8 +40,8 @@ class ContactFriction(Effect):
     name: ClassVar = "contact_friction"
     sentence: ClassVar = "Bodies that touch rub on each other and exchange spin."
     law: ClassVar = (
-        "|J_t| <= contact_friction J_n (wall_friction J_n at what is fixed), against the sliding at the touching point, also "
-        "where spheres roll, up to sticking"
+        "|J_t| <= contact_friction J_n (wall_friction J_n at what is fixed), against the sliding where they touch, "
+        "also as spheres roll, up to sticking"
     )
     source: ClassVar = "Coulomb friction in an impact: J. B. Keller, Impact with friction, J. Appl. Mech. 53 (1986)"
     parameters: ClassVar = (CONTACT_FRICTION, WALL_FRICTION)

@@ -35,7 +35,7 @@ RELEASE_ROLLING = Parameter(
 RELEASE_ROLLING_ACROSS = Parameter(
     "release_rolling_across",
     "1",
-    "velocity across its own, to the left, at which a sphere would roll by its spin when released, over its velocity then",
+    "velocity to the left of its own at which a sphere would roll by its spin when it is released, over its velocity",
     Transform.IDENTITY,
     Prior(0.0, 0.3),
     default=0.0,

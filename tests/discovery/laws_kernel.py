@@ -133,6 +133,12 @@ def pushed(laws, state, k, count, released, inverse_mass, now):
 
 
 @njit(cache=True)
+def moving_share(laws, sphere):
+    """Share of a push that moves what does not slip; where the table can turn a sphere it turns with the rest."""
+    return 1 / (1 + 1 / SOLID_SPHERE) if sphere and laws.slip_friction > 0 else 1.0
+
+
+@njit(cache=True)
 def against(x, y, start_x, start_y, amount):
     """Vector of a length against another one; past a turn back since the start it goes on as before the turn.
 

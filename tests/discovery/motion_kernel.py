@@ -9,7 +9,7 @@ import numpy as np
 from numba import njit
 
 from tests.discovery.contact_kernel import far, opening_speed, part
-from tests.discovery.laws_kernel import GRAVITY, SOLID_SPHERE, STILL, against, friction, on_patch, pushed
+from tests.discovery.laws_kernel import GRAVITY, SOLID_SPHERE, STILL, against, friction, moving_share, on_patch, pushed
 
 COLUMNS = 9
 RESTS, MOVES, SLIPS = 0, 1, 2
@@ -42,6 +42,8 @@ def rates(start, state, now, things, laws, mode, patch, released):
             result[k, 6], result[k, 7] = -SOLID_SPHERE * slip_x, -SOLID_SPHERE * slip_y
         else:
             amount = friction(laws, body, things.friction[k], patch[k], now) * GRAVITY
+            share = moving_share(laws, things.sphere[k])
+            x, y = share * x, share * y
             if result[k, 8] < STILL:
                 slip_x, slip_y = against(x, y, x, y, min(amount, np.sqrt(x * x + y * y)))
             else:
@@ -75,7 +77,8 @@ def step(state, now, size, things, laws, mode, patch, released):
 def held(state, k, now, things, laws, patch, released):
     """Whether friction holds a body that has no velocity."""
     x, y = pushed(laws, state, k, len(patch), released, things.inverse_mass[k], now)
-    return np.sqrt(x * x + y * y) <= friction(laws, state[k], things.friction[k], patch[k], now) * GRAVITY
+    push = moving_share(laws, things.sphere[k]) * np.sqrt(x * x + y * y)
+    return push <= friction(laws, state[k], things.friction[k], patch[k], now) * GRAVITY
 
 
 @njit(cache=True)

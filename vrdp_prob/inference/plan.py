@@ -61,3 +61,5 @@ CURRICULUM = FitPlan(free_first=True, windows=(40, 80), alternatives=False)
 GROWING = FitPlan(free_first=True, windows=8, alternatives=False)
 IN_DOUBT = FitPlan(attempts=1, yaws=False)
 """For one of several videos under a model that may lack something: other videos show what, more attempts do not."""
+TURNING = FitPlan(attempts=1)
+"""For one of several videos under a model that explains the others."""

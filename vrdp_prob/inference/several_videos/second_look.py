@@ -12,7 +12,7 @@ from jaxtyping import Bool
 
 from vrdp_prob.inference.map_fit import MapFit, fit_map
 from vrdp_prob.inference.parallel import in_processes
-from vrdp_prob.inference.plan import IN_DOUBT
+from vrdp_prob.inference.plan import IN_DOUBT, TURNING, FitPlan
 from vrdp_prob.inference.several_videos.agreement import consensus
 from vrdp_prob.inference.several_videos.parts import carried_starts, link_fits, plain_likelihood, stream, structure_of
 from vrdp_prob.models.parameters import Prior, Scope
@@ -23,7 +23,10 @@ WORSE = 1.08
 FAR_WORSE = 1.5
 """...and by this one the video is not asked for the shared numbers."""
 LOOKS = 4
-"""Fits that are made anew of one video."""
+"""Fits that are made anew of one video..."""
+EXPLAINED = 1.2
+"""...and one more, with the yaws of its cubes turned, if the video in the middle leaves no more than so many noise sd:
+then the model lacks nothing whose place a wrong yaw could take."""
 MOST = 2
 """One video in so many is looked at again."""
 SAME = 0.01
@@ -94,7 +97,9 @@ def look_again(
         return list(fits)
     excess = _excess(fits)
     goal = WORSE * float(np.median([one.misfit.residual_sd for one in fits]))
-    look = _Look(model, _told(fits, model, shared), goal, seed, looks)
+    explained = float(np.median([one.misfit.ratio for one in fits])) < EXPLAINED
+    plans = (IN_DOUBT,) * looks + ((TURNING,) if explained else ())
+    look = _Look(model, _told(fits, model, shared), goal, seed, plans)
     doubted = [(fits[index], bool(excess[index] >= FAR_WORSE)) for index in chosen]
     improved = dict(zip(chosen, in_processes(look, doubted), strict=True))
     return [improved.get(index) or fit for index, fit in enumerate(fits)]
@@ -114,22 +119,22 @@ class _Look:
         Residuals in units of the noise that are good enough.
     seed
         Seed of the searches.
-    looks
-        Their number at most.
+    plans
+        How each of them is made, at most.
     """
 
     model: PhysicsModel
     told: PhysicsModel
     goal: float
     seed: int
-    looks: int
+    plans: tuple[FitPlan, ...]
 
     def __call__(self, doubted: tuple[MapFit, bool]) -> MapFit | None:
         """A better fit, if there is one; with a fit comes whether it is far worse than those of other videos."""
         (best, far_worse), better = doubted, None
-        for look in range(self.looks):
+        for look, plan in enumerate(self.plans):
             generator = stream(self.seed, f"{best.clues.tracks.video} {look}")
-            found = fit_map(best.clues.tracks, self.told, generator, plan=IN_DOUBT, model_error=False)
+            found = fit_map(best.clues.tracks, self.told, generator, plan=plan, model_error=False)
             gained = best.misfit.residual_sd / found.misfit.residual_sd - 1
             if gained > SAME:
                 likelihood = plain_likelihood(found.clues, self.model, structure_of(found.likelihood.coordinates))

@@ -51,6 +51,9 @@ def test_mirror(seed: int, model: PhysicsModel) -> None:
         walls=worlds.walls * flip.repeat(2),
     )
     mirrored = _downhill(mirrored, _tilt(worlds) * flip)
+    if "release_rolling_across" in worlds.parameters:
+        across = {"release_rolling_across": -worlds.parameters["release_rolling_across"]}
+        mirrored = replace(mirrored, parameters={**mirrored.parameters, **across})
     first, second = simulate(worlds, TIMES, model), simulate(mirrored, TIMES, model)
     assert torch.allclose(first.trajectory * tensor([1.0, -1, -1]), second.trajectory, atol=TOLERANCE)
 

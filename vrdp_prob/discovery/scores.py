@@ -167,18 +167,14 @@ def _one_sided(score: Score, names: Sequence[str], effect: Effect) -> Score:
         if one.transform is Transform.LOG and effect.vanishes_at.get(one.name) == 0.0
     }
     left = list(range(len(names)))
-    while left:
-        estimate = score.of(left).estimate
-        negative = [k for k, value in zip(left, estimate, strict=True) if value < 0 and names[k] in positive]
+    while True:
+        bounded = np.zeros(len(names))
+        bounded[left] = score.of(left).estimate
+        negative = [k for k in left if bounded[k] < 0 and names[k] in positive]
         if not negative:
             break
         left.remove(min(negative, key=lambda k: score.gradient[k]))
-    if len(left) == len(names):
-        return score
-    bounded = np.zeros(len(names))
-    if left:
-        bounded[left] = score.of(left).estimate
-    return Score(score.information @ bounded, score.information)
+    return score if len(left) == len(names) else Score(score.information @ bounded, score.information)
 
 
 def _starting(effect: Effect, estimate: Mapping[str, float]) -> dict[str, float]:

@@ -45,3 +45,10 @@ def test_volumes_are_kept_up_to_the_stated_factor_also_after_it_was_moved() -> N
     for place in torch.from_numpy(np.random.default_rng(1).standard_normal((5, 3))):
         derivative = torch.autograd.functional.jacobian(curved.mapped, place)
         assert float(torch.linalg.slogdet(derivative)[1]) == pytest.approx(curved.log_volume, abs=1e-9)
+
+
+def test_no_points_are_mapped_to_no_points_and_back() -> None:
+    curved = CurvedGaussian.around(STRAIGHT, banana)
+    none = np.empty((0, 3))
+    assert curved.points(none).shape == (0, 3)
+    assert curved.whitened(none).shape == (0, 3)

@@ -1,7 +1,15 @@
 import numpy as np
 import pytest
 
-from vrdp_prob.inference.diagnostics import Reported, chain_statistics, share_with_error, weighted_statistics
+from vrdp_prob.inference.diagnostics import (
+    Reported,
+    chain_statistics,
+    drift,
+    joined,
+    settled,
+    share_with_error,
+    weighted_statistics,
+)
 from vrdp_prob.inference.infer import default_model
 from vrdp_prob.inference.samples import Samples, assess
 from vrdp_prob.models.unknowns import Structure, unknowns
@@ -27,6 +35,15 @@ def test_effective_size_of_an_autoregressive_chain_is_the_known_one(autoregressi
     assert found.ess_bulk == pytest.approx(known, rel=0.15)
     assert 0.5 * known < found.ess_tail < 4 * known
     assert found.r_hat < 1.01
+
+
+def test_chains_have_settled_where_every_statistic_meets_its_goal(autoregressive: np.ndarray) -> None:
+    groups = autoregressive.reshape(2, 2, DRAWS, 1)
+    found = chain_statistics(joined(groups))
+    r_hat, effective = max(found.r_hat, drift(groups)), min(found.ess_bulk, found.ess_tail)
+    assert settled(groups, r_hat=r_hat, effective=effective)
+    assert not settled(groups, r_hat=r_hat - 1e-9, effective=effective)
+    assert not settled(groups, r_hat=r_hat, effective=effective + 1e-6)
 
 
 def test_error_of_a_share_grows_with_memory(autoregressive: np.ndarray) -> None:

@@ -175,7 +175,7 @@ class SeveralClouds:
         bent = np.matmul(straight - self._mean[:, None], np.swapaxes(self._unroot, 1, 2))
         if self._axes.shape[2]:
             along = np.matmul(bent, self._axes)
-            products = (along[..., :, None] * along[..., None, :]).reshape(*along.shape[:2], -1)
+            products = (along[..., :, None] * along[..., None, :]).reshape(*along.shape[:2], along.shape[2] ** 2)
             bent = bent - np.matmul(products, self._bend.reshape(len(bent), -1, bent.shape[2])) / 2
         return np.asarray(np.matmul(bent - self._shift[:, None], np.swapaxes(self._unscale, 1, 2)))
 

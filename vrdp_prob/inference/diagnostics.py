@@ -104,12 +104,57 @@ class Statistics:
 def chain_statistics(draws: Float[np.ndarray, "chain draw dimension"], reported: Reported | None = None) -> Statistics:
     """Statistics of chains; R-hat is infinite and effective sizes are 0 where they are not defined."""
     shown = reported or Reported.coordinates(draws.shape[-1])
-    values = np.moveaxis(shown.values(draws), -1, 0)
+    values = _by_quantity(draws, shown)
+    return _worst(shown.names, _r_hat(values), _ess_bulk(values), _ess_tail(values))
+
+
+def settled(
+    draws: Float[np.ndarray, "group chain draw axis"],
+    reported: Reported | None = None,
+    *,
+    r_hat: float,
+    effective: float,
+) -> bool:
+    """Whether groups of chains have met their goals; what is asked first costs least and fails most.
+
+    Parameters
+    ----------
+    draws
+        Chains in groups, which are each judged as one chain.
+    reported
+        The quantities to look at; the coordinates where None.
+    r_hat
+        Largest R-hat, of groups and of their earlier and later draws (see `drift`).
+    effective
+        Fewest effective draws, in the bulk and in the tails.
+    """
+    if drift(draws, reported) > r_hat:
+        return False
+    values = _by_quantity(joined(draws), reported or Reported.coordinates(draws.shape[-1]))
+    return bool(
+        _r_hat(values).max() <= r_hat and _ess_tail(values).min() >= effective and _ess_bulk(values).min() >= effective
+    )
+
+
+def _by_quantity(
+    draws: Float[np.ndarray, "chain draw dimension"], reported: Reported
+) -> Float[np.ndarray, "quantity chain draw"]:
+    return np.moveaxis(reported.values(draws), -1, 0)
+
+
+def _r_hat(values: Float[np.ndarray, "quantity chain draw"]) -> Float[np.ndarray, "quantity"]:
     with np.errstate(all="ignore"):
-        r_hat = np.nan_to_num(np.asarray(array_stats.rhat(values), dtype=float), nan=np.inf)
-        bulk = np.nan_to_num(np.asarray(array_stats.ess(values, method="bulk"), dtype=float))
-        tail = np.nan_to_num(np.asarray(array_stats.ess(values, method="tail", prob=TAILS), dtype=float))
-    return _worst(shown.names, r_hat, bulk, tail)
+        return np.nan_to_num(np.asarray(array_stats.rhat(values), dtype=float), nan=np.inf)
+
+
+def _ess_bulk(values: Float[np.ndarray, "quantity chain draw"]) -> Float[np.ndarray, "quantity"]:
+    with np.errstate(all="ignore"):
+        return np.nan_to_num(np.asarray(array_stats.ess(values, method="bulk"), dtype=float))
+
+
+def _ess_tail(values: Float[np.ndarray, "quantity chain draw"]) -> Float[np.ndarray, "quantity"]:
+    with np.errstate(all="ignore"):
+        return np.nan_to_num(np.asarray(array_stats.ess(values, method="tail", prob=TAILS), dtype=float))
 
 
 def joined(draws: Float[np.ndarray, "group chain draw axis"]) -> Float[np.ndarray, "group several axis"]:
@@ -122,7 +167,8 @@ def joined(draws: Float[np.ndarray, "group chain draw axis"]) -> Float[np.ndarra
 
 def drift(draws: Float[np.ndarray, "group chain draw axis"], reported: Reported | None = None) -> float:
     """Largest R-hat of groups of chains, each group split into its earlier and its later draws."""
-    return chain_statistics(joined(np.swapaxes(draws, 1, 2)), reported).r_hat
+    values = _by_quantity(joined(np.swapaxes(draws, 1, 2)), reported or Reported.coordinates(draws.shape[-1]))
+    return float(_r_hat(values).max())
 
 
 def weighted_statistics(

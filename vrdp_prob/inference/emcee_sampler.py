@@ -17,7 +17,7 @@ import numpy as np
 from jaxtyping import Float
 
 from vrdp_prob.inference.checkpoint import Checkpoint, kept
-from vrdp_prob.inference.diagnostics import Reported, chain_statistics, drift, joined
+from vrdp_prob.inference.diagnostics import Reported, drift, joined, settled
 from vrdp_prob.inference.emcee_ensemble import Ensemble
 from vrdp_prob.inference.mixture import Jumps, Mixture
 from vrdp_prob.inference.mode_weights import doubts, weights_from_chains
@@ -150,9 +150,7 @@ def _run(
         while True:
             run_to(end, tune=False)
             points = _points(mixture, ensembles)
-            found = chain_statistics(joined(points), reported)
-            r_hat = max(found.r_hat, drift(points, reported))
-            if r_hat <= R_HAT_GOAL and min(found.ess_bulk, found.ess_tail) >= MARGIN * ESS_GOAL:
+            if settled(points, reported, r_hat=R_HAT_GOAL, effective=MARGIN * ESS_GOAL):
                 return ()
             work = sum(ensemble.work for ensemble in ensembles)
             if work >= work_limit:

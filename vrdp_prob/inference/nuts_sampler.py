@@ -13,7 +13,7 @@ from jaxtyping import Float
 
 from vrdp_prob.inference.checkpoint import Checkpoint, kept
 from vrdp_prob.inference.curved_gaussian import CurvedGaussian
-from vrdp_prob.inference.diagnostics import Reported, chain_statistics, drift, joined
+from vrdp_prob.inference.diagnostics import Reported, drift, joined, settled
 from vrdp_prob.inference.importance import Weighted, smoothed_weights
 from vrdp_prob.inference.mixture import Jumps, Mixture
 from vrdp_prob.inference.mode_weights import doubts, weights_from_chains, weights_from_importance
@@ -127,7 +127,9 @@ def sample_nuts(
             run.further(CHUNK, adapt=False)
             points = _in_proportion(run, inhabited, modes, np.random.default_rng(seed))
             chains = points.reshape(RESULTS, -1, *points.shape[1:])
-            if points[..., 0].size >= draws and _good(chains, reported):
+            if points[..., 0].size >= draws and settled(
+                chains, reported, r_hat=R_HAT_GOAL, effective=MARGIN * ESS_GOAL
+            ):
                 stopped: tuple[str, ...] = ()
                 break
             if run.gradients >= most_gradients:
@@ -153,12 +155,6 @@ def sample_nuts(
         modes=modes,
         notes=(*stopped, *doubtful),
     )
-
-
-def _good(chains: Float[np.ndarray, "result chain draw dimension"], reported: Reported | None) -> bool:
-    found = chain_statistics(joined(chains), reported)
-    r_hat = max(found.r_hat, drift(chains, reported))
-    return r_hat <= R_HAT_GOAL and min(found.ess_bulk, found.ess_tail) >= MARGIN * ESS_GOAL
 
 
 @dataclass

@@ -15,7 +15,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 from scipy.special import logsumexp
 
-from vrdp_prob.inference.diagnostics import chain_statistics
+from vrdp_prob.inference.diagnostics import drift, joined, settled
 from vrdp_prob.inference.samples import ESS_GOAL, R_HAT_GOAL
 from vrdp_prob.inference.several_videos.arrow import ArrowGaussian
 from vrdp_prob.inference.several_videos.clouds import Clouds
@@ -274,12 +274,9 @@ class _Sampler:
 
     def converged(self) -> bool:
         """Whether all draws since the last reshaping meet the goals."""
-        for series in self._series():
-            found = chain_statistics(_by_chain(series))
-            r_hat, ess = found.r_hat, min(found.ess_bulk, found.ess_tail)
-            if max(r_hat, _drift(series)) > R_HAT_GOAL or ess < MARGIN * ESS_GOAL:
-                return False
-        return True
+        return all(
+            settled(_in_groups(series), r_hat=R_HAT_GOAL, effective=MARGIN * ESS_GOAL) for series in self._series()
+        )
 
     def draws(self) -> JointDraws:
         """All draws since the last reshaping."""
@@ -287,7 +284,7 @@ class _Sampler:
             self._arrow.shared_points(_by_chain(self._kept)),
             tuple(_by_chain(video.points) for video in self._videos),
             tuple(_by_chain([values[:, None] for values in video.values])[..., 0] for video in self._videos),
-            max(_drift(series) for series in self._series()),
+            max(drift(_in_groups(series)) for series in self._series()),
             sum(video.looks for video in self._videos),
         )
 
@@ -318,13 +315,13 @@ class _Sampler:
         return list(self.workers.map(task, self._videos))
 
 
+def _in_groups(
+    sweeps: Sequence[Float[np.ndarray, "chain dimension"]],
+) -> Float[np.ndarray, "group member sweep dimension"]:
+    steps = np.stack(sweeps, axis=1)
+    return steps.reshape(GROUPS, -1, *steps.shape[1:])
+
+
 def _by_chain(sweeps: Sequence[Float[np.ndarray, "chain dimension"]]) -> Float[np.ndarray, "group draw dimension"]:
     """Groups of chains, each merged chain after chain so that autocorrelation within a chain shows."""
-    steps = np.stack(sweeps, axis=1)
-    return steps.reshape(GROUPS, -1, steps.shape[-1])
-
-
-def _drift(sweeps: Sequence[Float[np.ndarray, "chain dimension"]]) -> float:
-    steps = np.stack(sweeps)
-    grouped = steps.reshape(len(steps), GROUPS, -1, steps.shape[-1]).swapaxes(0, 1)
-    return chain_statistics(grouped.reshape(GROUPS, -1, steps.shape[-1])).r_hat
+    return joined(_in_groups(sweeps))

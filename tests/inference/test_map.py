@@ -12,7 +12,7 @@ from tests.inference.map_comparison import Comparison, compare
 from tests.inference.prior_scenes import prior_scene
 from tests.inference.random_scenes import Truth, random_truth
 from vrdp_prob.inference import default_model
-from vrdp_prob.inference.encounters import CROWDED, crowded
+from vrdp_prob.inference.encounters import CROWDED, MANY_PARTNERS, hard_to_explain
 from vrdp_prob.inference.events import courses
 from vrdp_prob.inference.hypothesis import distances, yaw_places
 from vrdp_prob.inference.map_fit import MapFit, fit_map
@@ -87,12 +87,25 @@ def test_bodies_that_begin_to_meet_on_the_way_get_their_unknowns() -> None:
     assert added >= {(name, body) for name in ("mass", "restitution") for body in wider[0].colliding}
 
 
-def test_contacts_in_quick_succession_are_crowded() -> None:
-    bounces = [(0.1 * k, 0, 1) for k in range(CROWDED)]
-    assert crowded(bounces)
-    assert not crowded(bounces[1:])
-    assert not crowded([(10 * time, *pair) for time, *pair in bounces])
-    assert not crowded([(0.1 * k, 2 * k, 2 * k + 1) for k in range(CROWDED)])
+def test_contacts_in_quick_succession_are_hard_to_explain() -> None:
+    bounces = [(1.0 + 0.1 * k, 0, 1) for k in range(CROWDED)]
+    long_ago = np.zeros(8)
+    assert hard_to_explain(bounces, long_ago)
+    assert not hard_to_explain(bounces[1:], long_ago)
+    assert not hard_to_explain([(10 * time, *pair) for time, *pair in bounces], long_ago)
+    assert not hard_to_explain([(1.0 + 0.1 * k, 2 * k, 2 * k + 1) for k in range(CROWDED)], long_ago)
+
+
+def test_many_partners_of_one_body_are_hard_to_explain() -> None:
+    partners = [(1.0 + k, 0, 1 + k) for k in range(MANY_PARTNERS)]
+    assert hard_to_explain(partners, np.zeros(8))
+    assert not hard_to_explain(partners[1:], np.zeros(8))
+
+
+def test_a_contact_right_after_a_body_entered_is_hard_to_explain() -> None:
+    entered = np.array([0.0, 0.8])
+    assert hard_to_explain([(1.0, 0, 1)], entered)
+    assert not hard_to_explain([(1.5, 0, 1)], entered)
 
 
 def test_a_course_counts_a_pair_that_bounces_on_the_spot_twice() -> None:

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 import torch
+from jaxtyping import Float
 
 from vrdp_prob.inference.alternatives import Encounter
 from vrdp_prob.inference.clues import Clues
@@ -21,7 +22,9 @@ LOOK = 2 * SETTLED
 LATEST = 3 * SETTLED
 """Time (s) after which a motion that is not explained is no longer put down to an approach."""
 CROWDED = 4
-"""So many contacts of one body in the time after which explanations are tried make any explanation doubtful."""
+"""So many contacts of one body in the time after which explanations are tried make any explanation doubtful..."""
+MANY_PARTNERS = 3
+"""...and so do so many partners of one body, since an error at the first contact spoils what is found at the others."""
 UNSEEN = 2
 """Frames before an approach from which on the velocities before it are known."""
 MOST_TRIED = 2
@@ -97,11 +100,25 @@ class EncounterFinder:
         return tuple(pair for pair, frames in zip(sorted(pairs), seen, strict=True) if frames <= UNSEEN)
 
 
-def crowded(contacts: Sequence[Contact]) -> bool:
-    """Whether a body has so many contacts in quick succession that their number and order are hard to find."""
+def hard_to_explain(contacts: Sequence[Contact], first_seen: Float[np.ndarray, "body"]) -> bool:
+    """Whether contacts are of a kind whose explanation easily goes astray.
+
+    A body has many contacts in quick succession, or many partners, or meets another one so soon after it was first seen
+    that its velocity before the contact is hardly known.
+
+    Parameters
+    ----------
+    contacts
+        All contacts, in order.
+    first_seen
+        Time (s) at which each body is first seen.
+    """
     for body in {one for contact in contacts for one in contact[1:]}:
-        times = np.array([time for time, *pair in contacts if body in pair])
-        if (times[CROWDED - 1 :] - times[: len(times) - CROWDED + 1] < SETTLED).any():
+        own = [contact for contact in contacts if body in contact[1:]]
+        times = np.array([time for time, *_ in own])
+        crowded = (times[CROWDED - 1 :] - times[: len(times) - CROWDED + 1] < SETTLED).any()
+        many = len({contact[1:] for contact in own}) >= MANY_PARTNERS
+        if crowded or many or times[0] - first_seen[body] < SETTLED:
             return True
     return False
 

@@ -15,7 +15,7 @@ from jaxtyping import Bool, Float
 from vrdp_prob.inference.alternatives import Encounter, alternatives, suggest
 from vrdp_prob.inference.clues import Clues
 from vrdp_prob.inference.descent import Descent
-from vrdp_prob.inference.encounters import EncounterFinder, contacts_in, crowded
+from vrdp_prob.inference.encounters import EncounterFinder, contacts_in, hard_to_explain
 from vrdp_prob.inference.events import first_contacts
 from vrdp_prob.inference.hypothesis import Hypothesis, distances, turned_least, yaw_places
 from vrdp_prob.inference.least_squares import Minimum, robust_cost
@@ -56,8 +56,8 @@ CONTACT_FIELDS = ("angle", "mass", "restitution")
 class GrowingFit:
     """Explanations of the first frames, the best one first.
 
-    `doubtful` says whether several cubes with open yaws met, or contacts follow on each other quickly, where the
-    search may well have gone astray.
+    `doubtful` says whether several cubes with open yaws met, or contacts are hard to explain, where the search may well
+    have gone astray.
 
     Parameters
     ----------
@@ -134,7 +134,8 @@ class GrowingFit:
             self.doubtful |= encounter.puzzling and len(yaw_places(self.likelihood, encounter.bodies)) > 1
             self._explain_otherwise(encounter, frame_count)
         if frame_count == len(self.likelihood.tracks.times):
-            self.doubtful |= crowded(contacts_in(self.likelihood, self.hypotheses[0], frame_count))
+            contacts = contacts_in(self.likelihood, self.hypotheses[0], frame_count)
+            self.doubtful |= hard_to_explain(contacts, self.likelihood.tracks.first_seen)
 
     def _explain_otherwise(self, encounter: Encounter, frame_count: int) -> None:
         """Look for other explanations of an encounter, beside the best one so far."""

@@ -45,6 +45,8 @@ AGREED = 1.0
 GOOD_COST = 1.15
 """A fit is plausible up to this factor on the cost that noise alone would make."""
 LBFGS_ITERATIONS = 30
+MAY_CATCH_UP = 15.0
+"""Nats that a start may gain on the best one after the first turn of a refinement."""
 
 
 @dataclass(frozen=True)
@@ -190,8 +192,8 @@ def _refined(
 ) -> list[Refined]:
     """What refinement makes of several starts, the best first; those without hope left out."""
     descent = Descent(likelihood, plan.optimiser)
-    found = [refine(descent, source.coordinates.carried(point, likelihood.coordinates)) for point in starts]
-    return _best(found)
+    carried = [source.coordinates.carried(point, likelihood.coordinates) for point in starts]
+    return _best(refine(descent, carried, hopeless=HOPELESS + MAY_CATCH_UP))
 
 
 def _best(found: Sequence[Refined]) -> list[Refined]:

@@ -28,7 +28,7 @@ class ModeSearch:
             return "Other explanations of the motion were not looked for."
         if not self.agreed:
             return (
-                f"Several contacts follow on each other so closely that {self.attempts} searches did not agree on the "
-                "most probable course of events; there may be a better explanation, or others as good."
+                f"The contacts of this video are hard to explain: {self.attempts} searches did not agree on the most "
+                "probable course of events; there may be a better explanation, or others as good."
             )
         return ""

@@ -48,7 +48,7 @@ class _Linear:
     Parameters
     ----------
     strands
-        The numbers that stray together.
+        The numbers that stray together, those side by side that do so by one law (the two axes of a body).
     residuals, derivative
         Values and derivative by the unknowns of all numbers.
     variance
@@ -57,7 +57,7 @@ class _Linear:
         Those of the prior.
     """
 
-    strands: Sequence[Strand]
+    strands: Sequence[Sequence[Strand]]
     residuals: Float[np.ndarray, "number"]
     derivative: Float[np.ndarray, "number dimension"]
     variance: Float[np.ndarray, "number"]
@@ -70,16 +70,16 @@ class _Linear:
         curvature = self.prior_derivative.T @ self.prior_derivative
         gradient = self.prior_derivative.T @ self.prior_residuals
         log_volume = 0.0
-        for strand in self.strands:
-            places = strand.places
-            root = scale * np.linalg.cholesky(strand.covariance(size, duration, self.variance))
-            both = np.column_stack([self.residuals[places], self.derivative[places]])
-            whitened = solve_triangular(root, both, lower=True)
+        for alike in self.strands:
+            root = scale * np.linalg.cholesky(alike[0].covariance(size, duration, self.variance))
+            places = np.column_stack([strand.places for strand in alike])
+            both = np.concatenate([self.residuals[places][..., None], self.derivative[places]], axis=-1)
+            whitened = solve_triangular(root, both.reshape(len(root), -1), lower=True).reshape(places.size, -1)
             values, slopes = whitened[:, 0], whitened[:, 1:]
             squares += float(values @ values)
             curvature += slopes.T @ slopes
             gradient += slopes.T @ values
-            log_volume += float(np.log(np.diag(root)).sum())
+            log_volume += len(alike) * float(np.log(np.diag(root)).sum())
         factor = np.linalg.cholesky(curvature + 1e-12 * np.trace(curvature) * np.eye(len(curvature)))
         absorbed = solve_triangular(factor, gradient, lower=True)
         return log_volume + float(np.log(np.diag(factor)).sum()) + (squares - float(absorbed @ absorbed)) / 2
@@ -248,7 +248,7 @@ def _linear(likelihood: Likelihood, point: Float[np.ndarray, "dimension"], clues
     strands = likelihood.strands
     return (
         _Linear(
-            strands.positions,
+            _by_law(strands.positions, np.repeat(position, 2)),
             values[:count],
             derivative[:count][:, free],
             np.repeat(position, 2),
@@ -256,7 +256,7 @@ def _linear(likelihood: Likelihood, point: Float[np.ndarray, "dimension"], clues
             prior_derivative[:, free],
         ),
         _Linear(
-            strands.angles,
+            _by_law(strands.angles, angle),
             values[count:],
             derivative[count:][:, free],
             angle,
@@ -264,6 +264,19 @@ def _linear(likelihood: Likelihood, point: Float[np.ndarray, "dimension"], clues
             prior_derivative[:, free],
         ),
     )
+
+
+def _by_law(strands: Sequence[Strand], variance: Float[np.ndarray, "number"]) -> list[list[Strand]]:
+    """Strands in groups of one covariance."""
+    groups: list[list[Strand]] = []
+    for strand in strands:
+        alike = (group for group in groups if strand.strays_like(group[0], variance))
+        found = next(alike, None)
+        if found is None:
+            groups.append([strand])
+        else:
+            found.append(strand)
+    return groups
 
 
 def _variances(

@@ -1,24 +1,28 @@
 """The last steps to a maximum of the log posterior, on all frames and with the noise scale."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import torch
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 from scipy.optimize import minimize as scipy_minimize
 
 from vrdp_prob.inference.descent import Descent
-from vrdp_prob.inference.least_squares import jacobian
+from vrdp_prob.inference.least_squares import Minimum, jacobian
 from vrdp_prob.inference.mode import Mode
 from vrdp_prob.inference.noise_fit import NOISE_FIELDS, best_noise, noise_curvature
 from vrdp_prob.inference.samples import Gaussian, evaluate
 from vrdp_prob.models.likelihood import Likelihood
 
-ROUNDS = 4
-"""Times that the noise and the rest are refined in turn."""
-ITERATIONS = 12
+ITERATIONS = (4, 12, 12, 12)
+"""Steps of the turns in which the noise and the rest are refined; few before hopeless starts are left out."""
 STANDING_STILL = 1e-3
-"""Largest step, in units of the coordinates' scales, after which nothing changes any more."""
+"""Gain (nats) of a turn after which another one is not worth its while; L-BFGS comes after it."""
+SAME_PLACE = 0.5
+"""Minima whose residuals differ by less (their norm, of unit variance) are one."""
+CLIMBED = 1e-4
+"""Gain (nats) of a step of L-BFGS after which the top is reached."""
 
 
 @dataclass(frozen=True)
@@ -43,23 +47,55 @@ class Refined:
     evaluations: int
 
 
-def refine(descent: Descent, start: Float[np.ndarray, "dimension"]) -> Refined:
-    """Least squares and the most probable noise in turn."""
+def refine(descent: Descent, starts: Sequence[Float[np.ndarray, "dimension"]], *, hopeless: float) -> list[Refined]:
+    """Least squares and the most probable noise in turn, from several starts side by side.
+
+    Parameters
+    ----------
+    descent
+        How to lower the cost.
+    starts
+        Where to begin.
+    hopeless
+        Nats by which a start may be worse than the best one after a turn; one that is worse goes no further.
+    """
     likelihood = descent.likelihood
-    point, converged, evaluations = start, False, 0
     free = ~likelihood.coordinates.mask(NOISE_FIELDS)
-    scale = likelihood.coordinates.scale
-    for _ in range(ROUNDS):
-        point = best_noise(likelihood, point)
-        (minimum,) = descent(point[None], free, iterations=ITERATIONS)
-        evaluations += minimum.evaluations
-        if not np.isfinite(minimum.cost):
+    found = [Refined(start, -np.inf, False, 0) for start in starts]
+    running = list(range(len(starts)))
+    for iterations in ITERATIONS:
+        if not running:
             break
-        moved = float(np.abs((minimum.point - point) / scale).max())
-        point, converged = minimum.point, minimum.converged
-        if moved < STANDING_STILL:
-            break
-    return Refined(point, _log_density(likelihood, point), converged, evaluations)
+        quiet = np.array([best_noise(likelihood, found[index].point) for index in running])
+        minima = descent(quiet, free, iterations=iterations)
+        lowered = np.array(
+            [one.point if np.isfinite(one.cost) else point for one, point in zip(minima, quiet, strict=True)]
+        )
+        values = evaluate(likelihood.log_density, lowered)
+        gains = {index: value - found[index].log_density for index, value in zip(running, values, strict=True)}
+        for index, point, value, minimum in zip(running, lowered, values, minima, strict=True):
+            before = found[index].evaluations
+            found[index] = Refined(point, float(value), minimum.converged, before + minimum.evaluations)
+        best = max(one.log_density for one in found)
+        apart = _apart(minima, values)
+        running = [
+            index
+            for index, alone in zip(running, apart, strict=True)
+            if alone and gains[index] > STANDING_STILL and found[index].log_density > best - hopeless
+        ]
+    return found
+
+
+def _apart(minima: Sequence[Minimum], values: Float[np.ndarray, "start"]) -> Bool[np.ndarray, "start"]:
+    """Which minima are not at the place of a better one, as far as the residuals tell places apart."""
+    apart = np.ones(len(minima), dtype=bool)
+    for index in np.argsort(-values, kind="stable"):
+        if not apart[index]:
+            continue
+        points = np.array([one.point for one in minima]) - minima[index].point
+        near = np.linalg.norm(points @ minima[index].jacobian.T, axis=1) < SAME_PLACE
+        apart &= ~near | (values > values[index]) | (np.arange(len(minima)) == index)
+    return apart
 
 
 def climb(likelihood: Likelihood, start: Mode, iterations: int) -> Refined:
@@ -80,7 +116,7 @@ def climb(likelihood: Likelihood, start: Mode, iterations: int) -> Refined:
         np.zeros(len(start.point)),
         jac=True,
         method="L-BFGS-B",
-        options={"maxiter": iterations, "maxcor": 20, "ftol": 1e-10},
+        options={"maxiter": iterations, "maxcor": 20, "ftol": CLIMBED / max(abs(start.log_density), 1.0)},
     )
     if not -result.fun > start.log_density:
         return Refined(start.point, start.log_density, False, int(result.nfev))
@@ -102,7 +138,3 @@ def with_noise(
     precision[places, :] = precision[:, places] = 0.0
     precision[np.ix_(places, places)] = curvature
     return precision
-
-
-def _log_density(likelihood: Likelihood, point: Float[np.ndarray, "dimension"]) -> float:
-    return float(evaluate(likelihood.log_density, point[None])[0])

@@ -107,6 +107,12 @@ class Strand:
         covariance[np.diag_indices(len(covariance))] += variance[self.places]
         return covariance
 
+    def strays_like(self, other: "Strand", variance: Float[np.ndarray, "all_numbers"]) -> bool:
+        """Whether the covariance is that of another strand, whatever the size and duration."""
+        moments = np.array_equal(self.times, other.times) and bool(self.release == other.release)
+        response = np.array_equal(self.sensitivity, other.sensitivity)
+        return moments and response and np.array_equal(variance[self.places], variance[other.places])
+
 
 @dataclass(frozen=True)
 class Strands:

@@ -67,10 +67,10 @@ def kernel_arrays(worlds: Worlds, effects: "Sequence[Effect]", layout: Layout, f
 
 def fixed_things(worlds: Worlds, effects: "Sequence[Effect]") -> list[Obstacle]:
     """Walls of the worlds, then what effects add."""
-    walls = [Obstacle.walls(worlds.walls.to(torch.float64)[None], worlds.restitution_of_walls)] * bool(
-        len(worlds.walls)
-    )
-    return [*walls, *(obstacle for effect in effects for obstacle in effect.obstacles(worlds.parameters))]
+    found = [obstacle for effect in effects for obstacle in effect.obstacles(worlds.parameters)]
+    if not len(worlds.walls):
+        return found
+    return [Obstacle.walls(worlds.walls.to(torch.float64)[None], worlds.restitution_of_walls), *found]
 
 
 def _kinds(worlds: Worlds, fixed: Sequence[Obstacle]) -> Int[np.ndarray, "world all 3"]:

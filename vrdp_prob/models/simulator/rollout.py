@@ -16,7 +16,7 @@ from vrdp_prob.models.physics import PhysicsModel
 from vrdp_prob.models.simulator.arrays import KernelArrays, kernel_arrays
 from vrdp_prob.models.simulator.events import EventTable, Tapes
 from vrdp_prob.models.simulator.kernel import Kernel
-from vrdp_prob.models.simulator.outcome import Outcome
+from vrdp_prob.models.simulator.outcome import OUTCOMES, Outcome
 from vrdp_prob.models.simulator.work import record_work
 from vrdp_prob.models.simulator.worlds import Worlds
 from vrdp_prob.scene import Shape
@@ -115,7 +115,7 @@ def simulate(
         trajectory=states[0].to(worlds.position),
         velocity=states[1].to(worlds.position),
         exists=released.detach() & worlds.present[:, None, :],
-        outcome=tuple(Outcome(int(code)) for code in run.outcomes),
+        outcome=tuple(OUTCOMES[code] for code in run.outcomes.tolist()),
         tapes=run.tapes,
         wall_count=len(worlds.walls),
     )

@@ -104,7 +104,7 @@ class CurvedGaussian:
         """Number of coordinates."""
         return len(self.gaussian.mean)
 
-    @property
+    @cached_property
     def log_volume(self) -> float:
         """Logarithm of the volume of points per volume of standard normal coordinates."""
         return float(np.log(np.diag(self.gaussian.root)).sum() + torch.log(torch.diagonal(self.scale)).sum())

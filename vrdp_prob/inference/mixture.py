@@ -62,9 +62,13 @@ class Mixture:
         """Log density of each component, weights left out."""
         dimension, freedom = self.dimension, DEGREES_OF_FREEDOM
         constant = gammaln((freedom + dimension) / 2) - gammaln(freedom / 2) - dimension / 2 * np.log(freedom * np.pi)
-        volumes = np.array([component.log_volume for component in self.components])
         squares = (self._clouds.whitened(points) ** 2).sum(axis=2)
-        return np.asarray(constant - volumes[:, None] - (freedom + dimension) / 2 * np.log1p(squares / freedom))
+        falling = (freedom + dimension) / 2 * np.log1p(squares / freedom)
+        return np.asarray(constant - self._log_volumes[:, None] - falling)
+
+    @cached_property
+    def _log_volumes(self) -> Float[np.ndarray, "component"]:
+        return np.array([component.log_volume for component in self.components])
 
     @cached_property
     def _clouds(self) -> SeveralClouds:
@@ -87,8 +91,8 @@ class Mixture:
         chosen = random.choice(len(self.components), size=count, p=self.weights)
         whitened = _student_t(count, self.dimension, random)
         points = np.empty_like(whitened)
-        for index, component in enumerate(self.components):
-            points[chosen == index] = component.points(whitened[chosen == index])
+        for index in np.unique(chosen):
+            points[chosen == index] = self.components[index].points(whitened[chosen == index])
         return points, chosen
 
 

@@ -15,14 +15,15 @@ from vrdp_prob.files import write_atomically
 from vrdp_prob.inference.component_move import ComponentMove, IndependentProposal
 from vrdp_prob.inference.hamiltonian_move import DensityAndGradient, HamiltonianMove
 from vrdp_prob.inference.mixture import Mixture
+from vrdp_prob.inference.rate_steps import RateProposal, RateSteps
 from vrdp_prob.inference.samples import LogDensity, evaluate, evaluate_with_gradient
 from vrdp_prob.models.simulator.work import metered
 
 GROUP = "ensemble"
-HAMILTONIAN, INDEPENDENT, DIFFERENCE, JUMP = 0.2, 0.4, 0.3, 0.1
+HAMILTONIAN, INDEPENDENT, DIFFERENCE, JUMP = 0.1, 0.4, 0.3, 0.1
 """Shares of the moves. One along the gradient costs as much as thirty of the others."""
-FAR = 0.6
-"""...and that of jumps between the islands of a posterior, beside them."""
+TRADE, FAR = 0.4, 0.6
+"""...and those of steps that trade rates, and of jumps between the islands of a posterior, beside them."""
 MOVES_PER_STEP, WITH_JUMPS = 2, 3
 """Moves of all walkers between two draws that are kept, and as many where some of them are jumps."""
 
@@ -44,6 +45,8 @@ class Ensemble:
         Where its chain is kept after every run; nowhere if None. What is there already is gone on with.
     jumps
         Proposals that reach what lies beyond the clouds of the mixture, if anything does.
+    rate_steps
+        Steps that trade rates of slowing down, if there are any.
     """
 
     def __init__(
@@ -55,6 +58,7 @@ class Ensemble:
         file: Path | None,
         *,
         jumps: Mixture | None = None,
+        rate_steps: RateSteps | None = None,
     ) -> None:
         self._density, self._mixture, self._file = density, mixture, file
         self.evaluations = self.gradients = self.work = 0
@@ -67,6 +71,8 @@ class Ensemble:
             (ComponentMove(density, mixture, difference[1]), JUMP),
         ]
         self._moves_per_step = MOVES_PER_STEP if jumps is None else WITH_JUMPS
+        if rate_steps is not None:
+            moves.append((emcee.moves.MHMove(RateProposal(rate_steps, mixture.components[0])), TRADE))
         if jumps is not None:
             moves.append((emcee.moves.MHMove(IndependentProposal(jumps, mixture.components[0])), FAR))
         whitened = mixture.components[0].whitened(places)

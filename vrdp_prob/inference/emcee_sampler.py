@@ -21,6 +21,7 @@ from vrdp_prob.inference.diagnostics import Reported, drift, joined, settled
 from vrdp_prob.inference.emcee_ensemble import Ensemble
 from vrdp_prob.inference.mixture import Jumps, Mixture
 from vrdp_prob.inference.mode_weights import doubts, weights_from_chains
+from vrdp_prob.inference.rate_steps import RateSteps
 from vrdp_prob.inference.samples import ESS_GOAL, R_HAT_GOAL, LogDensity, Samples
 from vrdp_prob.inference.shaping import Shaped, shaped, starting_places
 from vrdp_prob.models.simulator.work import metered, work_sentence
@@ -53,6 +54,7 @@ def sample_emcee(
     reported: Reported | None = None,
     form: Shaped | None = None,
     jumps: Jumps | None = None,
+    rate_steps: RateSteps | None = None,
     most_steps: int = MOST_STEPS,
     work_limit: int = WORK_LIMIT,
 ) -> Samples:
@@ -79,6 +81,8 @@ def sample_emcee(
         The clouds in the posterior's shape, where that is known already.
     jumps
         Proposals that reach what lies beyond the clouds, and places there, if anything does.
+    rate_steps
+        Steps that trade rates of slowing down, if there are any.
     most_steps, work_limit
         Steps of every ensemble and work of all after which sampling stops even if it has not converged.
 
@@ -99,6 +103,7 @@ def sample_emcee(
                 int(generator.integers(2**31)),
                 checkpoint.path(f"ensemble_{index}.h5") if checkpoint is not None else None,
                 jumps=None if jumps is None else jumps.mixture,
+                rate_steps=rate_steps,
             )
             for index in range(ENSEMBLES)
         ]

@@ -17,6 +17,7 @@ from vrdp_prob.inference.nuts_sampler import sample_nuts
 from vrdp_prob.inference.parallel import linear_algebra_in_one_thread
 from vrdp_prob.inference.posterior import Posterior
 from vrdp_prob.inference.proposals import proposals
+from vrdp_prob.inference.rate_steps import RateSteps
 from vrdp_prob.inference.samples import Samples, assess
 from vrdp_prob.inference.straightening import Rates
 from vrdp_prob.inference.yaw_tiles import yaw_jumps
@@ -158,8 +159,11 @@ def sampled(fit: MapFit, sampler: str, *, generator: np.random.Generator, **opti
     """
     likelihood, rates = fit.likelihood, Rates.of(fit.likelihood.tracks, fit.likelihood.coordinates)
     start = proposals(fit.modes, likelihood.residuals, rates)
-    jumps = yaw_jumps(likelihood, fit.point, rates, generator)
-    return SAMPLERS[sampler](likelihood.log_density, start, generator=generator, jumps=jumps, **options)
+    ways = {
+        "jumps": yaw_jumps(likelihood, fit.point, rates, generator),
+        "rate_steps": RateSteps.of(fit.modes[0], rates),
+    }
+    return SAMPLERS[sampler](likelihood.log_density, start, generator=generator, **ways, **options)
 
 
 def _given(value: object) -> str:

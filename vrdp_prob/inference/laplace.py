@@ -13,6 +13,7 @@ from vrdp_prob.inference.emcee_sampler import sample_emcee
 from vrdp_prob.inference.importance import Weighted, effective_count, flattened, resampled, smoothed_weights
 from vrdp_prob.inference.mixture import Jumps, Mixture
 from vrdp_prob.inference.mode_weights import doubts, weights_from_importance
+from vrdp_prob.inference.rate_steps import RateSteps
 from vrdp_prob.inference.samples import ESS_GOAL, PARETO_K_GOAL, LogDensity, Samples
 from vrdp_prob.inference.shaping import shaped
 from vrdp_prob.models.simulator.work import metered
@@ -45,6 +46,7 @@ def sample_laplace(
     checkpoint: Checkpoint | None = None,
     reported: Reported | None = None,
     jumps: Jumps | None = None,
+    rate_steps: RateSteps | None = None,
     hand_on: bool = True,
 ) -> Samples:
     """Draw by importance sampling around the modes.
@@ -67,6 +69,8 @@ def sample_laplace(
         Quantities that have to be known well enough; the coordinates where None.
     jumps
         Proposals that reach what lies beyond the clouds, if anything does.
+    rate_steps
+        Steps that trade rates of slowing down, for emcee, if it comes to that.
     hand_on
         Whether emcee goes on where the weights cannot be trusted. If not, the draws are handed back as they are, and
         their Pareto k says that they are not to be trusted.
@@ -106,6 +110,7 @@ def sample_laplace(
             reported=reported,
             form=form,
             jumps=jumps,
+            rate_steps=rate_steps,
         )
         return replace(
             samples,

@@ -4,6 +4,7 @@ Source: Hoffman and Gelman, The No-U-Turn Sampler, JMLR 15 (2014); Bingham et al
 """
 
 import warnings
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -17,13 +18,14 @@ from torch import Tensor
 from vrdp_prob.inference.curved_gaussian import CurvedGaussian
 from vrdp_prob.inference.mixture import Mixture
 from vrdp_prob.inference.nuts_lockstep import Ask, in_lockstep
+from vrdp_prob.inference.rate_steps import RateSteps
 from vrdp_prob.inference.samples import LogDensity, evaluate_with_gradient
 from vrdp_prob.models.simulator.work import metered
 
 TREE_DEPTH = 6
 ACCEPTANCE = 0.85
 TRIES = 4
-"""Jumps that are tried before every transition."""
+"""Steps of either kind that are tried before every transition."""
 OUT_OF_SUPPORT = 1e10
 """Potential where a world has no support; finite, because Pyro compares energies."""
 
@@ -48,6 +50,8 @@ class Task:
         Seed of each chain's piece.
     jumps
         Proposals that reach what trajectories do not, tried before every transition; None for none.
+    rate_steps
+        Steps that trade rates of slowing down, tried before every transition; None for none.
     """
 
     density: LogDensity
@@ -57,6 +61,7 @@ class Task:
     transitions: int
     seeds: tuple[int, ...]
     jumps: Mixture | None = None
+    rate_steps: RateSteps | None = None
 
 
 @dataclass(frozen=True)
@@ -109,7 +114,7 @@ def make(task: Task) -> Piece:
 
     sizes = [None] * len(task.places) if task.step_sizes is None else [float(size) for size in task.step_sizes]
     functions = [
-        partial(_run, place, size, task.transitions, _Jumping.of(task, seed))
+        partial(_run, place, size, task.transitions, _walks(task, seed))
         for place, size, seed in zip(task.places, sizes, task.seeds, strict=True)
     ]
     with warnings.catch_warnings(), metered() as meter:
@@ -119,9 +124,55 @@ def make(task: Task) -> Piece:
     return Piece(np.stack(whitened), np.array(found), sum(diverged), gradients, meter.rows)
 
 
+_Walk = Callable[[Float[np.ndarray, "dimension"], Ask], Float[np.ndarray, "dimension"]]
+"""Where Metropolis steps before a transition end, from a place in whitened coordinates."""
+
+
+def _walks(task: Task, seed: int) -> tuple[_Walk, ...]:
+    """Those of a chain of a task."""
+    found: list[_Walk] = []
+    if task.rate_steps is not None:
+        found.append(_Trading(task.rate_steps, task.cloud, np.random.default_rng([seed, 2])))
+    if task.jumps is not None:
+        found.append(_Jumping(task.jumps, task.cloud, np.random.default_rng([seed, 1])))
+    return tuple(found)
+
+
+@dataclass(frozen=True)
+class _Trading:
+    """Steps that trade one rate of slowing down against the others.
+
+    Parameters
+    ----------
+    steps
+        The steps.
+    cloud
+        Whitens the chain's coordinates.
+    generator
+        Source of randomness.
+    """
+
+    steps: RateSteps
+    cloud: CurvedGaussian
+    generator: np.random.Generator
+
+    def __call__(self, place: Float[np.ndarray, "dimension"], ask: Ask) -> Float[np.ndarray, "dimension"]:
+        """Where they end."""
+        value, _ = ask(place)
+        for _ in range(TRIES):
+            moved, volume = self.steps.moved(self.cloud.points(place[None]), self.generator)
+            if not np.isfinite(volume[0]):
+                continue
+            proposed = self.cloud.whitened(moved)[0]
+            there, _ = ask(proposed)
+            if np.log(self.generator.random()) < there - value + volume[0]:
+                value, place = there, proposed
+        return place
+
+
 @dataclass(frozen=True)
 class _Jumping:
-    """Metropolis steps whose proposals forget the place.
+    """Steps whose proposals forget the place.
 
     Parameters
     ----------
@@ -137,29 +188,24 @@ class _Jumping:
     cloud: CurvedGaussian
     generator: np.random.Generator
 
-    @classmethod
-    def of(cls, task: Task, seed: int) -> "_Jumping | None":
-        """Those of a chain; None where its task has no jumps."""
-        return None if task.jumps is None else cls(task.jumps, task.cloud, np.random.default_rng([seed, 1]))
-
-    def __call__(self, place: Float[np.ndarray, "dimension"], ask: Ask) -> Float[np.ndarray, "dimension"] | None:
-        """Another place; None where none was accepted."""
+    def __call__(self, place: Float[np.ndarray, "dimension"], ask: Ask) -> Float[np.ndarray, "dimension"]:
+        """Where they end."""
         points, _ = self.mixture.draws(TRIES, self.generator)
         proposed = self.cloud.whitened(points)
         ways = self.mixture.log_density(np.concatenate([self.cloud.points(place[None]), points]))
-        value, found, here = ask(place)[0], None, 0
+        value, here = ask(place)[0], 0
         for number, whitened in enumerate(proposed, start=1):
             there, _ = ask(whitened)
             if np.log(self.generator.random()) < there - value + ways[here] - ways[number]:
-                value, found, here = there, whitened, number
-        return found
+                value, place, here = there, whitened, number
+        return place
 
 
 def _run(
     place: Float[np.ndarray, "dimension"],
     step_size: float | None,
     transitions: int,
-    jumping: _Jumping | None,
+    walks: tuple[_Walk, ...],
     ask: Ask,
 ) -> tuple[Float[np.ndarray, "draw dimension"], float, int]:
     """Places, step size and number of divergences of one chain."""
@@ -186,9 +232,12 @@ def _run(
     kernel.setup(warmup_steps=transitions if finding else 0)
     places = []
     for _ in range(transitions):
-        found = None if jumping is None else jumping(parameters["whitened"].detach().numpy(), ask)
-        if found is not None:
-            parameters = {"whitened": torch.from_numpy(found.copy())}
+        before = parameters["whitened"].detach().numpy()
+        walked = before
+        for walk in walks:
+            walked = walk(walked, ask)
+        if walked is not before:
+            parameters = {"whitened": torch.from_numpy(walked.copy())}
             kernel.clear_cache()
         parameters = kernel.sample(parameters)
         places.append(parameters["whitened"].detach().numpy().copy())

@@ -19,6 +19,7 @@ from vrdp_prob.inference.mixture import Jumps, Mixture
 from vrdp_prob.inference.mode_weights import doubts, weights_from_chains, weights_from_importance
 from vrdp_prob.inference.nuts_chain import Piece, Task
 from vrdp_prob.inference.nuts_worker import Workers, workers
+from vrdp_prob.inference.rate_steps import RateSteps
 from vrdp_prob.inference.samples import (
     ESS_GOAL,
     PARETO_K_GOAL,
@@ -71,6 +72,7 @@ def sample_nuts(
     work_limit: int = WORK_LIMIT,
     processes: int | None = None,
     jumps: Jumps | None = None,
+    rate_steps: RateSteps | None = None,
 ) -> Samples:
     """Draw with several NUTS chains in every mode.
 
@@ -99,6 +101,8 @@ def sample_nuts(
     jumps
         Proposals that reach what lies beyond the clouds, and places there. Chains that make them are all in the
         coordinates of the heaviest cloud, and go to and fro between the modes by themselves.
+    rate_steps
+        Steps that trade rates of slowing down, if there are any.
 
     Returns
     -------
@@ -114,7 +118,15 @@ def sample_nuts(
     inhabited = [index for index in range(len(places)) if len(places) == 1 or modes[index].weight >= HARDLY_ANY]
     far = None if jumps is None else jumps.mixture
     groups = [
-        _Group(form.mixture.components[mode], mode, number, places[mode, number * TOGETHER :][:TOGETHER], seed, far)
+        _Group(
+            form.mixture.components[mode],
+            mode,
+            number,
+            places[mode, number * TOGETHER :][:TOGETHER],
+            seed,
+            far,
+            rate_steps,
+        )
         for mode in inhabited
         for number in range(GROUPS)
     ]
@@ -167,6 +179,7 @@ class _Group:
     places: Float[np.ndarray, "chain dimension"]
     seed: int
     jumps: Mixture | None = None
+    rate_steps: RateSteps | None = None
     pieces: list[Piece] = field(default_factory=list)
 
     @property
@@ -180,7 +193,7 @@ class _Group:
         own = np.random.SeedSequence([self.seed, self.mode, self.number, len(self.pieces)])
         seeds = tuple(int(one) for one in own.generate_state(len(places)))
         sizes = None if adapt else np.full(len(places), np.median(self.pieces[-1].step_sizes))
-        return Task(density, self.cloud, places, sizes, transitions, seeds, self.jumps)
+        return Task(density, self.cloud, places, sizes, transitions, seeds, self.jumps, self.rate_steps)
 
     @property
     def points(self) -> Float[np.ndarray, "chain draw dimension"]:

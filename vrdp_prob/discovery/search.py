@@ -11,7 +11,7 @@ from vrdp_prob.discovery.overdispersion import overdispersion
 from vrdp_prob.discovery.proposals import hidden_things
 from vrdp_prob.discovery.scores import CauseScore, happens_once, score_causes
 from vrdp_prob.discovery.single_videos import causes_of_lost_videos, lost_videos
-from vrdp_prob.discovery.trials import Trial, gain, weights
+from vrdp_prob.discovery.trials import Trial, gain, weights, with_own_spreads
 from vrdp_prob.inference.parallel import in_processes
 from vrdp_prob.inference.several_videos.fitting import SharedFit, fit_together
 from vrdp_prob.inference.several_videos.population import with_learned_spreads
@@ -218,7 +218,7 @@ class _Searcher:
             tracks = [part.clues.tracks for part in trial.fit.fits]
             fit = fit_together(tracks, model=model, shared=trial.fit.shared, seed=self.seed, model_error=False)
             self.advance(1)
-            return Trial((*trial.causes, effect), fit, trial.choices)
+            return Trial((*trial.causes, effect), with_own_spreads(fit), trial.choices)
 
         return [searched(effect) for effect in again]
 

@@ -14,6 +14,7 @@ from vrdp_prob.discovery.scores import CauseScore, happens_once
 from vrdp_prob.discovery.unexplained import Unexplained, unexplained
 from vrdp_prob.inference.several_videos.ascent import ImpossibleStartError
 from vrdp_prob.inference.several_videos.fitting import Owned, SharedFit
+from vrdp_prob.inference.several_videos.population import with_learned_spreads
 from vrdp_prob.inference.several_videos.second_look import MOST
 from vrdp_prob.models.effects.effect import Effect
 from vrdp_prob.models.parameters import Scope
@@ -25,6 +26,8 @@ A cause that holds another one as its limit (a bowl whose middle is far away is 
 """
 FIRST_ROUNDS = 5
 """Common steps with which it is seen whether a cause can win."""
+OTHER_SPREAD = 1.25
+"""Factor by which bodies must differ more or less under a model than was believed, for the belief to be changed."""
 PATCHED = 0.5
 """Share of the videos with a cause that happens once from which on, if they stray still, it explains none of them."""
 FELL = 5.0
@@ -135,7 +138,7 @@ class Trial:
         ]
         model = self.fit.model.with_effect(effect)
         fit = self.fit.under(model, start=score.start, own=starts, rounds=FIRST_ROUNDS, model_error=False)
-        return Trial((*self.causes, effect), fit, self.choices)
+        return Trial((*self.causes, effect), with_own_spreads(fit), self.choices)
 
     def _with_single_events(self, score: CauseScore) -> "Trial":
         """The fit with an effect that happens at most once in each video, where its scan has found it."""
@@ -195,7 +198,20 @@ class Trial:
         gone = {parameter.name for parameter in cause.parameters}
         held = [{key: one.held[key] for key in one.held if key[0] not in gone} for one in self.fit.structures]
         fit = self.fit.under(left, held=held, rounds=FIRST_ROUNDS, model_error=False)
-        return Trial(tuple(one for one in self.causes if one is not cause), fit, choices)
+        return Trial(tuple(one for one in self.causes if one is not cause), with_own_spreads(fit), choices)
+
+
+def with_own_spreads(fit: SharedFit) -> SharedFit:
+    """A fit that believes bodies to differ in their own parameters as much as they do under its very model.
+
+    What a model lacks shows as such differences, and a cause that explains them away is worth that they are less.
+    """
+    before = {one.name: one.prior.sd for one in fit.model.parameters if one.scope is Scope.BODY}
+    model = with_learned_spreads(fit)
+    changes = [np.log(one.prior.sd / before[one.name]) for one in model.parameters if one.scope is Scope.BODY]
+    if not changes or np.abs(changes).max() < np.log(OTHER_SPREAD):
+        return fit
+    return fit.under(model, rounds=FIRST_ROUNDS, model_error=False)
 
 
 def gains(

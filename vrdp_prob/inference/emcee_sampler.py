@@ -35,7 +35,7 @@ ROUND = 16
 """Steps after which the draws are judged and kept on disk."""
 STEPS_TOGETHER = 2
 """Steps after which the ensembles, one thread each, wait for one another, so that an interruption is soon noticed."""
-MOST_STEPS = 480
+MOST_STEPS = 900
 WORK_LIMIT = 40_000_000
 """Work (see `work.py` of the simulator) after which sampling stops; a minute on two cores of 2020. It is no time,
 so that the same seed gives the same draws on every machine."""

@@ -1,0 +1,41 @@
+"""A cause that explains why bodies differ is worth that they differ less; without it they differ as before."""
+
+from collections.abc import Iterable
+
+import numpy as np
+
+from tests.discovery.hidden import hide
+from tests.discovery.scenes import Setting
+from vrdp_prob.discovery.scores import score_causes
+from vrdp_prob.discovery.trials import Trial, gain, with_own_spreads
+from vrdp_prob.inference import default_model
+from vrdp_prob.inference.several_videos.fitting import SharedFit, fit_together
+from vrdp_prob.models.effects.body_friction import FRICTION_RATIO
+from vrdp_prob.models.effects.mass_dependent_friction import MassDependentFriction
+from vrdp_prob.models.parameters import Parameter
+
+NEEDED = 6.0
+"""Gain (nats) without which no cause is named (`search`): twenty causes share odds of 0.05."""
+
+
+def spread_of(fit: SharedFit) -> float:
+    return _named(fit.model.parameters, FRICTION_RATIO.name).prior.sd
+
+
+def _named(parameters: Iterable[Parameter], name: str) -> Parameter:
+    return next(one for one in parameters if one.name == name)
+
+
+def test_friction_by_mass_makes_bodies_alike_and_is_worth_it() -> None:
+    data = hide(["mass_dependent_friction"], seed=1, effect_size=3.0, setting=Setting(videos=6, bodies=3))
+    fit = fit_together(data.tracks, model=default_model(), model_error=False)
+    base = Trial((), with_own_spreads(fit))
+    (score,) = score_causes(base.fit, base.unexplained.plain, [MassDependentFriction()], seed=0)
+    found = base.with_cause(score)
+    assert found is not None
+    assert spread_of(base.fit) > 0.05
+    assert spread_of(found.fit) < spread_of(base.fit) / 2
+    assert gain(found, base)[0] > NEEDED
+    again = found.without(found.causes[0])
+    np.testing.assert_allclose(spread_of(again.fit), spread_of(base.fit), rtol=0.3)
+    assert abs(gain(again, base)[0]) < 1.0

@@ -3,11 +3,12 @@
 from collections.abc import Iterable
 
 import numpy as np
+import pytest
 
 from tests.discovery.hidden import hide
 from tests.discovery.scenes import Setting
 from vrdp_prob.discovery.scores import score_causes
-from vrdp_prob.discovery.trials import Trial, gain, with_own_spreads
+from vrdp_prob.discovery.trials import Trial, gain, gains, with_own_spreads
 from vrdp_prob.inference import default_model
 from vrdp_prob.inference.several_videos.fitting import SharedFit, fit_together
 from vrdp_prob.models.effects.body_friction import FRICTION_RATIO
@@ -37,5 +38,6 @@ def test_friction_by_mass_makes_bodies_alike_and_is_worth_it() -> None:
     assert spread_of(found.fit) < spread_of(base.fit) / 2
     assert gain(found, base)[0] > NEEDED
     again = found.without(found.causes[0])
-    np.testing.assert_allclose(spread_of(again.fit), spread_of(base.fit), rtol=0.3)
-    assert abs(gain(again, base)[0]) < 1.0
+    assert spread_of(again.fit) == pytest.approx(spread_of(base.fit), rel=0.3)
+    # A single video may take another course of events on the way.
+    assert np.median(np.abs(gains(again, base))) < 1.0

@@ -18,6 +18,7 @@ from vrdp_prob.inference.several_videos.population import with_learned_spreads
 from vrdp_prob.inference.several_videos.second_look import MOST
 from vrdp_prob.models.effects.effect import Effect
 from vrdp_prob.models.parameters import Scope
+from vrdp_prob.models.physics import PhysicsModel
 
 EACH_PARAMETER = 1.0
 """Nats by which a cause is believed less for each of its parameters.
@@ -27,7 +28,9 @@ A cause that holds another one as its limit (a bowl whose middle is far away is 
 FIRST_ROUNDS = 5
 """Common steps with which it is seen whether a cause can win."""
 OTHER_SPREAD = 1.25
-"""Factor by which bodies must differ more or less under a model than was believed, for the belief to be changed."""
+"""Factor by which bodies must differ more or less under a model than was believed, for the belief to be changed..."""
+SPREAD_ROUNDS = 3
+"""...and how often, since what bodies differ by hangs on what is believed of it."""
 PATCHED = 0.5
 """Share of the videos with a cause that happens once from which on, if they stray still, it explains none of them."""
 FELL = 5.0
@@ -193,7 +196,7 @@ class Trial:
 
     def without(self, cause: Effect) -> "Trial":
         """The fit without one of its causes."""
-        left = self.fit.model.without_effect(cause)
+        left = _with_stated_spreads(self.fit.model.without_effect(cause))
         choices = {name: one for name, one in self.choices.items() if name != cause.name}
         gone = {parameter.name for parameter in cause.parameters}
         held = [{key: one.held[key] for key in one.held if key[0] not in gone} for one in self.fit.structures]
@@ -206,12 +209,26 @@ def with_own_spreads(fit: SharedFit) -> SharedFit:
 
     What a model lacks shows as such differences, and a cause that explains them away is worth that they are less.
     """
-    before = {one.name: one.prior.sd for one in fit.model.parameters if one.scope is Scope.BODY}
-    model = with_learned_spreads(fit)
-    changes = [np.log(one.prior.sd / before[one.name]) for one in model.parameters if one.scope is Scope.BODY]
-    if not changes or np.abs(changes).max() < np.log(OTHER_SPREAD):
-        return fit
-    return fit.under(model, rounds=FIRST_ROUNDS, model_error=False)
+    for _ in range(SPREAD_ROUNDS):
+        model = with_learned_spreads(fit)
+        before, after = _spreads(fit.model), _spreads(model)
+        if not len(after) or np.abs(np.log(after / before)).max() < np.log(OTHER_SPREAD):
+            break
+        fit = fit.under(model, rounds=FIRST_ROUNDS, model_error=False)
+    return fit
+
+
+def _with_stated_spreads(model: PhysicsModel) -> PhysicsModel:
+    """A model in which bodies may differ as much as they may before anything is learned.
+
+    What a cause has explained, they have to explain by themselves without it, and would lose their way to it.
+    """
+    own = {one.name for one in model.parameters if one.scope is Scope.BODY}
+    return replace(model, beliefs={name: one for name, one in model.beliefs.items() if name not in own})
+
+
+def _spreads(model: PhysicsModel) -> Float[np.ndarray, "parameter"]:
+    return np.array([one.prior.sd for one in model.parameters if one.scope is Scope.BODY])
 
 
 def gains(

@@ -23,8 +23,8 @@ def learned_model(fit: SharedFit) -> PhysicsModel:
     gaussian = fit.joint.gaussian
     told = dict(zip(fit.joint.numbers.keys, zip(gaussian.mean, gaussian.sd, strict=True), strict=True))
     beliefs = dict(model.beliefs)
-    beliefs[MASS.name] = with_learned_spread(fit, model.believed(MASS))
-    beliefs[RESTITUTION.name] = with_learned_spread(fit, model.believed(RESTITUTION), mean=True)
+    beliefs[MASS.name] = with_learned_spread(fit, MASS)
+    beliefs[RESTITUTION.name] = with_learned_spread(fit, RESTITUTION, mean=True)
     for parameter in model.parameters:
         if parameter.scope is Scope.SHARED and (parameter.name, ()) in told:
             mean, sd = map(float, told[parameter.name, ()])

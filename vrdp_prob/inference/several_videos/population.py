@@ -18,9 +18,9 @@ from vrdp_prob.models.physics import PhysicsModel
 FEWEST = 6
 """Bodies (or combinations of bodies) of which the tracks must tell the quantity, for their spread to be estimated."""
 SMALLEST, LARGEST = 0.02, 2.0
-"""Standard deviations that are looked at, as shares of the stated one."""
+"""Standard deviations that are looked at, as shares of the stated one..."""
 TELLING = 0.5
-"""Share of the prior's variance below which the tracks tell a quantity."""
+"""...and the share of its variance below which the tracks tell a quantity."""
 
 
 def with_learned_spreads(fit: SharedFit) -> PhysicsModel:
@@ -30,7 +30,7 @@ def with_learned_spreads(fit: SharedFit) -> PhysicsModel:
     """
     model = fit.model
     beliefs = dict(model.beliefs)
-    for parameter in model.parameters:
+    for parameter in replace(model, beliefs={}).parameters:
         if parameter.scope is Scope.BODY:
             beliefs[parameter.name] = with_learned_spread(fit, parameter)
     return replace(model, beliefs=beliefs)
@@ -44,26 +44,27 @@ def with_learned_spread(fit: SharedFit, parameter: Parameter, *, mean: bool = Fa
     fit
         Fit of the videos.
     parameter
-        The parameter, as the model believes it.
+        The parameter as it is stated; a spread that was learned before is no limit to the new one.
     mean
         Whether the middle of the bodies is learned, too.
     """
     told = [one for index in range(len(fit.joint.videos)) if (one := _Told.of(fit, index, parameter)) is not None]
-    prior = parameter.prior
+    believed = fit.model.believed(parameter)
+    prior = believed.prior
     if sum(one.count for one in told) < FEWEST:
-        return parameter
+        return believed
 
     def cost(log_sd: float) -> float:
         middle = _middle(told, log_sd, prior) if mean else None
         return -sum(one.log_evidence(middle, float(np.exp(log_sd))) for one in told)
 
-    bounds = (float(np.log(SMALLEST * prior.sd)), float(np.log(LARGEST * prior.sd)))
+    bounds = (float(np.log(SMALLEST * parameter.prior.sd)), float(np.log(LARGEST * parameter.prior.sd)))
     log_sd = float(minimize_scalar(cost, bounds=bounds, method="bounded").x)
     learned = replace(prior, sd=float(np.exp(log_sd)))
     if not mean:
-        return replace(parameter, prior=learned)
+        return replace(believed, prior=learned)
     middle = _middle(told, log_sd, prior)
-    return replace(parameter, prior=replace(learned, mean=middle), default=parameter.transform.to_value(middle))
+    return replace(believed, prior=replace(learned, mean=middle), default=parameter.transform.to_value(middle))
 
 
 @dataclass(frozen=True)
@@ -96,12 +97,12 @@ class _Told:
         # Given the shared numbers: a shared friction that is not sharp shifts all bodies alike, which is no spread.
         root = local.root[chosen]
         both = np.linalg.inv(root @ root.T)
-        stated = np.array([1 / entries[number].prior.sd ** 2 for number in chosen])
+        believed = np.array([1 / entries[number].prior.sd ** 2 for number in chosen])
         expected = np.array([entries[number].prior.mean for number in chosen])
-        values, vectors = np.linalg.eigh(both - np.diag(stated))
+        values, vectors = np.linalg.eigh(both - np.diag(believed))
         alone = (vectors * np.maximum(values, 0.0)) @ vectors.T
-        count = int((values > (1 / TELLING - 1) * stated.min()).sum())
-        return cls(alone, both @ local.centre[chosen] - stated * expected, expected, count)
+        count = int((values > (1 / TELLING - 1) / parameter.prior.sd**2).sum())
+        return cls(alone, both @ local.centre[chosen] - believed * expected, expected, count)
 
     def log_evidence(self, middle: float | None, sd: float) -> float:
         """Log probability (nats, up to a constant) of the tracks where values spread by `sd` around a middle."""

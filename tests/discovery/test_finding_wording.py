@@ -112,3 +112,11 @@ def test_a_video_that_carries_a_gain_is_named() -> None:
     carried = replace(TILT, gain=replace(TILT.gain, by_video=by_video, elpd_difference=231.0))
     told = summary(replace(named(), causes=(carried,)))
     assert "The gain of surface tilt comes from run_00 alone and may be something of that video." in told
+
+
+def test_an_error_that_stays_is_said_to_stay() -> None:
+    before = TILT.gain.before
+    same = replace(TILT, gain=replace(TILT.gain, after=before))
+    told = summary(replace(named(), causes=(TILT, same)))[0]
+    assert "surface tilt takes the error of predicted positions from" in told
+    assert "and surface tilt leaves it at" in told

@@ -94,8 +94,11 @@ def _gains(causes: Sequence[FoundCause]) -> str:
     parts: list[str] = []
     for cause in causes:
         before, after, _, unit = errors_words(cause.gain)
-        what = "" if parts else " takes the error of predicted positions"
-        parts.append(f"{title(cause.name)}{what} from {before} to {after} {unit}")
+        what = "it" if parts else "the error of predicted positions"
+        change = (
+            f"leaves {what} at {after} {unit}" if before == after else f"takes {what} from {before} to {after} {unit}"
+        )
+        parts.append(f"{title(cause.name)} {change}")
     *_, noise, unit = errors_words(causes[-1].gain)
     return f"In videos that were left out, {listed(parts)}; the measurement noise is {noise} {unit}."
 

@@ -15,8 +15,10 @@ from vrdp_prob.inference.noise_fit import NOISE_FIELDS, best_noise, noise_curvat
 from vrdp_prob.inference.samples import Gaussian, evaluate
 from vrdp_prob.models.likelihood import Likelihood
 
-ITERATIONS = (4, 12, 12, 12)
-"""Steps of the turns in which the noise and the rest are refined; few before hopeless starts are left out."""
+ROUNDS = 4
+"""Times that the noise and the rest are refined in turn."""
+ITERATIONS = 12
+"""Steps of a turn; with fewer in the first one, fits of a model that lacks something end in other courses of events."""
 STANDING_STILL = 1e-3
 """Gain (nats) of a turn after which another one is not worth its while; L-BFGS comes after it."""
 SAME_PLACE = 0.5
@@ -63,11 +65,11 @@ def refine(descent: Descent, starts: Sequence[Float[np.ndarray, "dimension"]], *
     free = ~likelihood.coordinates.mask(NOISE_FIELDS)
     found = [Refined(start, -np.inf, False, 0) for start in starts]
     running = list(range(len(starts)))
-    for iterations in ITERATIONS:
+    for _ in range(ROUNDS):
         if not running:
             break
         quiet = np.array([best_noise(likelihood, found[index].point) for index in running])
-        minima = descent(quiet, free, iterations=iterations)
+        minima = descent(quiet, free, iterations=ITERATIONS)
         lowered = np.array(
             [one.point if np.isfinite(one.cost) else point for one, point in zip(minima, quiet, strict=True)]
         )

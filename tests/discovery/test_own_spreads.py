@@ -1,7 +1,5 @@
 """A cause that explains why bodies differ is worth that they differ less; without it they differ as before."""
 
-from collections.abc import Iterable
-
 import numpy as np
 import pytest
 
@@ -13,18 +11,13 @@ from vrdp_prob.inference import default_model
 from vrdp_prob.inference.several_videos.fitting import SharedFit, fit_together
 from vrdp_prob.models.effects.body_friction import FRICTION_RATIO
 from vrdp_prob.models.effects.mass_dependent_friction import MassDependentFriction
-from vrdp_prob.models.parameters import Parameter
 
 NEEDED = 6.0
 """Gain (nats) without which no cause is named (`search`): twenty causes share odds of 0.05."""
 
 
 def spread_of(fit: SharedFit) -> float:
-    return _named(fit.model.parameters, FRICTION_RATIO.name).prior.sd
-
-
-def _named(parameters: Iterable[Parameter], name: str) -> Parameter:
-    return next(one for one in parameters if one.name == name)
+    return fit.model.believed(FRICTION_RATIO).prior.sd
 
 
 def test_friction_by_mass_makes_bodies_alike_and_is_worth_it() -> None:

@@ -74,7 +74,7 @@ def refine(descent: Descent, starts: Sequence[Float[np.ndarray, "dimension"]], *
             [one.point if np.isfinite(one.cost) else point for one, point in zip(minima, quiet, strict=True)]
         )
         values = evaluate(likelihood.log_density, lowered)
-        gains = {index: value - found[index].log_density for index, value in zip(running, values, strict=True)}
+        gains = values - np.array([found[index].log_density for index in running])
         for index, point, value, minimum in zip(running, lowered, values, minima, strict=True):
             before = found[index].evaluations
             found[index] = Refined(point, float(value), minimum.converged, before + minimum.evaluations)
@@ -82,20 +82,19 @@ def refine(descent: Descent, starts: Sequence[Float[np.ndarray, "dimension"]], *
         apart = _apart(minima, values)
         running = [
             index
-            for index, alone in zip(running, apart, strict=True)
-            if alone and gains[index] > STANDING_STILL and found[index].log_density > best - hopeless
+            for index, alone, gained in zip(running, apart, gains, strict=True)
+            if alone and gained > STANDING_STILL and found[index].log_density > best - hopeless
         ]
     return found
 
 
 def _apart(minima: Sequence[Minimum], values: Float[np.ndarray, "start"]) -> Bool[np.ndarray, "start"]:
     """Which minima are not at the place of a better one, as far as the residuals tell places apart."""
-    apart = np.ones(len(minima), dtype=bool)
+    points, apart = np.array([one.point for one in minima]), np.ones(len(minima), dtype=bool)
     for index in np.argsort(-values, kind="stable"):
         if not apart[index]:
             continue
-        points = np.array([one.point for one in minima]) - minima[index].point
-        near = np.linalg.norm(points @ minima[index].jacobian.T, axis=1) < SAME_PLACE
+        near = np.linalg.norm((points - points[index]) @ minima[index].jacobian.T, axis=1) < SAME_PLACE
         apart &= ~near | (values > values[index]) | (np.arange(len(minima)) == index)
     return apart
 

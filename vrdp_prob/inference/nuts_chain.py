@@ -124,8 +124,8 @@ def make(task: Task) -> Piece:
     return Piece(np.stack(whitened), np.array(found), sum(diverged), gradients, meter.rows)
 
 
-_Walk = Callable[[Float[np.ndarray, "dimension"], Ask], Float[np.ndarray, "dimension"]]
-"""Where Metropolis steps before a transition end, from a place in whitened coordinates."""
+_Walk = Callable[[Float[np.ndarray, "dimension"], float, Ask], tuple[Float[np.ndarray, "dimension"], float]]
+"""Where Metropolis steps before a transition end, from a place in whitened coordinates; both with their log density."""
 
 
 def _walks(task: Task, seed: int) -> tuple[_Walk, ...]:
@@ -156,9 +156,10 @@ class _Trading:
     cloud: CurvedGaussian
     generator: np.random.Generator
 
-    def __call__(self, place: Float[np.ndarray, "dimension"], ask: Ask) -> Float[np.ndarray, "dimension"]:
-        """Where they end."""
-        value, _ = ask(place)
+    def __call__(
+        self, place: Float[np.ndarray, "dimension"], value: float, ask: Ask
+    ) -> tuple[Float[np.ndarray, "dimension"], float]:
+        """Where they end, and the log density there."""
         for _ in range(TRIES):
             moved, volume = self.steps.moved(self.cloud.points(place[None]), self.generator)
             if not np.isfinite(volume[0]):
@@ -167,7 +168,7 @@ class _Trading:
             there, _ = ask(proposed)
             if np.log(self.generator.random()) < there - value + volume[0]:
                 value, place = there, proposed
-        return place
+        return place, value
 
 
 @dataclass(frozen=True)
@@ -188,17 +189,19 @@ class _Jumping:
     cloud: CurvedGaussian
     generator: np.random.Generator
 
-    def __call__(self, place: Float[np.ndarray, "dimension"], ask: Ask) -> Float[np.ndarray, "dimension"]:
-        """Where they end."""
+    def __call__(
+        self, place: Float[np.ndarray, "dimension"], value: float, ask: Ask
+    ) -> tuple[Float[np.ndarray, "dimension"], float]:
+        """Where they end, and the log density there."""
         points, _ = self.mixture.draws(TRIES, self.generator)
         proposed = self.cloud.whitened(points)
         ways = self.mixture.log_density(np.concatenate([self.cloud.points(place[None]), points]))
-        value, here = ask(place)[0], 0
+        here = 0
         for number, whitened in enumerate(proposed, start=1):
             there, _ = ask(whitened)
             if np.log(self.generator.random()) < there - value + ways[here] - ways[number]:
                 value, place, here = there, whitened, number
-        return place
+        return place, value
 
 
 def _run(
@@ -232,10 +235,10 @@ def _run(
     kernel.setup(warmup_steps=transitions if finding else 0)
     places = []
     for _ in range(transitions):
-        before = parameters["whitened"].detach().numpy()
-        walked = before
+        before = walked = parameters["whitened"].detach().numpy()
+        value = ask(before)[0] if walks else 0.0
         for walk in walks:
-            walked = walk(walked, ask)
+            walked, value = walk(walked, value, ask)
         if walked is not before:
             parameters = {"whitened": torch.from_numpy(walked.copy())}
             kernel.clear_cache()

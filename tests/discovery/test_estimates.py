@@ -13,7 +13,9 @@ from vrdp_prob.models.effects.air_drag import AirDrag
 from vrdp_prob.models.effects.body_friction import BodyFriction
 from vrdp_prob.models.effects.effect import Effect
 from vrdp_prob.models.effects.linear_drag import LinearDrag
+from vrdp_prob.models.effects.pair_force import PairForce
 from vrdp_prob.models.effects.wall import Wall
+from vrdp_prob.models.model_file import known_effects
 from vrdp_prob.models.parameters import AIR_DRAG, Prior
 
 
@@ -40,6 +42,20 @@ def test_a_sentence_holds_the_strength_in_brackets() -> None:
         "Bodies are slowed in proportion to their speed (linear_drag = 0.187 ± 0.0082 1/s)."
     )
     assert cause_sentence(Wall(), {}) == Wall.sentence
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "said"),
+    [(0.1, 0.3, "attract each other"), (-0.3, -0.1, "repel each other"), (-0.1, 0.3, "attract or repel each other")],
+)
+def test_a_sentence_tells_the_direction_that_the_interval_tells(low: float, high: float, said: str) -> None:
+    found = {"pair_strength": Estimate((low + high) / 2, (high - low) / 4, low, high, "m^3/s^2")}
+    assert f"Bodies {said} without touching" in cause_sentence(PairForce(), found)
+
+
+@pytest.mark.parametrize("effect", [one for one in known_effects().values() if one.signed_sentences])
+def test_a_direction_is_that_of_one_strength(effect: type[Effect]) -> None:
+    assert list(effect.vanishes_at.values()) == [0.0]
 
 
 class _Placed(Effect):

@@ -116,10 +116,20 @@ def surprise(fit: SharedFit, effect: Effect) -> float:
 
 
 def cause_sentence(effect: Effect, found: Mapping[str, Estimate]) -> str:
-    """What a cause is and how strong."""
+    """What a cause is, which way it acts where the data tell, and how strong it is."""
+    sentence = _signed_sentence(effect, found).rstrip(".")
     shown = [name for name in found if name.split("[")[0] in {*effect.vanishes_at, *effect.vanishes_like}]
     parts = [f"{name} = {found[name].mean:.3g} ± {found[name].sd:.2g} {_unit(found[name].unit)}" for name in shown]
-    return f"{effect.sentence.rstrip('.')} ({'; '.join(part.strip() for part in parts)})." if parts else effect.sentence
+    return f"{sentence} ({'; '.join(part.strip() for part in parts)})." if parts else f"{sentence}."
+
+
+def _signed_sentence(effect: Effect, found: Mapping[str, Estimate]) -> str:
+    """The sentence for the sign of the strength, where its 95 % interval has but one."""
+    strength = next((found[name] for name in effect.vanishes_at if name in found), None)
+    if effect.signed_sentences is None or strength is None or strength.q025 <= 0 <= strength.q975:
+        return effect.sentence
+    positive, negative = effect.signed_sentences
+    return positive if strength.mean > 0 else negative
 
 
 def _unit(unit: str) -> str:

@@ -33,7 +33,11 @@ class Bowl(Effect):
     """A pull towards one point, in proportion to the distance."""
 
     name: ClassVar = "bowl"
-    sentence: ClassVar = "The table is a shallow bowl (or a dome): bodies are drawn to (or from) one point."
+    sentence: ClassVar = "The table is a shallow bowl or dome: bodies are drawn to one point or away from it."
+    signed_sentences: ClassVar = (
+        "The table is a shallow bowl: bodies are drawn to one point.",
+        "The table is a shallow dome: bodies are drawn away from one point.",
+    )
     law: ClassVar = "a = -bowl_stiffness (x - (bowl_x, bowl_y))"
     source: ClassVar = "gravity on a paraboloid, small slopes: bowl_stiffness is g over the radius of curvature"
     parameters: ClassVar = (BOWL_STIFFNESS, BOWL_X, BOWL_Y)

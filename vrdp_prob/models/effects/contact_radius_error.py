@@ -24,6 +24,10 @@ class ContactRadiusError(Effect):
 
     name: ClassVar = "contact_radius_error"
     sentence: ClassVar = "Bodies touch at another distance than their stated radii say."
+    signed_sentences: ClassVar = (
+        "Bodies touch at a larger distance than their stated radii say.",
+        "Bodies touch at a smaller distance than their stated radii say.",
+    )
     law: ClassVar = "contact radius = radius (1 + radius_error)"
     source: ClassVar = "definition"
     parameters: ClassVar = (RADIUS_ERROR,)

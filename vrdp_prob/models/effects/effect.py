@@ -114,6 +114,8 @@ class Effect:
     """Name in the catalogue of causes."""
     sentence: ClassVar[str]
     """One sentence a person can read."""
+    signed_sentences: ClassVar[tuple[str, str] | None] = None
+    """The sentence where the strength, the one parameter in `vanishes_at`, is positive, and where it is negative."""
     law: ClassVar[str]
     """The law as text, for reports and model files."""
     source: ClassVar[str]

@@ -35,6 +35,10 @@ class FrictionPatch(Effect):
 
     name: ClassVar = "friction_patch"
     sentence: ClassVar = "There is a patch on the table that slows bodies more, or less, than the rest."
+    signed_sentences: ClassVar = (
+        "There is a patch on the table that slows bodies more than the rest.",
+        "There is a patch on the table that slows bodies less than the rest.",
+    )
     law: ClassVar = "mu (1 + patch_friction) where the centre is within patch_radius of (patch_x, patch_y), at least 0"
     source: ClassVar = "dry friction of two materials"
     parameters: ClassVar = (PATCH_X, PATCH_Y, PATCH_RADIUS, PATCH_FRICTION)

@@ -33,6 +33,10 @@ class LensDistortion(Effect):
 
     name: ClassVar = "lens_distortion"
     sentence: ClassVar = "The lens bends straight lines: positions far from the middle of the picture are displaced."
+    signed_sentences: ClassVar = (
+        "The lens bends straight lines: positions far from the middle of the picture are displaced outwards.",
+        "The lens bends straight lines: positions far from the middle of the picture are displaced inwards.",
+    )
     law: ClassVar = "recorded r' = r (1 + distortion |r|^2) about (lens_x, lens_y)"
     source: ClassVar = "Brown, Close-range camera calibration, Photogrammetric Engineering 37 (1971), first radial term"
     parameters: ClassVar = (DISTORTION, LENS_X, LENS_Y)

@@ -22,7 +22,11 @@ class MassDependentFriction(Effect):
     """A friction coefficient that is a power of the mass."""
 
     name: ClassVar = "mass_dependent_friction"
-    sentence: ClassVar = "The table slows heavy bodies more (or less) than light ones."
+    sentence: ClassVar = "The table slows heavy bodies more than light ones, or less."
+    signed_sentences: ClassVar = (
+        "The table slows heavy bodies more than light ones.",
+        "The table slows light bodies more than heavy ones.",
+    )
     law: ClassVar = "mu_i = mu (m_i / 1 kg)^friction_mass_exponent"
     source: ClassVar = (
         "Amontons' law has the exponent 0; contacts that yield elastically have -1/3 (Bowden and Tabor, 1950)"

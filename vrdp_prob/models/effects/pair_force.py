@@ -32,6 +32,10 @@ class PairForce(Effect):
 
     name: ClassVar = "pair_force"
     sentence: ClassVar = "Bodies attract or repel each other without touching."
+    signed_sentences: ClassVar = (
+        "Bodies attract each other without touching.",
+        "Bodies repel each other without touching.",
+    )
     law: ClassVar = (
         "force pair_strength r / (|r|^2 + pair_softening^2)^1.5 between two bodies, attraction where positive"
     )

@@ -36,7 +36,13 @@ class SpeedDependentRestitution(Effect):
     """Fast impacts lose a larger share of their speed than slow ones."""
 
     name: ClassVar = "speed_dependent_restitution"
-    sentence: ClassVar = "The faster two bodies meet, the smaller the share of the speed with which they part."
+    sentence: ClassVar = (
+        "The faster two bodies meet, the smaller, or larger, the share of the speed with which they part."
+    )
+    signed_sentences: ClassVar = (
+        "The faster two bodies meet, the smaller the share of the speed with which they part.",
+        "The faster two bodies meet, the larger the share of the speed with which they part.",
+    )
     law: ClassVar = "e = r1 r2 (1 + v_n / restitution_speed)^-restitution_exponent, at most 1"
     source: ClassVar = (
         "Johnson, Contact Mechanics (1985), section 11.5: e falls as v^(-1/4) where bodies yield plastically"

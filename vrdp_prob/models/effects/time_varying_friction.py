@@ -18,6 +18,10 @@ class TimeVaryingFriction(Effect):
 
     name: ClassVar = "time_varying_friction"
     sentence: ClassVar = "The table becomes rougher, or smoother, in the course of the video."
+    signed_sentences: ClassVar = (
+        "The table becomes rougher in the course of the video.",
+        "The table becomes smoother in the course of the video.",
+    )
     law: ClassVar = "mu(t) = mu (1 + friction_trend t), at least 0"
     source: ClassVar = "first order of any slow change"
     parameters: ClassVar = (FRICTION_TREND,)

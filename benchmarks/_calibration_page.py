@@ -1,5 +1,6 @@
 """Tables, figures and checks of the calibration."""
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from itertools import zip_longest
 from pathlib import Path
@@ -81,6 +82,7 @@ def _one(result: Result, kind: str) -> Result | None:
 def tables(results: Results) -> str:
     """Everything that was measured, in Markdown."""
     parts = [_table(("sampler", *_SUMMARY), [(name, *_summary(found)) for name, found in results.items()])]
+    parts += [f"{name}: commit {', '.join(_versions(found))}." for name, found in results.items()]
     for name, found in results.items():
         for group, chosen in groups(found).items():
             kinds = calibrations(chosen)
@@ -91,6 +93,12 @@ def tables(results: Results) -> str:
             head = ("kind", "scenes", *(f"{100 * interval:.0f} %" for interval in INTERVALS), "uniform ranks, p")
             parts.append(f"### {name}, {group}: {len(chosen)} scenes\n\n{_table(head, rows)}")
     return "\n\n".join(parts)
+
+
+def _versions(results: Sequence[Result]) -> list[str]:
+    """The commits that were measured, each with the number of its scenes where there are several."""
+    count = Counter(str(result["version"]) for result in results)
+    return [name if len(count) == 1 else f"{name} ({number} scenes)" for name, number in count.items()]
 
 
 def _shown(calibration: Calibration) -> list[str]:
@@ -106,6 +114,7 @@ _SUMMARY = (
     "collision missed (of these converged)",
     "collision invented",
     "misfit claimed",
+    "moving body taken to rest",
     "seconds, median",
 )
 
@@ -122,6 +131,7 @@ def _summary(results: Sequence[Result]) -> list[str]:
         f"{len(missed)} ({sum(result['converged'] for result in missed)})",
         str(sum(result["invented"] > 0 for result in known)),
         str(len(claimed)),
+        f"{sum(result['taken_to_rest'] for result in known)} of {sum(result['moving'] for result in known)}",
         seconds,
     ]
 

@@ -45,6 +45,8 @@ def measured(
     known = {result[field]: result for result in read(path)}
     missing = [task for key, task in tasks.items() if key not in known]
     code = version_of_code()
+    if others := {str(known[key].get("version")) for key in tasks if key in known} - {code}:
+        print(f"{path}: results of {', '.join(sorted(others))} are kept; delete them to measure all with {code}.")
     with (
         local_workers(processes, tasks=len(missing)) as workers,
         path.open("a", encoding="utf-8") as file,

@@ -114,9 +114,18 @@ def outcome(scene: PriorScene, posterior: Posterior) -> Result:
         "pareto_k": posterior.convergence.pareto_k,
         "missed": len(scene.pairs - found),
         "invented": len(found - scene.pairs),
+        "taken_to_rest": taken_to_rest(scene, posterior),
+        "moving": int((scene.scene.velocity != 0).any(axis=1).sum()),
         "warnings": list(posterior.warnings),
         "ranks": [rank.to_document() for rank in ranks(scene, posterior)],
     }
+
+
+def taken_to_rest(scene: PriorScene, posterior: Posterior) -> int:
+    """Bodies that move when they are released and are held at rest in every draw."""
+    velocity = posterior.data["posterior"]["velocity"].transpose("chain", "draw", "body", ...).values
+    held = (velocity == 0).all(axis=(0, 1, 3))
+    return int((held & (scene.scene.velocity != 0).any(axis=1)).sum())
 
 
 if __name__ == "__main__":

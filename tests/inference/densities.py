@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import torch
+from scipy.stats import norm
 
 from vrdp_prob.inference.curved_gaussian import CurvedGaussian
 from vrdp_prob.inference.mixture import Mixture
@@ -43,6 +44,33 @@ class TwoModes:
         away = np.zeros(self.dimension)
         away[0] = FAR
         return Mixture.of(cloud(0 * away, 0.8), cloud(away, 2.4), log_weights=np.log([0.6, 0.4]))
+
+
+@dataclass(frozen=True)
+class SmallNeighbour:
+    """A round Gaussian, and a small one within reach of its chains; the mixture that it starts from is the density."""
+
+    weight: float = 0.06
+    distance: float = 5.0
+    scale: float = 0.8
+
+    def __call__(self, points: torch.Tensor) -> torch.Tensor:
+        away = torch.tensor([self.distance, 0.0], dtype=torch.float64)
+        large = -(points**2).sum(dim=1) / 2 + float(np.log1p(-self.weight))
+        small = -(((points - away) / self.scale) ** 2).sum(dim=1) / 2 + float(np.log(self.weight / self.scale**2))
+        return torch.logaddexp(large, small)
+
+    @property
+    def start(self) -> Mixture:
+        away = np.array([self.distance, 0.0])
+        log_weights = np.log([1 - self.weight, self.weight])
+        return Mixture.of(cloud(0 * away, 1.0), cloud(away, self.scale), log_weights=log_weights)
+
+    @property
+    def share_beyond(self) -> float:
+        """Share of the mass nearer to the small one, by the first coordinate."""
+        middle = self.distance / 2
+        return float((1 - self.weight) * norm.sf(middle) + self.weight * norm.sf(-middle / self.scale))
 
 
 @dataclass(frozen=True)

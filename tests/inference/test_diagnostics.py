@@ -6,12 +6,14 @@ from vrdp_prob.inference.diagnostics import (
     chain_statistics,
     drift,
     joined,
+    ordered,
     settled,
     share_with_error,
     weighted_statistics,
 )
+from vrdp_prob.inference.emcee_sampler import PER_WALKER
 from vrdp_prob.inference.infer import default_model
-from vrdp_prob.inference.samples import Samples, assess
+from vrdp_prob.inference.samples import ESS_GOAL, R_HAT_GOAL, Samples, assess
 from vrdp_prob.models.unknowns import Structure, unknowns
 from vrdp_prob.scene import Body, Shape, Tracks
 
@@ -39,11 +41,22 @@ def test_effective_size_of_an_autoregressive_chain_is_the_known_one(autoregressi
 
 def test_chains_have_settled_where_every_statistic_meets_its_goal(autoregressive: np.ndarray) -> None:
     groups = autoregressive.reshape(2, 2, DRAWS, 1)
-    found = chain_statistics(joined(groups))
-    r_hat, effective = max(found.r_hat, drift(groups)), min(found.ess_bulk, found.ess_tail)
-    assert settled(groups, r_hat=r_hat, effective=effective)
-    assert not settled(groups, r_hat=r_hat - 1e-9, effective=effective)
-    assert not settled(groups, r_hat=r_hat, effective=effective + 1e-6)
+    draws = joined(groups), ordered(groups)
+    found = chain_statistics(draws[0])
+    r_hat, effective = max(found.r_hat, drift(draws[1])), min(found.ess_bulk, found.ess_tail)
+    assert settled(*draws, r_hat=r_hat, effective=effective)
+    assert not settled(*draws, r_hat=r_hat - 1e-9, effective=effective)
+    assert not settled(*draws, r_hat=r_hat, effective=effective + 1e-6)
+
+
+def test_many_walkers_that_never_move_are_not_enough() -> None:
+    generator = np.random.default_rng(0)
+    walkers = 90
+    modes = 4.0 * (generator.standard_normal((4, walkers, 1, 1)) > 0)
+    stuck = modes + 0.3 * generator.standard_normal((4, walkers, 96, 1))
+    draws = joined(stuck), ordered(stuck)
+    assert settled(*draws, r_hat=R_HAT_GOAL, effective=ESS_GOAL), "no longer a danger"
+    assert not settled(*draws, r_hat=R_HAT_GOAL, effective=PER_WALKER * 4 * walkers)
 
 
 def test_error_of_a_share_grows_with_memory(autoregressive: np.ndarray) -> None:
@@ -108,6 +121,17 @@ def test_a_few_transitions_that_end_at_a_cliff_do_no_harm() -> None:
     assert few.converged
     assert not many.converged
     assert "21 divergences" in many.sentence
+    assert assess("nuts", Samples(draws, np.zeros((4, 500)), divergences=21, transitions=4000)).converged
+
+
+def test_draws_that_chains_agree_on_are_not_trusted_where_there_are_doubts() -> None:
+    draws = np.random.default_rng(4).standard_normal((4, 500, 1))
+    doubtful = assess("nuts", Samples(draws, np.zeros((4, 500)), notes=("So it was.",), doubts=("A mode is missing.",)))
+    assert not doubtful.converged
+    assert doubtful.sentence.endswith("So it was. A mode is missing.")
+    demanding = assess("emcee", Samples(draws, np.zeros((4, 500)), ess_goal=3000.0))
+    assert not demanding.converged
+    assert "(goal 3000)" in demanding.sentence
 
 
 def test_what_is_reported_of_a_video_holds_its_ratios_and_products() -> None:

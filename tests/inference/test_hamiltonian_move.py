@@ -2,7 +2,7 @@ import emcee
 import numpy as np
 import pytest
 
-from vrdp_prob.inference.hamiltonian_move import ACCEPTANCE, HamiltonianMove
+from vrdp_prob.inference.hamiltonian_move import ACCEPTANCE, FARTHEST, HamiltonianMove
 
 SCALES = np.array([0.5, 1.0, 2.0])
 WALKERS, WARM_UP, STEPS = 40, 40, 300
@@ -60,3 +60,16 @@ def test_a_walker_without_support_ahead_stays() -> None:
     state, accepted = move.propose(model, emcee.State(places.copy(), log_prob=np.zeros(4)))
     assert not accepted.any()
     assert (state.coords == places).all()
+
+
+def test_a_walker_from_where_no_trajectory_comes_stays() -> None:
+    def flat(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        return np.zeros(len(points)), np.zeros_like(points)
+
+    move = HamiltonianMove(flat)
+    places = np.array([[0.0, 0.0], [FARTHEST + 0.01, 0.0]])
+    sampler = emcee.EnsembleSampler(4, 2, lambda points: np.zeros(len(points)), vectorize=True)
+    model = emcee.model.Model(None, None, map, sampler._random)
+    accepted = np.array([move.propose(model, emcee.State(places.copy(), log_prob=np.zeros(2)))[1] for _ in range(20)])
+    assert accepted[:, 0].all()
+    assert not accepted[:, 1].any()

@@ -14,6 +14,13 @@ def test_importance_weights_tell_a_good_proposal_from_a_bad_one() -> None:
     assert k_hat > 0.7
 
 
+def test_weights_that_hardly_differ_have_no_tail() -> None:
+    generator = np.random.default_rng(0)
+    two_heaps = np.where(generator.random(4000) < 0.03, 0.012, 0.0) + 1e-5 * generator.random(4000)
+    _, k_hat = smoothed_weights(two_heaps)
+    assert k_hat <= 0
+
+
 def test_importance_weights_survive_worlds_without_support() -> None:
     weights, _ = smoothed_weights(np.array([-np.inf, -np.inf, 0.0]))
     assert weights.tolist() == [0, 0, 1]

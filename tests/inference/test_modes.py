@@ -5,8 +5,8 @@ from functools import partial
 import numpy as np
 import pytest
 
-from tests.inference.densities import FAR, Hopeless, TwoModes
-from vrdp_prob.inference import laplace
+from tests.inference.densities import FAR, Hopeless, SmallNeighbour, TwoModes
+from vrdp_prob.inference import laplace, nuts_sampler
 from vrdp_prob.inference.emcee_sampler import sample_emcee
 from vrdp_prob.inference.laplace import sample_laplace
 from vrdp_prob.inference.mixture import Jumps, Mixture
@@ -30,6 +30,26 @@ def test_two_modes_get_the_weights_that_they_have(name: str) -> None:
     convergence = assess(name, samples)
     assert convergence.modes == samples.modes
     assert convergence.converged or name == "nuts", convergence.sentence
+
+
+def test_a_small_mode_that_chains_of_nuts_leave_and_enter_keeps_its_share() -> None:
+    target = SmallNeighbour()
+    generator = np.random.default_rng(1)
+    samples = sample_nuts(target, target.start, draws=1000, generator=generator, processes=1)
+    share = float((samples.points[..., 0] > target.distance / 2).mean())
+    # About 1000 effective draws and the error of the weight: 0.009 together.
+    assert share == pytest.approx(target.share_beyond, abs=0.03)
+    assert assess("nuts", samples).converged
+
+
+def test_a_mode_that_hardly_a_draw_is_in_forbids_to_trust_the_others(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(nuts_sampler, "FEWEST_IN_MODE", 10**6)
+    target = SmallNeighbour()
+    options = {"processes": 1, "warm_up": 5, "most_gradients": 10}
+    samples = sample_nuts(target, target.start, draws=40, generator=np.random.default_rng(1), **options)
+    convergence = assess("nuts", samples)
+    assert not convergence.converged
+    assert "Hardly a draw is in mode 2, which holds 0.0" in convergence.sentence
 
 
 @pytest.mark.parametrize("name", SAMPLERS)

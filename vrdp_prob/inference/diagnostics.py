@@ -109,7 +109,8 @@ def chain_statistics(draws: Float[np.ndarray, "chain draw dimension"], reported:
 
 
 def settled(
-    draws: Float[np.ndarray, "group chain draw axis"],
+    by_chain: Float[np.ndarray, "group draw axis"],
+    by_time: Float[np.ndarray, "group draw axis"],
     reported: Reported | None = None,
     *,
     r_hat: float,
@@ -119,8 +120,10 @@ def settled(
 
     Parameters
     ----------
-    draws
-        Chains in groups, which are each judged as one chain.
+    by_chain
+        The draws of each group, chain after chain (see `joined`).
+    by_time
+        The same draws, earlier ones first (see `ordered`).
     reported
         The quantities to look at; the coordinates where None.
     r_hat
@@ -128,9 +131,9 @@ def settled(
     effective
         Fewest effective draws, in the bulk and in the tails.
     """
-    if drift(draws, reported) > r_hat:
+    if drift(by_time, reported) > r_hat:
         return False
-    values = _by_quantity(joined(draws), reported or Reported.coordinates(draws.shape[-1]))
+    values = _by_quantity(by_chain, reported or Reported.coordinates(by_chain.shape[-1]))
     return bool(
         _r_hat(values).max() <= r_hat and _ess_tail(values).min() >= effective and _ess_bulk(values).min() >= effective
     )
@@ -165,9 +168,14 @@ def joined(draws: Float[np.ndarray, "group chain draw axis"]) -> Float[np.ndarra
     return draws.reshape(len(draws), -1, draws.shape[-1])
 
 
-def drift(draws: Float[np.ndarray, "group chain draw axis"], reported: Reported | None = None) -> float:
-    """Largest R-hat of groups of chains, each group split into its earlier and its later draws."""
-    values = _by_quantity(joined(np.swapaxes(draws, 1, 2)), reported or Reported.coordinates(draws.shape[-1]))
+def ordered(draws: Float[np.ndarray, "group chain draw axis"]) -> Float[np.ndarray, "group several axis"]:
+    """Each group of chains as one, the first draws of all chains before the second ones."""
+    return joined(np.swapaxes(draws, 1, 2))
+
+
+def drift(by_time: Float[np.ndarray, "group draw axis"], reported: Reported | None = None) -> float:
+    """Largest R-hat of groups of draws in the order of time, each group split into its earlier and its later ones."""
+    values = _by_quantity(by_time, reported or Reported.coordinates(by_time.shape[-1]))
     return float(_r_hat(values).max())
 
 

@@ -102,6 +102,11 @@ class Ensemble:
         return density_and_gradient
 
     @property
+    def walkers(self) -> int:
+        """Number of walkers."""
+        return self._chain.shape[1]
+
+    @property
     def steps(self) -> int:
         """Steps done so far."""
         return len(self._chain)
@@ -119,7 +124,7 @@ class Ensemble:
                 progress=False,
             )
         self.work += meter.rows
-        self._accepted += self._sampler.backend.accepted / steps
+        self._accepted += self._sampler.backend.accepted
         self._chain = np.concatenate([self._chain, self._sampler.get_chain()])
         self._values = np.concatenate([self._values, self._sampler.get_log_prob()])
 
@@ -164,7 +169,7 @@ class Ensemble:
 
     @property
     def acceptance(self) -> float:
-        """Share of the moves that were accepted."""
+        """Share of the moves that were accepted, of each step the last one."""
         return float(self._accepted.mean() / max(self.steps, 1))
 
     def chain(self, discard: int) -> Float[np.ndarray, "step walker dimension"]:

@@ -17,7 +17,7 @@ import numpy as np
 from jaxtyping import Float
 
 from vrdp_prob.inference.checkpoint import Checkpoint, kept
-from vrdp_prob.inference.diagnostics import Reported, drift, joined, settled
+from vrdp_prob.inference.diagnostics import Reported, drift, joined, ordered, settled
 from vrdp_prob.inference.emcee_ensemble import Ensemble
 from vrdp_prob.inference.mixture import Jumps, Mixture
 from vrdp_prob.inference.mode_weights import doubts, weights_from_chains
@@ -39,6 +39,8 @@ MOST_STEPS = 900
 WORK_LIMIT = 40_000_000
 """Work (see `work.py` of the simulator) after which sampling stops; a minute on two cores of 2020. It is no time,
 so that the same seed gives the same draws on every machine."""
+PER_WALKER = 3.0
+"""Effective draws that each walker needs: one that never moves counts as about 1.5, so that many of them look well."""
 MARGIN = 1.15
 """Effective draws beyond the goal at which it stops, so that thinning does not fall short of it."""
 
@@ -112,18 +114,20 @@ def sample_emcee(
     points = _points(form.mixture, ensembles)
     by_walker = joined(points)
     log_density = np.stack([ensemble.log_density(WARM_UP) for ensemble in ensembles])
-    acceptance = [np.full(log_density[0].size, ensemble.acceptance) for ensemble in ensembles]
     modes = weights_from_chains(form.mixture, by_walker)
+    acceptance_rate = np.broadcast_to([[ensemble.acceptance] for ensemble in ensembles], by_walker.shape[:2])
     return Samples(
         by_walker,
         np.swapaxes(log_density, 1, 2).reshape(len(log_density), -1),
-        {"acceptance_rate": np.stack(acceptance)},
-        r_hat=drift(points, reported),
+        {"acceptance_rate": acceptance_rate},
+        r_hat=drift(ordered(points), reported),
         evaluations=form.evaluations + sum(ensemble.evaluations for ensemble in ensembles),
         gradients=form.gradients + sum(ensemble.gradients for ensemble in ensembles),
         work=meter.rows + sum(ensemble.work for ensemble in ensembles),
         modes=modes,
-        notes=(*stopped, *doubts(modes)),
+        notes=stopped,
+        doubts=doubts(modes),
+        ess_goal=_ess_goal(ensembles),
     )
 
 
@@ -155,7 +159,8 @@ def _run(
         while True:
             run_to(end, tune=False)
             points = _points(mixture, ensembles)
-            if settled(points, reported, r_hat=R_HAT_GOAL, effective=MARGIN * ESS_GOAL):
+            effective = MARGIN * _ess_goal(ensembles)
+            if settled(joined(points), ordered(points), reported, r_hat=R_HAT_GOAL, effective=effective):
                 return ()
             work = sum(ensemble.work for ensemble in ensembles)
             if work >= work_limit:
@@ -181,6 +186,11 @@ def _kept_form(
         return shaped(density, start, generator, lambda _worlds: None).arrays()
 
     return Shaped.of_arrays(kept(checkpoint, "form", generator, compute), start)
+
+
+def _ess_goal(ensembles: list[Ensemble]) -> float:
+    """Effective draws that are enough, and more than walkers that never move would look like."""
+    return max(ESS_GOAL, PER_WALKER * sum(ensemble.walkers for ensemble in ensembles))
 
 
 def _points(mixture: Mixture, ensembles: list[Ensemble]) -> Float[np.ndarray, "ensemble walker step dimension"]:

@@ -19,7 +19,7 @@ STEP_SPREAD = 0.2
 ACCEPTANCE = 0.8
 """Acceptance that tuning aims at (Neal advises 0.65 and more; kinks at contacts make caution pay)."""
 FARTHEST = 30.0
-"""Whitened coordinate beyond which there is no support, so that no wild world is simulated."""
+"""Whitened coordinate beyond which no trajectory goes, so that no wild world is simulated."""
 TUNING_RATE = 0.7
 """Change of the log step per unit of excess acceptance."""
 
@@ -73,7 +73,9 @@ class HamiltonianMove(emcee.moves.Move):  # type: ignore[misc]  # emcee has no t
             log_density = np.where(goes, values, log_density)
             gradient = np.where(goes[:, None], slopes, gradient)
         gain = energy - (momentum**2).sum(axis=1) / 2 + log_density
-        accepted = np.log(random.uniform(size=walkers)) < gain
+        # No trajectory leads back to a place that is too far off, so a walker there waits for other moves.
+        near = np.abs(state.coords).max(axis=1) < FARTHEST
+        accepted = (np.log(random.uniform(size=walkers)) < gain) & near
         return self.update(state, emcee.State(place, log_prob=log_density), accepted), accepted
 
     def tune(self, state: emcee.State, accepted: Bool[np.ndarray, "walker"]) -> None:

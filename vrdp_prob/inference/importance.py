@@ -16,6 +16,8 @@ from vrdp_prob.inference.samples import LogDensity, evaluate
 from vrdp_prob.models.simulator.work import metered, record_work
 from vrdp_prob.progress import Advance
 
+ALIKE = 2.0
+"""Largest weight, in units of the mean one, up to which weights have no tail whose shape would mean anything."""
 BATCH = 500
 THREADS = 2
 """Batches that are simulated at once, where there are as many cores."""
@@ -80,6 +82,8 @@ def smoothed_weights(log_ratio: Float[np.ndarray, "draw"]) -> tuple[Float[np.nda
         smoothed, k_hat = array_stats.psislw(log_ratio[finite].max() - log_ratio[finite])  # it takes negative ratios
     smoothed = np.exp(smoothed - smoothed.max())
     weights[finite] = smoothed / smoothed.sum()
+    if weights.max() <= ALIKE / len(weights):
+        return weights, min(float(np.nan_to_num(k_hat)), 0.0)
     return weights, float(np.nan_to_num(k_hat, nan=np.inf))
 
 

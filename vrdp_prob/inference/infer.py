@@ -1,6 +1,7 @@
 """From tracks to posterior: the most probable values first, then a sampler that sets out from them."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,14 +14,15 @@ from vrdp_prob.inference.diagnostics import Reported
 from vrdp_prob.inference.emcee_sampler import sample_emcee
 from vrdp_prob.inference.laplace import sample_laplace
 from vrdp_prob.inference.map_fit import MapFit, fit_map
+from vrdp_prob.inference.mode_weights import UNSURE
 from vrdp_prob.inference.nuts_sampler import sample_nuts
 from vrdp_prob.inference.parallel import linear_algebra_in_one_thread
 from vrdp_prob.inference.posterior import Posterior
-from vrdp_prob.inference.proposals import proposals
+from vrdp_prob.inference.proposals import proposals, share_left_out
 from vrdp_prob.inference.rate_steps import RateSteps
 from vrdp_prob.inference.samples import Samples, assess
 from vrdp_prob.inference.straightening import Rates
-from vrdp_prob.inference.yaw_tiles import yaw_jumps
+from vrdp_prob.inference.yaw_tiles import yaw_jumps, yaws_left_out
 from vrdp_prob.models.effects.body_friction import BodyFriction
 from vrdp_prob.models.noise import NoiseFamily
 from vrdp_prob.models.physics import PhysicsModel
@@ -163,7 +165,21 @@ def sampled(fit: MapFit, sampler: str, *, generator: np.random.Generator, **opti
         "jumps": yaw_jumps(likelihood, fit.point, rates, generator),
         "rate_steps": RateSteps.of(fit.modes[0], rates),
     }
-    return SAMPLERS[sampler](likelihood.log_density, start, generator=generator, **ways, **options)
+    samples = SAMPLERS[sampler](likelihood.log_density, start, generator=generator, **ways, **options)
+    return replace(samples, doubts=(*samples.doubts, *_unexplored(fit)))
+
+
+def _unexplored(fit: MapFit) -> Iterator[str]:
+    """A sentence for what samplers do not look for, and chains that agree do not show to be missing."""
+    bodies = fit.likelihood.tracks.bodies
+    if cubes := yaws_left_out(fit.likelihood, fit.point):
+        names = ", ".join(bodies[cube].id for cube in cubes)
+        yield (
+            f"The yaws of the cubes {names} were not measured, and all of them are hit: what the contacts tell of so "
+            "many lies on islands of which the draws may leave some out."
+        )
+    if (share := share_left_out(fit.modes)) > UNSURE:
+        yield f"There are too many modes to explore all: those that are left out hold {share:.2f} of the evidence."
 
 
 def _given(value: object) -> str:

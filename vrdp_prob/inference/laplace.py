@@ -133,5 +133,5 @@ def sample_laplace(
         gradients=form.gradients,
         work=meter.rows,
         modes=modes,
-        notes=doubts(modes),
+        doubts=doubts(modes),
     )

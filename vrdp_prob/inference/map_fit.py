@@ -178,7 +178,8 @@ def fit_map(
     climbed = _climbed(likelihood, _best(found))
     while (wider := with_all_that_meet(likelihood, structure, [one.point for one in climbed])) is not None:
         structure, widened = wider
-        climbed = _climbed(widened, _refined(likelihood, [one.point for one in climbed], widened, stages))
+        found = _refined(likelihood, [one.point for one in climbed], widened, stages)
+        climbed = _climbed(widened, found)
         likelihood = widened
         evaluations += sum(one.evaluations for one in climbed)
     likelihood, modes = without_idle(likelihood, distinct_modes(likelihood, climbed), clues.moving)

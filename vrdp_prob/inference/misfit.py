@@ -86,6 +86,8 @@ class Misfit:
             positions = "1 position lies" if self.outliers == 1 else f"{self.outliers} positions lie"
             if self.outliers_count:
                 taken = "Gaussian, as was asked for, so that they count in full"
+            elif self.error_acceleration is not None:
+                taken = "larger there, which discounts them"
             else:
                 taken = "Student-t, which discounts them"
             found += (f"{positions} far off those before and after; the noise is taken as {taken}.",)

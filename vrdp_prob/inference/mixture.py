@@ -28,7 +28,7 @@ class Mixture:
     Parameters
     ----------
     components
-        One per mode, or several that share one; the heaviest first.
+        One per mode, or several that share one.
     log_weights
         Logarithms of their weights, which add up to 1.
     """
@@ -83,6 +83,10 @@ class Mixture:
         """Probability that a point comes from each component; rows add up to 1."""
         joint = self.log_densities(points) + self.log_weights[:, None]
         return np.exp(joint - logsumexp(joint, axis=0)).T
+
+    def regions(self, points: Float[np.ndarray, "point dimension"]) -> Int[np.ndarray, "point"]:
+        """The component that each point most probably comes from."""
+        return np.asarray(self.memberships(points).argmax(axis=1))
 
     def draws(
         self, count: int, random: Random

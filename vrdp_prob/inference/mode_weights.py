@@ -1,4 +1,7 @@
-"""How much of a posterior's mass each mode holds, with the Monte Carlo error of that share."""
+"""How much of a posterior's mass each mode holds, with the Monte Carlo error of that share.
+
+A mode is the region in which its component is the most probable one of the mixture, so that draws can be sorted by it.
+"""
 
 import numpy as np
 from jaxtyping import Float
@@ -14,21 +17,26 @@ UNSURE = 0.05
 def weights_from_importance(
     mixture: Mixture, points: Float[np.ndarray, "draw dimension"], weights: Float[np.ndarray, "draw"]
 ) -> tuple[ModeWeight, ...]:
-    """Weights of the components from weighted draws; nothing where there is only one."""
+    """Weights of the modes from weighted draws; nothing where there is only one."""
     if len(mixture.components) == 1:
         return ()
-    member = mixture.memberships(points)
+    member = _members(mixture, points)
     shares = weights @ member
     errors = np.sqrt(weights**2 @ (member - shares) ** 2)
     return tuple(ModeWeight(float(share), float(error)) for share, error in zip(shares, errors, strict=True))
 
 
 def weights_from_chains(mixture: Mixture, points: Float[np.ndarray, "chain draw dimension"]) -> tuple[ModeWeight, ...]:
-    """Weights of the components from chains that go to and fro; nothing where there is only one."""
+    """Weights of the modes from chains that go to and fro; nothing where there is only one."""
     if len(mixture.components) == 1:
         return ()
-    member = mixture.memberships(points.reshape(-1, points.shape[-1])).reshape(*points.shape[:2], -1)
+    member = _members(mixture, points.reshape(-1, points.shape[-1])).reshape(*points.shape[:2], -1)
     return tuple(ModeWeight(*share_with_error(member[..., index])) for index in range(member.shape[-1]))
+
+
+def _members(mixture: Mixture, points: Float[np.ndarray, "draw dimension"]) -> Float[np.ndarray, "draw mode"]:
+    """1 for the mode that a draw is in, else 0."""
+    return np.eye(len(mixture.components))[mixture.regions(points)]
 
 
 def doubts(modes: tuple[ModeWeight, ...]) -> tuple[str, ...]:

@@ -13,7 +13,7 @@ from jaxtyping import Float
 
 from vrdp_prob.inference.checkpoint import Checkpoint, kept
 from vrdp_prob.inference.curved_gaussian import CurvedGaussian
-from vrdp_prob.inference.diagnostics import Reported, drift, joined, settled
+from vrdp_prob.inference.diagnostics import Reported, drift, joined, ordered, settled
 from vrdp_prob.inference.importance import Weighted, smoothed_weights
 from vrdp_prob.inference.mixture import Jumps, Mixture
 from vrdp_prob.inference.mode_weights import doubts, weights_from_chains, weights_from_importance
@@ -30,7 +30,7 @@ from vrdp_prob.inference.samples import (
     evaluate,
 )
 from vrdp_prob.inference.shaping import Shaped, shaped, starting_places
-from vrdp_prob.models.simulator.work import metered
+from vrdp_prob.models.simulator.work import metered, work_sentence
 from vrdp_prob.progress import Advance, ProgressDisplay, SilentProgress
 
 GROUPS = 2
@@ -50,9 +50,11 @@ WORK_LIMIT = 40_000_000
 """Simulated work after which sampling stops, for worlds of which one gradient costs as much as a hundred of others."""
 MARGIN = 1.1
 """Effective draws beyond the goal at which it stops."""
-EVIDENCE_DRAWS = 4000
-FEWEST_IN_MODE = 4
-"""Draws of every chain that must be in a mode for it to count among the modes."""
+EVIDENCE_DRAWS, EVIDENCE_ROUNDS = 4000, 6
+"""Weighted draws that tell what modes weigh, and how often so many more are drawn until that is known as well as all
+else."""
+FEWEST_IN_MODE = 16
+"""Draws of every result that must be in a mode for it not to be missed."""
 HARDLY_ANY = 0.01
 """Weight below which a mode gets no chains."""
 MOST_PROCESSES = GROUPS
@@ -113,7 +115,8 @@ def sample_nuts(
         form, places = _kept_start(density, start, generator, checkpoint)
         if jumps is not None:
             places = jumps.starts(CHAINS, generator)[None]
-        modes, doubtful = ((), ()) if jumps else _kept_weights(density, form.mixture, generator, checkpoint)
+        weighed = _Weighed() if jumps else _kept_weights(density, form.mixture, generator, checkpoint)
+    modes, doubtful = weighed.modes, weighed.doubts
     seed = int(generator.integers(2**31))
     inhabited = [index for index in range(len(places)) if len(places) == 1 or modes[index].weight >= HARDLY_ANY]
     far = None if jumps is None else jumps.mixture
@@ -137,10 +140,10 @@ def sample_nuts(
         run.further(warm_up, adapt=True)
         while True:
             run.further(CHUNK, adapt=False)
-            points = _in_proportion(run, inhabited, modes, np.random.default_rng(seed))
-            chains = points.reshape(RESULTS, -1, *points.shape[1:])
-            if points[..., 0].size >= draws and settled(
-                chains, reported, r_hat=R_HAT_GOAL, effective=MARGIN * ESS_GOAL
+            drawn = _in_proportion(run, inhabited, modes, np.random.default_rng(seed))
+            enough = drawn.by_chain[..., 0].size >= draws and not drawn.missed
+            if enough and settled(
+                drawn.by_chain, drawn.by_time, reported, r_hat=R_HAT_GOAL, effective=MARGIN * ESS_GOAL
             ):
                 stopped: tuple[str, ...] = ()
                 break
@@ -148,24 +151,23 @@ def sample_nuts(
                 stopped = (f"It stopped at its budget of {most_gradients} gradients.",)
                 break
             if run.work >= work_limit:
-                stopped = (
-                    f"It stopped at its budget of simulated work ({work_limit:.3g} pieces of motion and events).",
-                )
+                stopped = (work_sentence(work_limit),)
                 break
-    evaluations = form.evaluations + (EVIDENCE_DRAWS if len(places) > 1 else 0)
     if jumps is not None:
-        modes = weights_from_chains(form.mixture, joined(chains))
+        modes = weights_from_chains(form.mixture, drawn.by_chain)
         doubtful = doubts(modes)
     return Samples(
-        joined(chains),
-        np.stack([evaluate(density, chain) for chain in joined(chains)]),
-        r_hat=drift(chains, reported),
+        drawn.by_chain,
+        np.stack([evaluate(density, chain) for chain in drawn.by_chain]),
+        r_hat=drift(drawn.by_time, reported),
         divergences=run.divergences,
-        evaluations=evaluations + run.gradients,
+        transitions=run.transitions,
+        evaluations=form.evaluations + weighed.evaluations + run.gradients,
         gradients=form.gradients + run.gradients,
         work=meter.rows + run.work,
         modes=modes,
-        notes=(*stopped, *doubtful),
+        notes=stopped,
+        doubts=(*doubtful, *_missed(modes, drawn.missed)),
     )
 
 
@@ -245,41 +247,77 @@ class _Run:
         return sum(piece.work for group in self.groups for piece in group.pieces)
 
     @property
+    def transitions(self) -> int:
+        """Transitions of all chains after adaptation."""
+        return sum(piece.whitened[..., 0].size for group in self.groups for piece in group.pieces[1:])
+
+    @property
     def divergences(self) -> int:
-        """Divergent transitions of all chains."""
-        return sum(piece.divergences for group in self.groups for piece in group.pieces)
+        """Divergent transitions of all chains after adaptation."""
+        return sum(piece.divergences for group in self.groups for piece in group.pieces[1:])
+
+
+@dataclass(frozen=True)
+class _Drawn:
+    """Draws of all modes in proportion to what these weigh.
+
+    Parameters
+    ----------
+    by_chain
+        The draws of each result, those of its chains one after another.
+    by_time
+        The same draws, earlier ones first.
+    missed
+        Modes with a weight of which the chains hold hardly anything.
+    """
+
+    by_chain: Float[np.ndarray, "result draw dimension"]
+    by_time: Float[np.ndarray, "result draw dimension"]
+    missed: tuple[int, ...] = ()
 
 
 def _in_proportion(
     run: _Run, inhabited: list[int], modes: tuple[ModeWeight, ...], generator: np.random.Generator
-) -> Float[np.ndarray, "chain draw dimension"]:
-    """As many chains as a mode has, each of one chain from every mode, in proportion to the modes' weights.
+) -> _Drawn:
+    """The draws of each result's chains, thinned to the modes' weights.
 
     A draw counts for the mode that it is in, whichever its chain set out from: chains are restricted, not trusted to
-    stay. A mode in which hardly any chain stays is left to what the others find of it.
+    stay.
     """
-    chains = [run.points(mode) for mode in inhabited]
+    chains = np.stack([run.points(mode) for mode in inhabited])  # mode chain draw dimension
+    own = np.moveaxis(chains.reshape(len(inhabited), RESULTS, -1, *chains.shape[2:]), 1, 0)
+    by_result = own.reshape(RESULTS, -1, *own.shape[3:])
     if len(inhabited) == 1:
-        return chains[0]
-    own: list[list[np.ndarray]] = []
-    for number in range(CHAINS):
-        points = np.concatenate([several[number] for several in chains])
-        member = run.mixture.memberships(points).argmax(axis=1)
-        own.append([points[member == mode] for mode in inhabited])
-    counts = np.array([[len(points) for points in several] for several in own]).min(axis=0)
-    shares = np.where(counts >= FEWEST_IN_MODE, [modes[mode].weight for mode in inhabited], 0.0)
-    if not shares.any():
-        return np.stack([np.concatenate(several)[: counts.sum()] for several in own])
-    wanted = np.floor(shares * (counts[shares > 0] / shares[shares > 0]).min()).astype(int)
-    joined = []
-    for several in own:
-        labels = generator.permutation(np.repeat(np.arange(len(inhabited)), wanted))
-        chain = np.empty((len(labels), run.mixture.dimension))
-        for index, count in enumerate(wanted):
-            points = several[index]
-            chain[labels == index] = points[np.linspace(0, len(points) - 1, count).round().astype(int)]
-        joined.append(chain)
-    return np.stack(joined)
+        return _Drawn(joined(by_result), ordered(by_result))
+    regions = run.mixture.regions(by_result.reshape(-1, run.mixture.dimension)).reshape(by_result.shape[:3])
+    counts = np.array([(regions == mode).sum(axis=(1, 2)).min() for mode in inhabited])
+    weights = np.array([modes[mode].weight for mode in inhabited])
+    there = counts >= FEWEST_IN_MODE
+    missed = tuple(mode for mode, enough in zip(inhabited, there, strict=True) if not enough)
+    if not there.any():
+        return _Drawn(joined(by_result), ordered(by_result), missed)
+    wanted = np.floor(weights[there] * (counts[there] / weights[there]).min()).astype(int)
+    sorted_by = [mode for mode, enough in zip(inhabited, there, strict=True) if enough]
+    labels = generator.permutation(np.repeat(sorted_by, wanted))
+    shape = (RESULTS, len(labels), run.mixture.dimension)
+    drawn = _Drawn(np.empty(shape), np.empty(shape), missed)
+    for points, where, by_chain, by_time in zip(by_result, regions, drawn.by_chain, drawn.by_time, strict=True):
+        for mode, count in zip(sorted_by, wanted, strict=True):
+            chain, time = np.nonzero(where == mode)
+            chosen = np.linspace(0, len(chain) - 1, count).round().astype(int)
+            chain, time = chain[chosen], time[chosen]
+            by_chain[labels == mode] = points[chain, time]
+            earlier = np.argsort(time, kind="stable")
+            by_time[labels == mode] = points[chain[earlier], time[earlier]]
+    return drawn
+
+
+def _missed(modes: tuple[ModeWeight, ...], missed: tuple[int, ...]) -> tuple[str, ...]:
+    """A sentence for every mode that the draws leave out."""
+    return tuple(
+        f"Hardly a draw is in mode {mode + 1}, which holds {modes[mode].weight:.2f} of the posterior."
+        for mode in missed
+    )
 
 
 def _kept_start(
@@ -296,24 +334,46 @@ def _kept_start(
     return Shaped.of_arrays(arrays, start), arrays["starts"]
 
 
+@dataclass(frozen=True)
+class _Weighed:
+    """What modes weigh, sentences if that is not known well enough, and the densities that it took."""
+
+    modes: tuple[ModeWeight, ...] = ()
+    doubts: tuple[str, ...] = ()
+    evaluations: int = 0
+
+
 def _kept_weights(
     density: LogDensity, mixture: Mixture, generator: np.random.Generator, checkpoint: Checkpoint | None
-) -> tuple[tuple[ModeWeight, ...], tuple[str, ...]]:
-    """What the modes weigh, and a sentence if that is not known well enough."""
+) -> _Weighed:
+    """What the modes weigh."""
     if len(mixture.components) == 1:
-        return (), ()
+        return _Weighed()
 
     def compute() -> Mapping[str, np.ndarray]:
-        drawn = Weighted.drawn(density, mixture, EVIDENCE_DRAWS, generator, lambda _worlds: None)
-        weights, pareto_k = smoothed_weights(drawn.log_ratio)
-        modes = weights_from_importance(mixture, drawn.points, weights)
-        return {"modes": np.array([[mode.weight, mode.error] for mode in modes]), "pareto_k": np.array(pareto_k)}
+        def more() -> Weighted:
+            return Weighted.drawn(density, mixture, EVIDENCE_DRAWS, generator, lambda _worlds: None)
+
+        drawn = more()
+        for done in range(1, EVIDENCE_ROUNDS + 1):
+            weights, pareto_k = smoothed_weights(drawn.log_ratio)
+            modes = weights_from_importance(mixture, drawn.points, weights)
+            known = all(one.effective >= ESS_GOAL for one in modes if one.weight >= HARDLY_ANY)
+            if known or done == EVIDENCE_ROUNDS:
+                break
+            drawn = drawn.joined(more())
+        return {
+            "modes": np.array([[mode.weight, mode.error] for mode in modes]),
+            "pareto_k": np.array(pareto_k),
+            "evaluations": np.array(len(drawn.points)),
+        }
 
     found = kept(checkpoint, "evidence", generator, compute)
     modes = tuple(ModeWeight(float(weight), float(error)) for weight, error in found["modes"])
-    if float(found["pareto_k"]) <= PARETO_K_GOAL:
-        return modes, doubts(modes)
-    return modes, (
-        f"The {len(modes)} modes could not be weighted well: the importance weights behind their weights have Pareto k "
-        f"{float(found['pareto_k']):.2f}.",
-    )
+    doubtful = doubts(modes)
+    if float(found["pareto_k"]) > PARETO_K_GOAL:
+        doubtful = (
+            f"The {len(modes)} modes could not be weighted well: the importance weights behind their weights have "
+            f"Pareto k {float(found['pareto_k']):.2f}.",
+        )
+    return _Weighed(modes, doubtful, int(found["evaluations"]))

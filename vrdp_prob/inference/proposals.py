@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 
 import numpy as np
+from jaxtyping import Float
 
 from vrdp_prob.inference.curved_gaussian import CurvedGaussian
 from vrdp_prob.inference.least_squares import Residuals
@@ -20,14 +21,27 @@ LEAST_WEIGHT = 0.02
 
 
 def proposals(modes: Sequence[Mode], residuals: Residuals, rates: Rates | None = None) -> Mixture:
-    """A curved Gaussian around every mode, weighted by Laplace evidence, its ridges along some rates straightened."""
-    best = max(mode.log_evidence for mode in modes)
-    ranked = sorted(modes, key=lambda mode: -mode.log_evidence)[:MOST_MODES]
-    kept = [mode for mode in ranked if mode.log_evidence > best - HOPELESS]
+    """A curved Gaussian around every mode, weighted by Laplace evidence, its ridges along some rates straightened.
+
+    Only the best modes; see `share_left_out`.
+    """
+    ranked, evidence = _ranked(modes)
+    kept = [mode for mode, share in zip(ranked[:MOST_MODES], evidence, strict=False) if share > np.exp(-HOPELESS)]
     clouds = [_cloud(mode, residuals, rates) for mode in kept]
-    evidence = np.exp([mode.log_evidence - best for mode in kept])
-    weights = np.maximum(evidence / evidence.sum(), LEAST_WEIGHT)
-    return Mixture.of(*clouds, log_weights=np.log(weights))
+    shares = evidence[: len(kept)] / evidence[: len(kept)].sum()
+    return Mixture.of(*clouds, log_weights=np.log(np.maximum(shares, LEAST_WEIGHT)))
+
+
+def share_left_out(modes: Sequence[Mode]) -> float:
+    """Share of the Laplace evidence under modes that nothing is proposed from, since there are too many."""
+    _, evidence = _ranked(modes)
+    return float(evidence[MOST_MODES:].sum() / evidence.sum())
+
+
+def _ranked(modes: Sequence[Mode]) -> tuple[list[Mode], Float[np.ndarray, "mode"]]:
+    """Modes, the best first, and their evidence in units of the best one's."""
+    ranked = sorted(modes, key=lambda mode: -mode.log_evidence)
+    return ranked, np.exp([mode.log_evidence - ranked[0].log_evidence for mode in ranked])
 
 
 def _cloud(mode: Mode, residuals: Residuals, rates: Rates | None) -> CurvedGaussian:

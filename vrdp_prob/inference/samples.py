@@ -74,6 +74,12 @@ class ModeWeight:
     weight: float
     error: float
 
+    @property
+    def effective(self) -> float:
+        """Independent draws that would tell the weight as well."""
+        spread = self.weight * (1 - self.weight)
+        return spread / self.error**2 if self.error > 0 else float("inf")
+
 
 @dataclass(frozen=True)
 class Samples:
@@ -89,6 +95,8 @@ class Samples:
         More about each draw, by name.
     divergences
         Number of divergent transitions (NUTS), else None.
+    transitions
+        Number of transitions that they are among; as many as there are draws where 0.
     pareto_k
         Pareto k-hat of the importance weights, else None.
     known
@@ -102,7 +110,12 @@ class Samples:
     modes
         Weights of the modes that the sampler set out from, in their order.
     notes
-        Plain sentences: handed on to another sampler, stopped at a budget, modes that could not be weighted.
+        Plain sentences: handed on to another sampler, stopped at a budget.
+    doubts
+        Plain sentences on what forbids to trust the draws though chains agree: modes that could not be weighted, or
+        that no draw is in.
+    ess_goal
+        Effective draws that every reported quantity needs.
     sampler
         Name of the sampler that made the draws, where another one was asked for.
     """
@@ -111,6 +124,7 @@ class Samples:
     log_density: Float[np.ndarray, "chain draw"]
     statistics: Mapping[str, Float[np.ndarray, "chain draw"]] = field(default_factory=dict)
     divergences: int | None = None
+    transitions: int = 0
     pareto_k: float | None = None
     known: Statistics | None = None
     r_hat: float | None = None
@@ -119,6 +133,8 @@ class Samples:
     work: int = 0
     modes: tuple[ModeWeight, ...] = ()
     notes: tuple[str, ...] = ()
+    doubts: tuple[str, ...] = ()
+    ess_goal: float = ESS_GOAL
     sampler: str | None = None
 
     def thinned(self, draws: int) -> "Samples":
@@ -161,7 +177,9 @@ class Convergence:
     modes
         Weights of the modes, with their errors; empty where the sampler set out from one.
     notes
-        Plain sentences on how the draws came about.
+        Plain sentences on how the draws came about, and on what forbids to trust them though chains agree.
+    ess_goal
+        Effective sample size that every reported quantity needs.
     """
 
     sampler: str
@@ -175,6 +193,7 @@ class Convergence:
     worst: str | None = None
     modes: tuple[ModeWeight, ...] = ()
     notes: tuple[str, ...] = ()
+    ess_goal: float = ESS_GOAL
 
     @classmethod
     def of_document(cls, document: Mapping[str, Any]) -> "Convergence":
@@ -190,7 +209,7 @@ class Convergence:
             facts.append(f"R-hat {self.r_hat:.3f} (goal {R_HAT_GOAL:g} or less)")
         if self.ess_bulk is not None:
             tail = "" if self.ess_tail is None else f" and {self.ess_tail:.0f} in the tails"
-            facts.append(f"effective sample size {self.ess_bulk:.0f}{tail} (goal {ESS_GOAL:g})")
+            facts.append(f"effective sample size {self.ess_bulk:.0f}{tail} (goal {self.ess_goal:g})")
         if self.divergences is not None:
             facts.append(f"{self.divergences} divergences (goal 1 % of the transitions or less)")
         if self.pareto_k is not None:
@@ -220,12 +239,12 @@ def assess(
     found = samples.known or chain_statistics(samples.points, reported)
     weighted = samples.pareto_k is not None
     r_hat = max(found.r_hat, samples.r_hat or 0.0)
-    enough = min(found.ess_bulk, found.ess_tail) >= ESS_GOAL
+    enough = min(found.ess_bulk, found.ess_tail) >= samples.ess_goal
     trusted = samples.pareto_k <= PARETO_K_GOAL if samples.pareto_k is not None else r_hat <= R_HAT_GOAL
-    few = (samples.divergences or 0) <= DIVERGENT_GOAL * samples.log_density.size
+    few = (samples.divergences or 0) <= DIVERGENT_GOAL * (samples.transitions or samples.log_density.size)
     return Convergence(
         sampler=samples.sampler or sampler,
-        converged=bool(trusted and enough and few),
+        converged=bool(trusted and enough and few and not samples.doubts),
         r_hat=None if weighted else r_hat,
         ess_bulk=found.ess_bulk,
         divergences=samples.divergences,
@@ -234,7 +253,8 @@ def assess(
         ess_tail=found.ess_tail,
         worst=found.worst,
         modes=samples.modes,
-        notes=samples.notes,
+        notes=(*samples.notes, *samples.doubts),
+        ess_goal=samples.ess_goal,
     )
 
 

@@ -67,7 +67,7 @@ def yaw_jumps(
 ) -> Jumps | None:
     """Proposals for the yaws and spins of cubes that meet something; None where every yaw is measured or idle.
 
-    Nor are there any where more than two such cubes are hit.
+    Nor are there any where more than two such cubes are hit; see `yaws_left_out`.
 
     Parameters
     ----------
@@ -82,9 +82,7 @@ def yaw_jumps(
     """
     clouds: list[CurvedGaussian] = []
     log_weights: list[float] = []
-    cubes = list(unseen_yaws(likelihood, point))
-    if len(cubes) > MOST_CUBES:
-        return None
+    cubes = [] if yaws_left_out(likelihood, point) else list(unseen_yaws(likelihood, point))
     for body, frame in cubes:
         knots = KNOTS if len(cubes) == 1 else FEWER_KNOTS
         tiles = _Lattice.around(likelihood, point, body, frame, knots).tiles(MOST_TILES // len(cubes))
@@ -95,6 +93,20 @@ def yaw_jumps(
     if not clouds:
         return None
     return _corrected(Mixture.of(*clouds, log_weights=np.array(log_weights)), likelihood.log_density, generator)
+
+
+def yaws_left_out(likelihood: Likelihood, point: Float[np.ndarray, "dimension"]) -> tuple[int, ...]:
+    """Cubes that meet something and whose yaw nobody measured, where they are too many for proposals of their own.
+
+    Parameters
+    ----------
+    likelihood
+        The density.
+    point
+        Its maximum.
+    """
+    cubes = tuple(body for body, _ in unseen_yaws(likelihood, point))
+    return cubes if len(cubes) > MOST_CUBES else ()
 
 
 def _cloud(tile: Mode, rates: Rates) -> CurvedGaussian:

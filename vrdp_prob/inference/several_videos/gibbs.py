@@ -15,7 +15,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 from scipy.special import logsumexp
 
-from vrdp_prob.inference.diagnostics import drift, joined, settled
+from vrdp_prob.inference.diagnostics import drift, joined, ordered, settled
 from vrdp_prob.inference.samples import ESS_GOAL, R_HAT_GOAL
 from vrdp_prob.inference.several_videos.arrow import ArrowGaussian
 from vrdp_prob.inference.several_videos.clouds import Clouds
@@ -61,6 +61,8 @@ class JointDraws:
         R-hat of the groups' earlier against their later sweeps, over all numbers.
     evaluations
         Number of worlds simulated.
+    notes
+        At which limit sampling has stopped, if at one.
     """
 
     shared: Float[np.ndarray, "chain draw shared"]
@@ -68,6 +70,7 @@ class JointDraws:
     log_density: tuple[Float[np.ndarray, "chain draw"], ...]
     drift: float
     evaluations: int
+    notes: tuple[str, ...] = ()
 
 
 def sample_gibbs(
@@ -94,8 +97,8 @@ def sample_gibbs(
         for _ in range(rounds):
             run(SWEEPS_PER_ROUND)
             if sampler.converged():
-                break
-    return sampler.draws()
+                return sampler.draws()
+    return replace(sampler.draws(), notes=(f"It stopped after {rounds * SWEEPS_PER_ROUND} sweeps.",))
 
 
 class _Video:
@@ -275,7 +278,8 @@ class _Sampler:
     def converged(self) -> bool:
         """Whether all draws since the last reshaping meet the goals."""
         return all(
-            settled(_in_groups(series), r_hat=R_HAT_GOAL, effective=MARGIN * ESS_GOAL) for series in self._series()
+            settled(_by_chain(series), _by_time(series), r_hat=R_HAT_GOAL, effective=MARGIN * ESS_GOAL)
+            for series in self._series()
         )
 
     def draws(self) -> JointDraws:
@@ -284,7 +288,7 @@ class _Sampler:
             self._arrow.shared_points(_by_chain(self._kept)),
             tuple(_by_chain(video.points) for video in self._videos),
             tuple(_by_chain([values[:, None] for values in video.values])[..., 0] for video in self._videos),
-            max(drift(_in_groups(series)) for series in self._series()),
+            max(drift(_by_time(series)) for series in self._series()),
             sum(video.looks for video in self._videos),
         )
 
@@ -325,3 +329,8 @@ def _in_groups(
 def _by_chain(sweeps: Sequence[Float[np.ndarray, "chain dimension"]]) -> Float[np.ndarray, "group draw dimension"]:
     """Groups of chains, each merged chain after chain so that autocorrelation within a chain shows."""
     return joined(_in_groups(sweeps))
+
+
+def _by_time(sweeps: Sequence[Float[np.ndarray, "chain dimension"]]) -> Float[np.ndarray, "group draw dimension"]:
+    """Groups of chains, each merged sweep after sweep."""
+    return ordered(_in_groups(sweeps))

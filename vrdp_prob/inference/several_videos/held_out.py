@@ -6,12 +6,12 @@ import numpy as np
 from jaxtyping import Float
 from scipy.special import logsumexp
 
-from vrdp_prob.inference.importance import effective_count, smoothed_weights
+from vrdp_prob.inference.importance import effective_count, resampled, smoothed_weights
 from vrdp_prob.inference.map_fit import fit_map
 from vrdp_prob.inference.samples import PARETO_K_GOAL
 from vrdp_prob.inference.several_videos.arrow import ArrowGaussian
 from vrdp_prob.inference.several_videos.clouds import Clouds
-from vrdp_prob.inference.several_videos.importance import resampled, weighted_locals
+from vrdp_prob.inference.several_videos.importance import weighted_locals
 from vrdp_prob.inference.several_videos.joint_fit import local_modes
 from vrdp_prob.inference.several_videos.linking import linked
 from vrdp_prob.inference.several_videos.parts import plain_likelihood, stream, structure_of

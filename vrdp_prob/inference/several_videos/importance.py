@@ -12,7 +12,7 @@ import numpy as np
 from jaxtyping import Float
 from scipy.special import gammaln, logsumexp
 
-from vrdp_prob.inference.importance import effective_count, smoothed_weights
+from vrdp_prob.inference.importance import effective_count, flattened, resampled, smoothed_weights
 from vrdp_prob.inference.several_videos.arrow import ArrowGaussian
 from vrdp_prob.inference.several_videos.clouds import Clouds
 from vrdp_prob.inference.several_videos.joint_fit import JointFit
@@ -101,7 +101,9 @@ def sample_by_importance(
             advance(1)
     weights, pareto_k = smoothed_weights(log_ratio)
     effective = effective_count(weights)
-    chosen = resampled(_spread_out(log_ratio, weights), draws, generator)
+    if effective < (fewest := min(FEWEST, count / 2)):
+        weights = flattened(log_ratio, fewest)
+    chosen = resampled(weights, draws, generator)
     volume = float(np.log(np.diag(fit.gaussian.root)).sum())
     constant = log_prior_constant(fit.numbers.entries) + volume - _log_constant(dimension)
     return WeightedDraws(
@@ -141,24 +143,6 @@ def weighted_locals(
     with np.errstate(divide="ignore"):
         log_evidence = logsumexp(log_weight, axis=1) - np.log(tries) + own_prior
     return WeightedLocals(points[chosen], log_density[chosen], log_evidence)
-
-
-def resampled(weights: Float[np.ndarray, "draw"], count: int, generator: np.random.Generator) -> np.ndarray:
-    """Places of draws chosen by their weights: systematic resampling, shuffled."""
-    places = (generator.random() + np.arange(count)) / count
-    chosen = np.searchsorted(np.cumsum(weights), places).clip(max=len(weights) - 1)
-    return generator.permutation(chosen)
-
-
-def _spread_out(log_ratio: Float[np.ndarray, "draw"], weights: Float[np.ndarray, "draw"]) -> Float[np.ndarray, "draw"]:
-    """The weights, or where they leave too few effective draws the largest power of them that leaves enough."""
-    shifted = np.where(np.isfinite(log_ratio), log_ratio - log_ratio.max(), -1e6)
-    power = 1.0
-    while effective_count(weights) < min(FEWEST, len(weights) / 2) and power > 1e-6:
-        power /= 1.5
-        flattened = np.exp(power * shifted)
-        weights = flattened / flattened.sum()
-    return weights
 
 
 def _log_constant(dimension: int) -> float:

@@ -1,6 +1,6 @@
 """From the tracks of several videos to one posterior: the joint fit first, then draws of everything together."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -96,7 +96,9 @@ def sample_together(
         drawn = _by_gibbs(fit, generator, progress)
     else:
         drawn = _by_importance(fit, draws, generator, progress)
-    convergence = assess(sampler, drawn.shared) if len(fit.joint.numbers) else _nothing_shared(sampler)
+    names = [part.likelihood.tracks.video for part in fit.fits]
+    each = {name: assess(sampler, samples) for name, samples in zip(names, drawn.videos, strict=True)}
+    convergence = assess(sampler, drawn.shared) if len(fit.joint.numbers) else _nothing_shared(sampler, each)
     return SharedPosterior(
         model=fit.model,
         seed=seed,
@@ -105,11 +107,11 @@ def sample_together(
         most_probable=fit.joint.gaussian.mean,
         log_evidence=drawn.log_evidence,
         convergence=convergence,
-        warnings=tuple(_warnings(fit, convergence)),
+        warnings=tuple(_warnings(fit, convergence, each)),
         videos=VideoPosteriors(
             {
-                part.likelihood.tracks.video: _maker(part, samples.thinned(draws), assess(sampler, samples), seed)
-                for part, samples in zip(fit.fits, drawn.videos, strict=True)
+                name: _maker(part, samples.thinned(draws), each[name], seed)
+                for name, part, samples in zip(names, fit.fits, drawn.videos, strict=True)
             }
         ),
     )
@@ -128,9 +130,13 @@ def _by_gibbs(fit: SharedFit, generator: np.random.Generator, progress: Progress
     found = sample_gibbs(fit.joint, generator=generator, progress=progress)
     shape = found.shared.shape
     log_prior = fit.joint.numbers.log_prior(found.shared.reshape(-1, shape[-1])).reshape(shape[:2])
-    shared = Samples(found.shared, log_prior + np.sum(found.log_density, axis=0), r_hat=found.drift)
+
+    def samples(points: Float[np.ndarray, "chain draw dimension"], values: Float[np.ndarray, "chain draw"]) -> Samples:
+        return Samples(points, values, r_hat=found.drift, notes=found.notes)
+
+    shared = samples(found.shared, log_prior + np.sum(found.log_density, axis=0))
     parts = zip(fit.joint.videos, found.locals, found.log_density, strict=True)
-    videos = tuple(Samples(video.points(found.shared, own), value, r_hat=found.drift) for video, own, value in parts)
+    videos = tuple(samples(video.points(found.shared, own), log_prior + value) for video, own, value in parts)
     return _Drawn(shared, videos, fit.log_evidence)
 
 
@@ -143,9 +149,10 @@ def _by_importance(
         known = Statistics(1.0, found.effective, found.effective, "every number alike")
         return Samples(points[None], values[None], pareto_k=found.pareto_k, known=known)
 
-    shared = samples(found.shared, fit.joint.numbers.log_prior(found.shared) + np.sum(found.log_density, axis=0))
+    log_prior = fit.joint.numbers.log_prior(found.shared)
+    shared = samples(found.shared, log_prior + np.sum(found.log_density, axis=0))
     parts = zip(fit.joint.videos, found.locals, found.log_density, strict=True)
-    videos = tuple(samples(video.points(found.shared, own), value) for video, own, value in parts)
+    videos = tuple(samples(video.points(found.shared, own), log_prior + value) for video, own, value in parts)
     return _Drawn(shared, videos, found.log_evidence)
 
 
@@ -157,17 +164,22 @@ def _maker(part: MapFit, samples: Samples, convergence: Convergence, seed: int) 
     return make
 
 
-def _nothing_shared(sampler: str) -> Convergence:
-    return Convergence(sampler, converged=True, r_hat=None, ess_bulk=None, divergences=None, pareto_k=None)
+def _nothing_shared(sampler: str, each: Mapping[str, Convergence]) -> Convergence:
+    """Convergence of draws of nothing: that of all videos."""
+    converged = all(one.converged for one in each.values())
+    return Convergence(sampler, converged, r_hat=None, ess_bulk=None, divergences=None, pareto_k=None)
 
 
-def _warnings(fit: SharedFit, convergence: Convergence) -> list[str]:
+def _warnings(fit: SharedFit, convergence: Convergence, each: Mapping[str, Convergence]) -> list[str]:
     """What limits the result."""
     sentences = []
     if not fit.joint.converged:
         sentences.append("The search for the most probable values of all videos ended before it had converged.")
-    if not convergence.converged:
+    if not convergence.converged and len(fit.joint.numbers):
         sentences.append(convergence.sentence)
     for part in fit.fits:
-        sentences += [f"{part.likelihood.tracks.video}: {sentence}" for sentence in part.misfit.sentences]
+        name = part.likelihood.tracks.video
+        sentences += [f"{name}: {sentence}" for sentence in part.misfit.sentences]
+        if not each[name].converged:
+            sentences.append(f"{name}: {each[name].sentence}")
     return sentences

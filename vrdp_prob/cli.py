@@ -413,3 +413,7 @@ def _tell(written: Report) -> None:
         print(line)
     for file in written.files:
         print(file)
+
+
+if __name__ == "__main__":
+    main()

@@ -2,6 +2,8 @@
 
 import errno
 import json
+import subprocess
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -171,6 +173,12 @@ def test_a_report_that_cannot_be_written_leaves_the_old_one(
     assert {path.name: path.read_text() for path in out.iterdir()} == dict.fromkeys(
         ("posterior.nc", "report.html", "report.json"), "old"
     )
+
+
+def test_the_package_and_its_module_are_the_command() -> None:
+    for module in ("vrdp_prob", "vrdp_prob.cli"):
+        found = subprocess.run([sys.executable, "-m", module, "--version"], capture_output=True, text=True, check=True)
+        assert found.stdout == f"vrdp-prob {__version__}\n"
 
 
 def test_the_version(capsys: pytest.CaptureFixture[str]) -> None:

@@ -51,6 +51,9 @@ def test_a_folder_belongs_to_the_first_run_that_keeps_something_in_it(tmp_path: 
     for damaged in ("[]", "{"):
         (tmp_path / "fingerprint.json").write_text(damaged)
         assert other.arrays("part") is None  # nobody knows whose it is
+        with pytest.raises(InputError, match="does not say what run it belongs to"):
+            Checkpoint(tmp_path, {"seed": "4"})
+    (tmp_path / "part.npz").unlink()
     Checkpoint(tmp_path, {"seed": "4"}).keep("part", {"a": np.zeros(2)})
     assert Checkpoint(tmp_path, {"seed": "4"}).arrays("part") is not None
 

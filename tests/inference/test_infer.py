@@ -1,3 +1,4 @@
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
@@ -115,6 +116,14 @@ def test_files_that_are_no_posterior_are_refused(tmp_path: Path) -> None:
         Posterior.read(path)
 
 
+def test_a_body_without_a_radius_is_told_to_meet_nothing() -> None:
+    tracks = observe(chain(), frames=30)
+    bodies = (*tracks.bodies[:-1], replace(tracks.bodies[-1], radius=None))
+    unsized = Tracks.from_arrays(tracks.video, bodies, tracks.times, tracks.positions)
+    posterior = infer(unsized, sampler="laplace", draws=50, hand_on=False)
+    assert any(warning.startswith(f"Object {bodies[-1].id} has no radius") for warning in posterior.warnings)
+
+
 def test_the_same_seed_gives_the_same_posterior() -> None:
     tracks = observe(chain(), noise=0.01, frames=30, seed=4)
     first, second = (infer(tracks, sampler="laplace", draws=50, seed=7, hand_on=False) for _ in range(2))
@@ -142,7 +151,7 @@ def test_unknown_samplers_too_few_draws_and_negative_seeds_are_refused() -> None
         infer(tracks, sampler="gibbs")
     with pytest.raises(InputError, match="at least 4"):
         infer(tracks, draws=2)
-    with pytest.raises(InputError, match="not negative"):
+    with pytest.raises(InputError, match="seed is -1; give a whole number of at least 0"):
         infer(tracks, seed=-1)
 
 

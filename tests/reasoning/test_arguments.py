@@ -14,6 +14,8 @@ from vrdp_prob.reasoning import ask
 ROOT = Path(__file__).parents[2]
 A_PROGRAM = "; give a text in English, or a program: a list of tokens, each a text."
 OF_TRACKS = "; give the tracks of one video, which vrdp_prob.load reads."
+OF_SEVERAL = "; give those of several videos, which vrdp_prob.load_all reads."
+OF_ARRAYS = "with these times and objects it must be"
 BY_EXAMPLE = "; make each by Example.of."
 EXPECTED = {
     "question of numbers": f"the question is [5, 5]{A_PROGRAM}",
@@ -30,6 +32,27 @@ EXPECTED = {
     "asking tracks": "a Tracks cannot be asked; give a posterior, which vrdp_prob.infer makes of tracks.",
     "inferring a path": f"tracks is 'examples/demo'{OF_TRACKS}",
     "inferring a list": f"tracks is a list{OF_TRACKS}",
+    "draws of nan": "draws is nan; give a whole number of at least 4.",
+    "seed as a text": "seed is '0'; give a whole number of at least 0.",
+    "model as a text": "model is 'base'; give a PhysicsModel, which PhysicsModel.read reads from a file.",
+    "one video together": f"videos are no list of tracks{OF_SEVERAL}",
+    "a folder together": f"videos are no list of tracks{OF_SEVERAL}",
+    "unknown shape": "object a: shape 'pyramid' is not known; use sphere, cube or cylinder.",
+    "shape as a text": "accepted: Body(id='a', shape=<Shape.CUBE: 'cube'>, radius=None, mass=None, inertia=None, "
+    "material=None, color=None, attribute_probabilities={})",
+    "one coordinate": f"v: positions have the shape (4, 2, 1); {OF_ARRAYS} (4, 2, 2): (time, body, 2).",
+    "three coordinates": f"v: positions have the shape (4, 2, 3); {OF_ARRAYS} (4, 2, 2): (time, body, 2).",
+    "axes the other way round": f"v: positions have the shape (2, 4, 2); {OF_ARRAYS} (4, 2, 2): (time, body, 2).",
+    "positions as a text": (
+        "v: positions are not an array of numbers (could not convert string to float: 'here'); give one."
+    ),
+    "too few times": f"v: positions have the shape (4, 2, 2); {OF_ARRAYS} (3, 2, 2): (time, body, 2).",
+    "times of objects": f"v: times have the shape (4, 2, 2); {OF_ARRAYS} (4,): (time).",
+    "angles of one object": f"v: angles have the shape (4,); {OF_ARRAYS} (4, 2): (time, body).",
+    "covariance of an axis": (
+        f"v: position_covariance have the shape (4, 2, 2); {OF_ARRAYS} (4, 2, 2, 2): (time, body, 2, 2)."
+    ),
+    "lists as arrays": "accepted: (4, 2, 2)",
     "reporting a path": "a str cannot be reported; give tracks, which vrdp_prob.load reads.",
     "a single question": "questions is a single question; give a list, even of one.",
     "a single example": "examples is a single example of the word 'zippier'; give a list, even of one.",

@@ -9,12 +9,15 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 import vrdp_prob
 from tests.concepts.physical.words import UNSURE
 from tests.reasoning.hand_made import STORY, video
 from tests.reasoning.sliding_discs import Disc, KnownPosterior, tracks_of
+from vrdp_prob.inference import infer_together
 from vrdp_prob.reasoning import ask
-from vrdp_prob.scene import Choice, Question
+from vrdp_prob.scene import Body, Choice, Question, Shape, Tracks
 
 FACTS: Any = video(STORY)
 DISCS = (Disc((0.0, 0.0), (1.0, 0.0)),)
@@ -26,6 +29,16 @@ EXAMPLE: Any = vrdp_prob.Example.of(POSTERIOR, "What if the disc were zippier?")
 PLAIN: Any = vrdp_prob.Example(TRACKS, Question("Why?"))
 NOTHING: Any = None
 FIVE: Any = 5
+PLACES = np.stack([np.zeros((4, 2)), np.ones((4, 2))], axis=1)
+
+
+def tracks(**arrays: Any) -> Tracks:
+    """Two spheres that stay, with some arrays in the place of the right ones."""
+    bodies = (Body("a", Shape.SPHERE, 0.1), Body("b", Shape.SPHERE, 0.1))
+    return Tracks.from_arrays(
+        **{"video": "v", "bodies": bodies, "times": np.arange(4.0), "positions": PLACES, **arrays}
+    )
+
 
 CALLS: dict[str, Callable[[Path], Any]] = {
     "question of numbers": lambda _: ask(FACTS, [FIVE, FIVE]),
@@ -42,6 +55,22 @@ CALLS: dict[str, Callable[[Path], Any]] = {
     "asking tracks": lambda _: ask(TRACKS, NEXT, choices=CHOICES),
     "inferring a path": lambda _: vrdp_prob.infer("examples/demo"),  # type: ignore[arg-type]
     "inferring a list": lambda _: vrdp_prob.infer([TRACKS]),  # type: ignore[arg-type]
+    "draws of nan": lambda _: vrdp_prob.infer(TRACKS, draws=float("nan")),  # type: ignore[arg-type]
+    "seed as a text": lambda _: vrdp_prob.infer(TRACKS, seed="0"),  # type: ignore[arg-type]
+    "model as a text": lambda _: vrdp_prob.infer(TRACKS, model="base"),  # type: ignore[arg-type]
+    "one video together": lambda _: infer_together(TRACKS),
+    "a folder together": lambda _: infer_together("folder"),  # type: ignore[arg-type]
+    "unknown shape": lambda _: Body("a", "pyramid"),  # type: ignore[arg-type]
+    "shape as a text": lambda _: Body("a", "cube"),  # type: ignore[arg-type]
+    "one coordinate": lambda _: tracks(positions=PLACES[:, :, :1]),
+    "three coordinates": lambda _: tracks(positions=np.zeros((4, 2, 3))),
+    "axes the other way round": lambda _: tracks(positions=np.swapaxes(PLACES, 0, 1)),
+    "positions as a text": lambda _: tracks(positions="here"),
+    "too few times": lambda _: tracks(times=np.arange(3.0)),
+    "times of objects": lambda _: tracks(times=PLACES),
+    "angles of one object": lambda _: tracks(angles=np.arange(4.0)),
+    "covariance of an axis": lambda _: tracks(position_covariance=PLACES),
+    "lists as arrays": lambda _: tracks(positions=PLACES.tolist(), times=[0, 1, 2, 3]).positions.shape,
     "reporting a path": lambda folder: vrdp_prob.report("examples/demo", directory=folder),  # type: ignore[arg-type]
     "a single question": lambda folder: vrdp_prob.report(TRACKS, questions=NEXT, directory=folder),
     "a single example": lambda _: vrdp_prob.learn_concept("zippier", EXAMPLE),

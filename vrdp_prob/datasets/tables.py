@@ -36,15 +36,18 @@ class Row:
 
     def number_in(self, column: str) -> float:
         """Finite number in a cell that must not be empty."""
-        value = self.optional_number(column)
+        value = self.optional_number(column, "leave the row out where there is no measurement")
         if value is None:
             raise InputError(
                 f"{self.place}: '{column}' is empty; give a number, or leave the row out if it is missing."
             )
         return value
 
-    def optional_number(self, column: str) -> float | None:
-        """Finite number in a cell, None where the cell is empty or the table has no such column."""
+    def optional_number(self, column: str, remedy: str = "leave the cell empty where it is not known") -> float | None:
+        """Finite number in a cell, None where the cell is empty or the table has no such column.
+
+        `remedy` is said of what is not finite.
+        """
         text = self.optional_text(column)
         if text is None:
             return None
@@ -53,7 +56,7 @@ class Row:
         except ValueError as error:
             raise InputError(f"{self.place}: '{column}' is '{text}'; give a number.") from error
         if not math.isfinite(value):
-            raise InputError(f"{self.place}: '{column}' is '{text}'; leave the row out where there is no measurement.")
+            raise InputError(f"{self.place}: '{column}' is '{text}'; {remedy}.")
         return value
 
 

@@ -13,7 +13,7 @@ from vrdp_prob.discovery.free_flight_checks import SEEN
 from vrdp_prob.discovery.replications import sum_p_value, two_sided_p_value
 from vrdp_prob.discovery.residual_model import ResidualModel, VideoResiduals
 from vrdp_prob.discovery.words import number, opposite
-from vrdp_prob.inference.free_flight import CUBIC_NOISE_GAIN, NORMAL_MAD
+from vrdp_prob.models.roughness import CUBIC_NOISE_GAIN, NORMAL_MAD
 
 MEMORY, SIZE = GENERAL = ("memory of the residuals", "size of the residuals")
 """Checks that say that something is wrong, and not what."""

@@ -16,6 +16,7 @@ from vrdp_prob.inference.posterior import Posterior
 from vrdp_prob.inference.samples import Convergence, Samples
 from vrdp_prob.inference.tree import posterior_tree
 from vrdp_prob.models.parameters import MASS, RESTITUTION
+from vrdp_prob.models.roughness import untold_noise
 from vrdp_prob.models.unknowns import mass_prior
 
 BATCH = 500
@@ -121,6 +122,17 @@ def _warnings(fit: MapFit, convergence: Convergence, status: dict[str, BodyStatu
         sentences.append("The search for the most probable values ended before it had converged.")
     if fit.search.sentence:
         sentences.append(fit.search.sentence)
+    if (noise := untold_noise(fit.likelihood.tracks)) is not None:
+        sentences.append(
+            f"The positions do not tell their noise (they are computed, rounded, or all on a line): {noise:.2g} m is "
+            "taken."
+        )
+    if unsized := [body.id for body in fit.likelihood.tracks.bodies if body.radius is None]:
+        several = len(unsized) > 1
+        sentences.append(
+            f"Object{'s' * several} {', '.join(unsized)} {'have' if several else 'has'} no radius and so cannot meet "
+            "anything: state radii, and collisions are looked for."
+        )
     found = {frozenset(pair) for pair in fit.contacts}
     seen = {(contact.first, contact.second) for contact in fit.clues.contacts}
     missed = {pair for pair in seen if frozenset(pair) not in found}

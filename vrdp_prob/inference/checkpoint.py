@@ -7,12 +7,14 @@ with a seed or a state of its own, and is kept when it is whole. A file that can
 import json
 import zipfile
 from collections.abc import Callable, Collection, Mapping
+from functools import cache
 from hashlib import sha256
 from importlib.metadata import version
 from pathlib import Path
 
 import numpy as np
 
+import vrdp_prob
 from vrdp_prob.errors import InputError
 from vrdp_prob.files import check_writable, write_atomically
 from vrdp_prob.models.physics import PhysicsModel
@@ -53,11 +55,24 @@ def model_facts(model: PhysicsModel) -> dict[str, str]:
 
 
 def program_facts(**settings: object) -> dict[str, str]:
-    """The version of the program, and the settings given, in short texts by name."""
-    return {"version": version("vrdp-prob"), **{name: str(value) for name, value in settings.items()}}
+    """The version of the program with the text of its code, and the settings given, in short texts by name."""
+    return {"version": f"{version('vrdp-prob')} {_code()}", **{name: str(value) for name, value in settings.items()}}
+
+
+@cache
+def _code() -> str:
+    """All modules of this package, in a short text: versions between releases differ, too."""
+    root = Path(vrdp_prob.__file__).parent
+    text = sha256()
+    for module in sorted(root.rglob("*.py")):
+        text.update(str(module.relative_to(root)).encode())
+        text.update(module.read_bytes())
+    return text.hexdigest()[:12]
 
 
 FINGERPRINT = "fingerprint.json"
+KEPT = ("*.npz", "ensemble_*.h5")
+"""Files of what a run has done."""
 
 
 class Checkpoint:
@@ -73,8 +88,8 @@ class Checkpoint:
     Raises
     ------
     InputError
-        If the folder cannot be written, or holds what another run has done: what belongs to other tracks, another
-        seed or other settings is neither mixed with this run nor thrown away.
+        If the folder cannot be written, or holds what another run has done, or what does not say whose it is: what
+        belongs to other tracks, another seed or other settings is neither mixed with this run nor thrown away.
     """
 
     def __init__(self, folder: Path | str, facts: Mapping[str, str]) -> None:
@@ -82,6 +97,11 @@ class Checkpoint:
         check_writable(self.folder)
         self._facts = dict(facts)
         found = self._owner()
+        if found is None and any(any(self.folder.glob(pattern)) for pattern in KEPT):
+            raise InputError(
+                f"{self.folder}: there is a checkpoint that does not say what run it belongs to ({FINGERPRINT} is "
+                "missing or cannot be read); choose another folder, or delete this one to start anew."
+            )
         if found is not None and found != self._facts:
             names = sorted(set(found) | set(facts))
             other = ", ".join(name for name in names if found.get(name) != facts.get(name))

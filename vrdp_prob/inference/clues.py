@@ -12,13 +12,13 @@ from vrdp_prob.inference.free_flight import (
     SeenContact,
     approaches,
     local_fit,
-    noise_scale,
     release_fit,
     seen_contacts,
 )
 from vrdp_prob.inference.outliers import gross_outliers, without
 from vrdp_prob.models.noise import NoiseFamily
 from vrdp_prob.models.observation import prior_noise
+from vrdp_prob.models.roughness import noise_scale, untold_noise
 from vrdp_prob.scene import Tracks
 
 SIGNIFICANT = 5.0
@@ -156,7 +156,7 @@ def _position_sd(tracks: Tracks, noise: float) -> Float[np.ndarray, "time body"]
 
 def _roughness(tracks: Tracks) -> float:
     """Measurement noise (m) from the tracks alone; the prior's where they are too short to tell."""
-    noise = noise_scale(tracks)
+    noise = untold_noise(tracks) or noise_scale(tracks)
     return noise if np.isfinite(noise) and noise > 0 else prior_noise(tracks)
 
 

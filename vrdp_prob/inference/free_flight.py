@@ -1,4 +1,4 @@
-"""What local quadratic fits say before any simulation: noise, release velocities, and the contacts that were seen.
+"""What local quadratic fits say before any simulation: release velocities, and the contacts that were seen.
 
 Quadratic and not linear: friction bends a track enough within 0.2 s to bias a momentum balance.
 """
@@ -23,9 +23,6 @@ SMALLEST_JUMP = 0.02
 """...and from this share of the fastest speed of the two bodies on."""
 FEWEST_BEFORE, FEWEST_AFTER = 2, 3
 """Positions on either side of a kink; of a body that was just released few come before its first contact."""
-CUBIC_NOISE_GAIN = 20.0
-"""Variance of a third difference of independent noise of unit variance: 1 + 9 + 9 + 1."""
-NORMAL_MAD = 0.6745
 
 
 @dataclass(frozen=True)
@@ -75,15 +72,6 @@ class Approach:
     first: int
     second: int
     time: float
-
-
-def noise_scale(tracks: Tracks) -> float:
-    """Standard deviation (m) of the positions, from third differences of neighbouring frames (kinks are outvoted)."""
-    differences = np.diff(tracks.positions, n=3, axis=0)
-    values = differences[np.isfinite(differences)]
-    if len(values) < 8:
-        return float("nan")
-    return float(np.median(np.abs(values)) / NORMAL_MAD / np.sqrt(CUBIC_NOISE_GAIN))
 
 
 def local_fit(

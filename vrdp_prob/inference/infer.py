@@ -35,6 +35,7 @@ SAMPLERS: Mapping[str, Callable[..., Samples]] = {
     "laplace": sample_laplace,
 }
 """The samplers by name; all take the log density and what its modes propose."""
+FEWEST_DRAWS = 4
 OPTIONS = {
     "sampler": tuple(SAMPLERS),
     "noise": ("auto", *NoiseFamily),
@@ -103,16 +104,15 @@ def infer(
     Raises
     ------
     InputError
-        If the tracks are none, the sampler or an option is unknown, fewer than 4 draws are asked for, the seed is
-        negative, no object moves, or the checkpoint belongs to another run.
+        If the tracks or the model are none, the sampler or an option is unknown, fewer than 4 draws are asked for, the
+        seed is negative, no object moves, or the checkpoint belongs to another run.
     """
     if not isinstance(tracks, Tracks):
         raise InputError(f"tracks is {_given(tracks)}; give the tracks of one video, which vrdp_prob.load reads.")
     check_options(sampler=sampler, noise=noise, defaults=defaults, motion=motion)
-    if draws < 4:
-        raise InputError(f"draws is {draws}; ask for at least 4.")
-    if seed < 0:
-        raise InputError(f"seed is {seed}; give a number that is not negative.")
+    check_counts(draws, seed)
+    if not isinstance(model, PhysicsModel | None):
+        raise InputError(f"model is {_given(model)}; give a PhysicsModel, which PhysicsModel.read reads from a file.")
     physics = default_model() if model is None else model
     kept = None
     if checkpoint is not None:
@@ -180,6 +180,19 @@ def _unexplored(fit: MapFit) -> Iterator[str]:
         )
     if (share := share_left_out(fit.modes)) > UNSURE:
         yield f"There are too many modes to explore all: those that are left out hold {share:.2f} of the evidence."
+
+
+def check_counts(draws: int, seed: int) -> None:
+    """Refuse numbers of draws and seeds that are none.
+
+    Raises
+    ------
+    InputError
+        If one is no whole number, fewer than 4 draws are asked for, or the seed is negative.
+    """
+    for name, value, least in (("draws", draws, FEWEST_DRAWS), ("seed", seed, 0)):
+        if not isinstance(value, int | np.integer) or value < least:
+            raise InputError(f"{name} is {value!r}; give a whole number of at least {least}.")
 
 
 def _given(value: object) -> str:

@@ -279,5 +279,6 @@ def _start(likelihood: Likelihood, clues: Clues) -> Float[np.ndarray, "dimension
             place = coordinates.places.get((field, body))
             if place is not None:
                 start[place] = value
-    start[coordinates.places[NOISE, None]] = np.log(clues.noise / likelihood.observations.position_reference)
+    if (place := coordinates.places.get((NOISE, None))) is not None:
+        start[place] = np.log(clues.noise / likelihood.observations.position_reference)
     return start

@@ -20,6 +20,7 @@ from vrdp_prob.inference.misfit import Misfit, tempered
 from vrdp_prob.inference.noise_fit import NOISE_FIELDS
 from vrdp_prob.models.likelihood import Likelihood
 from vrdp_prob.models.model_error import ModelError, Strand
+from vrdp_prob.models.roughness import untold_noise
 from vrdp_prob.models.unknowns import ANGLE_NOISE
 
 TURNS = 4
@@ -103,7 +104,8 @@ def next_model_error(
     """
     if likelihood.model_error is not None:
         return fit_model_error(likelihood, point, clues) or likelihood.model_error
-    if misfit.large or fit_model_error(likelihood, point, clues) is not None:
+    told = untold_noise(likelihood.tracks) is None  # else residuals smaller than the noise mean nothing
+    if misfit.large or (told and fit_model_error(likelihood, point, clues) is not None):
         return expected_model_error(likelihood, point, clues)
     return None
 

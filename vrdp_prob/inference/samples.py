@@ -180,6 +180,8 @@ class Convergence:
         Plain sentences on how the draws came about, and on what forbids to trust them though chains agree.
     ess_goal
         Effective sample size that every reported quantity needs.
+    transitions
+        Transitions that the divergences are among; 0 where they are not counted.
     """
 
     sampler: str
@@ -194,6 +196,7 @@ class Convergence:
     modes: tuple[ModeWeight, ...] = ()
     notes: tuple[str, ...] = ()
     ess_goal: float = ESS_GOAL
+    transitions: int = 0
 
     @classmethod
     def of_document(cls, document: Mapping[str, Any]) -> "Convergence":
@@ -211,7 +214,8 @@ class Convergence:
             tail = "" if self.ess_tail is None else f" and {self.ess_tail:.0f} in the tails"
             facts.append(f"effective sample size {self.ess_bulk:.0f}{tail} (goal {self.ess_goal:g})")
         if self.divergences is not None:
-            facts.append(f"{self.divergences} divergences (goal 1 % of the transitions or less)")
+            among = f" in {self.transitions} transitions" if self.transitions else ""
+            facts.append(f"{self.divergences} divergences{among} (goal 1 % or less)")
         if self.pareto_k is not None:
             facts.append(f"Pareto k {self.pareto_k:.2f} (goal {PARETO_K_GOAL:g} or less)")
         verdict = "has converged" if self.converged else "has not converged, so take its intervals with care"
@@ -255,6 +259,7 @@ def assess(
         modes=samples.modes,
         notes=(*samples.notes, *samples.doubts),
         ess_goal=samples.ess_goal,
+        transitions=samples.transitions,
     )
 
 

@@ -76,6 +76,9 @@ def read_posterior(path: Path, tracks: Tracks | None = None) -> Posterior:
         If the file cannot be read or is not a posterior.
     """
     with reading(path):
+        with xr.open_dataset(path, engine="h5netcdf") as root:
+            if "numbers" in json.loads(root.attrs["vrdp_prob"]):
+                raise InputError("the posterior of several videos; open it with SharedPosterior.read.")
         with xr.open_datatree(path, engine="h5netcdf") as opened:
             tree = opened.load().copy()
         return from_tree(tree, tracks)

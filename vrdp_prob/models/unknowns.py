@@ -21,6 +21,7 @@ from vrdp_prob.models.parameters import (
     Transform,
 )
 from vrdp_prob.models.physics import PhysicsModel
+from vrdp_prob.models.roughness import untold_noise
 from vrdp_prob.scene import Body, Shape, Tracks
 
 NOISE = "noise_scale"
@@ -81,7 +82,8 @@ def unknowns(
 ) -> Coordinates:
     """The vector of unknowns of a video under a model, with the defaults of what is not sampled.
 
-    With a model error the noise is none of them: it has the size that was found together with the error.
+    With a model error the noise is none of them: it has the size that was found together with the error. Nor is noise
+    that the tracks do not tell.
     """
     entries = [
         *_motion(tracks, structure),
@@ -185,7 +187,8 @@ def _by_material(tracks: Tracks) -> dict[str, tuple[int, ...]]:
 
 
 def _measurement(tracks: Tracks, noise: NoiseFamily) -> Iterator[Coordinate]:
-    yield Coordinate(NOISE, None, Transform.LOG, Prior(0.0, NOISE_LOG_SD), scale=0.1)
+    if untold_noise(tracks) is None:
+        yield Coordinate(NOISE, None, Transform.LOG, Prior(0.0, NOISE_LOG_SD), scale=0.1)
     if Observations.of(tracks).angle_bodies:
         yield Coordinate(ANGLE_NOISE, None, Transform.LOG, Prior(0.0, NOISE_LOG_SD), scale=0.1)
     if noise is NoiseFamily.STUDENT_T:
@@ -198,6 +201,7 @@ def _defaults(tracks: Tracks, model: PhysicsModel) -> dict[str, Float[np.ndarray
     first = first_positions(tracks)
     known = [wall.restitution for wall in tracks.walls]
     mass, of_wall = _mass_default(tracks, model), model.believed(WALL_RESTITUTION).default
+    noise = untold_noise(tracks)
     defaults = {
         "x": first[:, 0],
         "y": first[:, 1],
@@ -205,7 +209,7 @@ def _defaults(tracks: Tracks, model: PhysicsModel) -> dict[str, Float[np.ndarray
         MASS.name: np.array([mass if body.mass is None else body.mass for body in tracks.bodies]),
         RESTITUTION.name: np.full(count, model.believed(RESTITUTION).default),
         WALL_RESTITUTION.name: np.array([of_wall if value is None else value for value in known]),
-        NOISE: np.ones(1),
+        NOISE: np.ones(1) if noise is None else np.full(1, noise / Observations.of(tracks).position_reference),
         ANGLE_NOISE: np.ones(1),
         DEGREES_OF_FREEDOM: np.full(1, math.exp(DEGREES_PRIOR.mean)),
     }

@@ -12,7 +12,7 @@ from functools import cached_property
 import numpy as np
 from jaxtyping import Bool, Float
 
-from vrdp_prob.inference.free_flight import noise_scale
+from vrdp_prob.models.roughness import noise_scale
 from vrdp_prob.scene import Tracks
 
 POSITION_SD = 10.0

@@ -50,7 +50,8 @@ class Body:
     Raises
     ------
     InputError
-        If a radius, mass or inertia is not a positive finite number, or probabilities do not add up to 1.
+        If the shape is none of `Shape`, a radius, mass or inertia is not a positive finite number, or probabilities do
+        not add up to 1.
     """
 
     id: str
@@ -63,6 +64,9 @@ class Body:
     attribute_probabilities: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
+        if self.shape not in list(Shape):
+            raise InputError(f"object {self.id}: shape '{self.shape}' is not known; use sphere, cube or cylinder.")
+        object.__setattr__(self, "shape", Shape(self.shape))  # a plain text is as good
         for name in ("radius", "mass", "inertia"):
             value = getattr(self, name)
             if value is not None and not (math.isfinite(value) and value > 0):

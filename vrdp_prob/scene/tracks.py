@@ -5,11 +5,14 @@ from dataclasses import dataclass
 import numpy as np
 import xarray as xr
 from jaxtyping import Bool, Float
+from numpy.typing import ArrayLike
 
 from vrdp_prob.errors import InputError
 from vrdp_prob.scene.body import Body, Wall
 from vrdp_prob.scene.camera import Camera
 
+FARTHEST = 1e6
+"""Coordinate in m beyond which a position is no position; trackers mark with such numbers what they did not see."""
 OVERLAP_TOLERANCE = 0.25
 """Share of the contact distance by which measured centres may be too near before the tracks are refused."""
 
@@ -39,8 +42,9 @@ class Tracks:
     Raises
     ------
     InputError
-        If there is no object or no position, times are not finite and strictly increasing, a position is infinite,
-        an object was seen fewer than two times, or two bodies overlap where they are first seen together.
+        If there is no object or no position, times are not finite and strictly increasing, a position is infinite or
+        farther off than 1000 km, an object was seen fewer than two times, or two bodies overlap where they are first
+        seen together.
     """
 
     video: str
@@ -67,7 +71,23 @@ class Tracks:
         walls: tuple[Wall, ...] = (),
         camera: Camera | None = None,
     ) -> "Tracks":
-        """Tracks from arrays: times in s, positions in m (NaN where not seen), angles in rad, covariance in m^2."""
+        """Tracks from arrays: times in s, positions in m (NaN where not seen), angles in rad, covariance in m^2.
+
+        Raises
+        ------
+        InputError
+            If an array has another shape, or what the class refuses.
+        """
+        times, positions = _numbers(video, "times", times), _numbers(video, "positions", positions)
+        frames, count = len(times), len(bodies)
+        _check_shape(video, "times", times, (frames,), "(time)")
+        _check_shape(video, "positions", positions, (frames, count, 2), "(time, body, 2)")
+        if angles is not None:
+            angles = _numbers(video, "angles", angles)
+            _check_shape(video, "angles", angles, (frames, count), "(time, body)")
+        if position_covariance is not None:
+            position_covariance = _numbers(video, "position_covariance", position_covariance)
+            _check_shape(video, "position_covariance", position_covariance, (frames, count, 2, 2), "(time, body, 2, 2)")
         variables: dict[str, object] = {
             "x": (("time", "body"), positions[..., 0], {"units": "m"}),
             "y": (("time", "body"), positions[..., 1], {"units": "m"}),
@@ -165,10 +185,12 @@ class Tracks:
             raise InputError(
                 f"{self.video}: times are not strictly increasing at {where:g} s; sort the rows and drop duplicates."
             )
-        if np.isinf(positions).any():
-            frame, body, _ = np.argwhere(np.isinf(positions))[0]
+        if (far := np.abs(positions) > FARTHEST).any():
+            frame, body, axis = np.argwhere(far)[0]
+            value = positions[frame, body, axis]
+            where = "infinite" if np.isinf(value) else f"{value:.3g} m away, farther than {FARTHEST:g} m"
             raise InputError(
-                f"{self.video}: the position of object {self.bodies[body].id} at {times[frame]:g} s is infinite; "
+                f"{self.video}: the position of object {self.bodies[body].id} at {times[frame]:g} s is {where}; "
                 "leave a missing observation out."
             )
         for body, count in zip(self.bodies, self.seen.sum(axis=0).tolist(), strict=True):
@@ -194,3 +216,19 @@ class Tracks:
                         f"(centres {distance:.3g} m apart, radii {first.radius:g} and {second.radius:g} m); "
                         "check positions and radii."
                     )
+
+
+def _numbers(video: str, name: str, values: ArrayLike) -> Float[np.ndarray, "..."]:
+    """Values as an array of numbers."""
+    try:
+        return np.asarray(values, dtype=float)
+    except (TypeError, ValueError) as error:
+        raise InputError(f"{video}: {name} are not an array of numbers ({error}); give one.") from error
+
+
+def _check_shape(video: str, name: str, values: Float[np.ndarray, "..."], shape: tuple[int, ...], axes: str) -> None:
+    """Refuse an array of another shape."""
+    if values.shape != shape:
+        raise InputError(
+            f"{video}: {name} have the shape {values.shape}; with these times and objects it must be {shape}: {axes}."
+        )

@@ -4,6 +4,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from pathlib import Path
 
 import numpy as np
 from jaxtyping import Float
@@ -287,13 +288,15 @@ def _with_modes(joint: JointFit, fits: Sequence[MapFit]) -> JointFit:
 
 
 def check_videos(videos: Sequence[Tracks]) -> None:
-    """Refuse no videos at all, and two of one name.
+    """Refuse what are no tracks, no videos at all, and two of one name.
 
     Raises
     ------
     InputError
         In these cases.
     """
+    if isinstance(videos, Tracks | str | Path) or not all(isinstance(one, Tracks) for one in videos):
+        raise InputError("videos are no list of tracks; give those of several videos, which vrdp_prob.load_all reads.")
     if not videos:
         raise InputError("there are 0 videos; give tracks of at least one.")
     names = [tracks.video for tracks in videos]

@@ -220,8 +220,10 @@ def check_names(names: Sequence[str], model: PhysicsModel) -> None:
     Raises
     ------
     InputError
-        If the model has no such parameter, or each body has its own.
+        If the names are one text, the model has no such parameter, or each body has its own.
     """
+    if isinstance(names, str):
+        raise InputError(f"shared is the text '{names}'; give a list of names: ['{names}'].")
     per_video = [parameter.name for parameter in model.parameters if parameter.scope not in (Scope.BODY, Scope.VIDEO)]
     possible = [*per_video, WALL_RESTITUTION.name, NOISE, ANGLE_NOISE]
     for name in names:

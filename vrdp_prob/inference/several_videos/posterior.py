@@ -157,6 +157,8 @@ class SharedPosterior:
             with xr.open_dataset(file, engine="h5netcdf") as opened:
                 shared = opened.load()
             document = json.loads(shared.attrs["vrdp_prob"])
+            if "numbers" not in document:
+                raise InputError("the posterior of one video; open it with vrdp_prob.AskablePosterior.read.")
             return cls(
                 model=PhysicsModel(*model_file.parse(document["model"])),
                 seed=document["seed"],

@@ -9,7 +9,7 @@ from jaxtyping import Float
 from vrdp_prob.errors import InputError
 from vrdp_prob.inference.assembly import posterior_from
 from vrdp_prob.inference.diagnostics import Statistics
-from vrdp_prob.inference.infer import default_model
+from vrdp_prob.inference.infer import check_counts, default_model
 from vrdp_prob.inference.map_fit import MapFit
 from vrdp_prob.inference.posterior import Posterior
 from vrdp_prob.inference.samples import Convergence, Samples, assess
@@ -23,7 +23,6 @@ from vrdp_prob.progress import ProgressDisplay
 from vrdp_prob.scene import Tracks
 
 SAMPLERS = ("gibbs", "laplace")
-FEWEST_DRAWS = 4
 
 
 @dataclass(frozen=True)
@@ -120,10 +119,7 @@ def sample_together(
 def _check(sampler: str, draws: int, seed: int) -> None:
     if sampler not in SAMPLERS:
         raise InputError(f"sampler '{sampler}' is not known for several videos; use one of {', '.join(SAMPLERS)}.")
-    if draws < FEWEST_DRAWS:
-        raise InputError(f"draws is {draws}; ask for at least {FEWEST_DRAWS}.")
-    if seed < 0:
-        raise InputError(f"seed is {seed}; give a number that is not negative.")
+    check_counts(draws, seed)
 
 
 def _by_gibbs(fit: SharedFit, generator: np.random.Generator, progress: ProgressDisplay | None) -> _Drawn:

@@ -1,0 +1,70 @@
+"""Noise of tracks that are computed, rounded, or on a line."""
+
+import numpy as np
+import pytest
+
+from tests.inference.generator import Scene, observe
+from vrdp_prob.inference import infer
+from vrdp_prob.models.roughness import noise_scale, untold_noise
+from vrdp_prob.scene import Body, Shape, Tracks
+
+RADIUS = 0.2
+HEAD_ON = Scene(
+    (Shape.CYLINDER, Shape.CYLINDER),
+    np.array([[-1.5, 0.0], [0.5, 0.0]]),
+    np.array([[1.8, 0.0], [0.0, 0.0]]),
+    np.array([1.0, 1.0]),
+    np.array([0.9, 0.8]),
+    np.full(2, RADIUS),
+    np.full(2, 0.1),
+)
+
+
+def seen(noise: float = 1e-13) -> Tracks:
+    return observe(HEAD_ON, noise=noise, frames=60, seed=1)
+
+
+def moved(tracks: Tracks, positions: np.ndarray) -> Tracks:
+    return Tracks.from_arrays(tracks.video, tracks.bodies, tracks.times, positions)
+
+
+def rounded(decimals: int) -> Tracks:
+    return moved(seen(), seen().positions.round(decimals))
+
+
+def on_a_line(noise: float) -> Tracks:
+    return moved(seen(), seen(noise).positions * [1.0, 0.0])
+
+
+def test_noise_that_can_be_seen_is_told() -> None:
+    assert untold_noise(seen(0.0005)) is None
+    assert untold_noise(moved(seen(), seen(0.004).positions.round(3))) is None
+
+
+def test_computed_positions_get_a_small_noise() -> None:
+    assert untold_noise(seen()) == pytest.approx(1e-3 * 0.05 * RADIUS)
+
+
+@pytest.mark.parametrize("decimals", [2, 3])
+def test_rounded_positions_get_what_was_rounded_off(decimals: int) -> None:
+    assert untold_noise(rounded(decimals)) == pytest.approx(10.0**-decimals / np.sqrt(12), rel=0.3)
+
+
+def test_a_coordinate_that_is_kept_does_not_count_as_measured() -> None:
+    assert untold_noise(on_a_line(0.0005)) == pytest.approx(0.0005, rel=0.3)
+    half_at_rest = np.concatenate([seen(0.0005).positions, np.full((60, 2, 2), 3.0)], axis=1)
+    bodies = (*seen().bodies, Body("c", Shape.SPHERE, 0.1), Body("d", Shape.SPHERE, 0.1))
+    half_at_rest[:, 3] = -3.0
+    tracks = Tracks.from_arrays("v", bodies, seen().times, half_at_rest)
+    assert noise_scale(tracks) == pytest.approx(0.0005, rel=0.3)
+    assert untold_noise(tracks) is None
+
+
+@pytest.mark.parametrize(("tracks", "error"), [(seen(), 1e-4), (rounded(3), 0.005), (on_a_line(0.0005), 0.004)])
+def test_the_mass_ratio_of_such_tracks_is_right_and_the_noise_is_told(tracks: Tracks, error: float) -> None:
+    posterior = infer(tracks, sampler="laplace", hand_on=False)
+    (pair,) = posterior.mass_ratios()
+    assert pair.summary.mean == pytest.approx(1.0, abs=error)
+    assert pair.summary.q05 - pair.summary.sd < 1.0 < pair.summary.q95 + pair.summary.sd
+    assert posterior.misfit.fits
+    assert any("do not tell their noise" in warning for warning in posterior.warnings)

@@ -1,0 +1,64 @@
+"""What positions say of their own noise before anything is fitted, and what is taken where they do not."""
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+from vrdp_prob.models.observation import prior_noise
+from vrdp_prob.scene import Tracks
+
+FEWEST = 8
+"""Third differences below which nothing is said."""
+CUBIC_NOISE_GAIN = 20.0
+"""Variance of a third difference of independent noise of unit variance: 1 + 9 + 9 + 1."""
+NORMAL_MAD = 0.6745
+"""Median of the absolute value of a standard normal number."""
+SHARPEST = 1e-3
+"""Noise, as a share of what is expected beforehand, that tracks are taken to have at least: computed positions have
+none, and no simulation agrees with them to their last digit."""
+MOST_DECIMALS = 6
+"""Digits after the point (m) up to which positions are recognised as rounded."""
+
+
+def noise_scale(tracks: Tracks) -> float:
+    """Standard deviation (m) of the positions, from third differences of neighbouring frames (kinks are outvoted).
+
+    A coordinate that an object keeps to the last digit was not measured, and tells nothing; nan where all are so, or
+    frames are too few.
+    """
+    positions = tracks.positions
+    differences = np.diff(positions, n=3, axis=0)[:, ~_kept(positions)]
+    values = differences[np.isfinite(differences)]
+    if len(values) < FEWEST:
+        return float("nan")
+    return float(np.median(np.abs(values)) / NORMAL_MAD / np.sqrt(CUBIC_NOISE_GAIN))
+
+
+def untold_noise(tracks: Tracks) -> float | None:
+    """The noise (m) that tracks are taken to have where they do not tell it; None where they do.
+
+    They do not where positions are computed, or rounded to more than they scatter, and where all objects keep one
+    coordinate to the last digit: then half of the residuals are 0 whatever the noise.
+    """
+    noise = noise_scale(tracks)
+    if tracks.position_covariance is not None or not np.isfinite(noise):
+        return None
+    positions = tracks.positions
+    least = max(SHARPEST * prior_noise(tracks), _rounding(positions))
+    if noise < least:
+        return least
+    moving = ~_kept(positions).all(axis=1)
+    return noise if moving.any() and _kept(positions)[moving].any(axis=1).all() else None
+
+
+def _kept(positions: Float[np.ndarray, "time body 2"]) -> Bool[np.ndarray, "body 2"]:
+    """Coordinates that an object keeps to the last digit."""
+    return np.asarray(np.nanmax(positions, axis=0) == np.nanmin(positions, axis=0))
+
+
+def _rounding(positions: Float[np.ndarray, "time body 2"]) -> float:
+    """Standard deviation (m) of what was rounded off; 0 where positions were not rounded."""
+    values = positions[np.isfinite(positions)]
+    for decimals in range(MOST_DECIMALS + 1):
+        if np.abs(values - values.round(decimals)).max() < 1e-3 * 10.0**-decimals:
+            return float(10.0**-decimals / np.sqrt(12))
+    return 0.0

@@ -1,3 +1,4 @@
+import re
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -122,6 +123,18 @@ def test_a_body_without_a_radius_is_told_to_meet_nothing() -> None:
     unsized = Tracks.from_arrays(tracks.video, bodies, tracks.times, tracks.positions)
     posterior = infer(unsized, sampler="laplace", draws=50, hand_on=False)
     assert any(warning.startswith(f"Object {bodies[-1].id} has no radius") for warning in posterior.warnings)
+
+
+@pytest.mark.parametrize(
+    ("factor", "frames", "sentence"),
+    [(1000.0, 30, r"Objects move at \d\S*e\+03 m/s: see whether"), (1.0, 3, "The video has 3 frames")],
+)
+def test_units_and_lengths_that_cannot_be_meant_are_told(factor: float, frames: int, sentence: str) -> None:
+    tracks = observe(chain(), noise=0.01, frames=40, seed=4)
+    body, positions = tracks.bodies[:1], factor * tracks.positions[:frames, :1]
+    short = Tracks.from_arrays("short", body, tracks.times[:frames], positions)
+    posterior = infer(short, sampler="laplace", draws=50, hand_on=False)
+    assert any(re.match(sentence, warning) for warning in posterior.warnings), posterior.warnings
 
 
 def test_the_same_seed_gives_the_same_posterior() -> None:

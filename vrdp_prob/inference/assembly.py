@@ -18,7 +18,12 @@ from vrdp_prob.inference.tree import posterior_tree
 from vrdp_prob.models.parameters import MASS, RESTITUTION
 from vrdp_prob.models.roughness import untold_noise
 from vrdp_prob.models.unknowns import mass_prior
+from vrdp_prob.scene import Tracks
 
+FEWEST_FRAMES = 5
+"""Frames below which a video hardly shows a motion."""
+FASTEST = 100.0
+"""Speed in m/s that nothing on a table has: positions are in other units."""
 BATCH = 500
 """Worlds simulated at once when the draws are looked at again."""
 BOTH = ("mass and restitution are default values", "mass and restitution are drawn from the prior")
@@ -122,17 +127,7 @@ def _warnings(fit: MapFit, convergence: Convergence, status: dict[str, BodyStatu
         sentences.append("The search for the most probable values ended before it had converged.")
     if fit.search.sentence:
         sentences.append(fit.search.sentence)
-    if (noise := untold_noise(fit.likelihood.tracks)) is not None:
-        sentences.append(
-            f"The positions do not tell their noise (they are computed, rounded, or all on a line): {noise:.2g} m is "
-            "taken."
-        )
-    if unsized := [body.id for body in fit.likelihood.tracks.bodies if body.radius is None]:
-        several = len(unsized) > 1
-        sentences.append(
-            f"Object{'s' * several} {', '.join(unsized)} {'have' if several else 'has'} no radius and so cannot meet "
-            "anything: state radii, and collisions are looked for."
-        )
+    sentences += _of_tracks(fit.likelihood.tracks)
     found = {frozenset(pair) for pair in fit.contacts}
     seen = {(contact.first, contact.second) for contact in fit.clues.contacts}
     missed = {pair for pair in seen if frozenset(pair) not in found}
@@ -142,6 +137,35 @@ def _warnings(fit: MapFit, convergence: Convergence, status: dict[str, BodyStatu
         )
     sentences += convergence.notes if convergence.converged else (convergence.sentence,)
     return [*sentences, *_untold(fit, status, drawn=drawn)]
+
+
+def _of_tracks(tracks: Tracks) -> Iterator[str]:
+    """What limits any result from some tracks."""
+    if len(tracks.times) < FEWEST_FRAMES:
+        yield f"The video has {len(tracks.times)} frames: next to everything rests on what was believed beforehand."
+    if (speed := _fastest(tracks)) > FASTEST:
+        yield f"Objects move at {speed:.3g} m/s: see whether positions are in m and times in s."
+    if (noise := untold_noise(tracks)) is not None:
+        yield (
+            f"The positions do not tell their noise (they are computed, rounded, or all on a line): {noise:.2g} m is "
+            "taken."
+        )
+    if unsized := [body.id for body in tracks.bodies if body.radius is None]:
+        several = len(unsized) > 1
+        yield (
+            f"Object{'s' * several} {', '.join(unsized)} {'have' if several else 'has'} no radius and so cannot meet "
+            "anything: state radii, and collisions are looked for."
+        )
+
+
+def _fastest(tracks: Tracks) -> float:
+    """Median speed (m/s) of the fastest body between frames in which it was seen."""
+    seen, times, positions = tracks.seen, tracks.times, tracks.positions
+    speeds = [
+        np.linalg.norm(np.diff(positions[there, body], axis=0), axis=1) / np.diff(times[there])
+        for body, there in enumerate(seen.T)
+    ]
+    return max(float(np.median(one)) for one in speeds)
 
 
 def _untold(fit: MapFit, status: dict[str, BodyStatus], *, drawn: bool) -> Iterator[str]:

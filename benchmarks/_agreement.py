@@ -102,10 +102,12 @@ def _moments(samples: Samples, reported: Reported) -> Moments:
             "mean": (mean, _weighted_error(flat, weights)),
             "sd": (sd, _weighted_error(squares, weights) / (2 * sd)),
         }
-    series = np.moveaxis(values, -1, 0)
+    series, squares = np.moveaxis(values, -1, 0), np.moveaxis((values - mean) ** 2, -1, 0)
+    # arviz's own error of a standard deviation takes the effective size of the mean, which chains of NUTS, whose draws
+    # alternate, have more of: half the error that squares show.
     return {
         "mean": (mean, array_stats.mcse(series, method="mean")),
-        "sd": (sd, array_stats.mcse(series, method="sd")),
+        "sd": (sd, array_stats.mcse(squares, method="mean") / (2 * sd)),
     }
 
 

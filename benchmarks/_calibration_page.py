@@ -131,9 +131,16 @@ def _summary(results: Sequence[Result]) -> list[str]:
         f"{len(missed)} ({sum(result['converged'] for result in missed)})",
         str(sum(result["invented"] > 0 for result in known)),
         str(len(claimed)),
-        f"{sum(result['taken_to_rest'] for result in known)} of {sum(result['moving'] for result in known)}",
+        _taken_to_rest([result for result in known if "moving" in result]),
         seconds,
     ]
+
+
+def _taken_to_rest(counted: Sequence[Result]) -> str:
+    """Of the bodies that move when they are released, how many are held at rest."""
+    if not counted:
+        return "not counted"
+    return f"{sum(result['taken_to_rest'] for result in counted)} of {sum(result['moving'] for result in counted)}"
 
 
 def _table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:

@@ -5,14 +5,13 @@ from functools import partial
 import numpy as np
 import pytest
 
-from tests.inference.densities import FAR, Hopeless, SmallNeighbour, TwoModes, cloud
-from vrdp_prob.inference import emcee_sampler, laplace, nuts_sampler
+from tests.inference.densities import FAR, Hopeless, SmallNeighbour, TwoModes
+from vrdp_prob.inference import laplace, nuts_sampler
 from vrdp_prob.inference.emcee_sampler import sample_emcee
 from vrdp_prob.inference.laplace import sample_laplace
 from vrdp_prob.inference.mixture import Jumps, Mixture
 from vrdp_prob.inference.nuts_sampler import sample_nuts
 from vrdp_prob.inference.samples import PARETO_K_GOAL, assess
-from vrdp_prob.inference.shaping import Shaped, reshaped
 
 SAMPLERS = {"emcee": sample_emcee, "nuts": sample_nuts, "laplace": sample_laplace}
 
@@ -83,29 +82,6 @@ def test_the_fast_way_hands_on_where_it_cannot_be_trusted_and_says_so(monkeypatc
     assert convergence.pareto_k is None
     assert convergence.notes[0].startswith("The fast way could not be trusted")
     assert convergence.notes[0] in convergence.sentence
-
-
-def test_walkers_give_clouds_that_are_too_narrow_their_shape(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(emcee_sampler, "RESHAPED_AFTER", (48,))
-    monkeypatch.setattr(emcee_sampler, "PER_WALKER", 1e3)
-    shapes: list[Mixture] = []
-
-    def recorded(mixture: Mixture, points: np.ndarray, independent: float) -> Mixture:
-        shapes.append(reshaped(mixture, points, independent))
-        return shapes[-1]
-
-    monkeypatch.setattr(emcee_sampler, "reshaped", recorded)
-    target = TwoModes(1.0, dimension=4)
-    start = Mixture.of(target.start.components[0])
-    form = Shaped(Mixture.of(cloud(np.zeros(4), 0.2)), np.zeros((40, 4)), np.zeros(40, dtype=int), 0, 0)
-    generator = np.random.default_rng(0)
-    samples = sample_emcee(target, start, draws=100, generator=generator, form=form, most_steps=96)
-    # The log-gamma coordinate has the standard deviation 0.533, the others 1; 160 walkers tell them to 10 %.
-    exact = np.array([1.0, 0.533, 1.0, 1.0])
-    (found,) = shapes
-    told = found.components[0].points(np.random.default_rng(1).standard_normal((4000, 4))).std(axis=0)
-    assert told == pytest.approx(exact, rel=0.25)
-    assert samples.points.reshape(-1, 4).std(axis=0) == pytest.approx(exact, rel=0.12)
 
 
 def test_a_sampler_that_stops_at_its_budget_says_so() -> None:

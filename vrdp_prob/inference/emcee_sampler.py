@@ -23,7 +23,7 @@ from vrdp_prob.inference.mixture import Jumps, Mixture
 from vrdp_prob.inference.mode_weights import doubts, weights_from_chains
 from vrdp_prob.inference.rate_steps import RateSteps
 from vrdp_prob.inference.samples import ESS_GOAL, R_HAT_GOAL, LogDensity, Samples
-from vrdp_prob.inference.shaping import Shaped, clouds_arrays, clouds_of, reshaped, shaped, starting_places
+from vrdp_prob.inference.shaping import Shaped, shaped, starting_places
 from vrdp_prob.models.simulator.work import metered, work_sentence
 from vrdp_prob.progress import Advance, ProgressDisplay, SilentProgress
 
@@ -39,9 +39,6 @@ MOST_STEPS = 900
 WORK_LIMIT = 40_000_000
 """Work (see `work.py` of the simulator) after which sampling stops; a minute on two cores of 2020. It is no time,
 so that the same seed gives the same draws on every machine."""
-RESHAPED_AFTER = (96, 256)
-"""Steps after which ensembles that have not converged give the clouds their shape, and begin anew where they are; none
-where they jump between islands, whose common shape is that of none of them."""
 PER_WALKER = 3.0
 """Effective draws that each walker needs: one that never moves counts as about 1.5, so that many of them look well."""
 MARGIN = 1.15
@@ -93,88 +90,45 @@ def sample_emcee(
 
     Returns
     -------
-    One chain per ensemble, walker after walker so that autocorrelation within a walker shows; all steps after warm-up,
-    and after the clouds have taken their last shape.
+    One chain per ensemble, walker after walker so that autocorrelation within a walker shows; all steps after warm-up.
     The R-hat that goes with it compares the ensembles' earlier with their later steps.
     """
     del draws
     with metered() as meter:
         form = form or _kept_form(density, start, generator, checkpoint)
         walkers = max(2 * (start.dimension + 1), FEWEST_WALKERS)
-        places = [_places(density, form, jumps, walkers, generator) for _ in range(ENSEMBLES)]
-    mixture, past = form.mixture, list[Ensemble]()
+        ensembles = [
+            Ensemble(
+                density,
+                form.mixture,
+                _places(density, form, jumps, walkers, generator),
+                int(generator.integers(2**31)),
+                checkpoint.path(f"ensemble_{index}.h5") if checkpoint is not None else None,
+                jumps=None if jumps is None else jumps.mixture,
+                rate_steps=rate_steps,
+            )
+            for index in range(ENSEMBLES)
+        ]
     with (progress or SilentProgress()).stage("Sampling (emcee), at most", total=WARM_UP + most_steps) as advance:
-        for turn, until in enumerate(_turns(most_steps, changing=jumps is None)):
-            ensembles = [
-                Ensemble(
-                    density,
-                    mixture,
-                    begin,
-                    int(generator.integers(2**31)),
-                    None if checkpoint is None else checkpoint.path(_file(index, turn)),
-                    jumps=None if jumps is None else jumps.mixture,
-                    rate_steps=rate_steps,
-                )
-                for index, begin in enumerate(places)
-            ]
-            steps = until - sum(one.steps for one in past[::ENSEMBLES])
-            worked = sum(ensemble.work for ensemble in past)
-            settled_now = _run(ensembles, mixture, reported, advance, steps=steps, work_limit=work_limit - worked)
-            past += ensembles
-            work = sum(ensemble.work for ensemble in past)
-            if settled_now or work >= work_limit or until == WARM_UP + most_steps:
-                break
-            mixture, places = _kept_turn(mixture, ensembles, turn, generator, checkpoint)
-    stopped: tuple[str, ...] = ()
-    if not settled_now:
-        stopped = (work_sentence(work_limit) if work >= work_limit else f"It stopped after {most_steps} steps.",)
-    points = _points(mixture, ensembles)
+        stopped = _run(ensembles, form.mixture, reported, advance, most_steps=most_steps, work_limit=work_limit)
+    points = _points(form.mixture, ensembles)
     by_walker = joined(points)
     log_density = np.stack([ensemble.log_density(WARM_UP) for ensemble in ensembles])
-    modes = weights_from_chains(mixture, by_walker)
+    modes = weights_from_chains(form.mixture, by_walker)
     acceptance_rate = np.broadcast_to([[ensemble.acceptance] for ensemble in ensembles], by_walker.shape[:2])
     return Samples(
         by_walker,
         np.swapaxes(log_density, 1, 2).reshape(len(log_density), -1),
         {"acceptance_rate": acceptance_rate},
         r_hat=drift(ordered(points), reported),
-        evaluations=form.evaluations + sum(ensemble.evaluations for ensemble in past),
-        gradients=form.gradients + sum(ensemble.gradients for ensemble in past),
-        work=meter.rows + work,
+        evaluations=form.evaluations + sum(ensemble.evaluations for ensemble in ensembles),
+        gradients=form.gradients + sum(ensemble.gradients for ensemble in ensembles),
+        work=meter.rows + sum(ensemble.work for ensemble in ensembles),
         modes=modes,
         notes=stopped,
         doubts=doubts(modes),
         ess_goal=_ess_goal(ensembles),
     )
-
-
-def _turns(most_steps: int, *, changing: bool) -> list[int]:
-    """Steps, those of warm-up and of earlier turns included, at which each turn ends."""
-    ends = [end for end in RESHAPED_AFTER if changing and end <= most_steps / 2]
-    return [WARM_UP + end for end in (*ends, most_steps)]
-
-
-def _file(index: int, turn: int) -> str:
-    return f"ensemble_{index}_{turn}.h5" if turn else f"ensemble_{index}.h5"
-
-
-def _kept_turn(
-    mixture: Mixture,
-    ensembles: list[Ensemble],
-    turn: int,
-    generator: np.random.Generator,
-    checkpoint: Checkpoint | None,
-) -> tuple[Mixture, list[Float[np.ndarray, "walker dimension"]]]:
-    """The clouds in the shape of the draws so far, and the places where the walkers are."""
-    points = _points(mixture, ensembles)
-    later = points[:, :, points.shape[2] // 2 :]
-
-    def compute() -> Mapping[str, np.ndarray]:
-        independent = float(later.shape[0] * later.shape[1])
-        return clouds_arrays(reshaped(mixture, later.reshape(-1, later.shape[-1]), independent))
-
-    found = clouds_of(kept(checkpoint, f"turn_{turn + 1}", generator, compute), mixture)
-    return found, [one[:, -1] for one in points]
 
 
 def _run(
@@ -183,10 +137,10 @@ def _run(
     reported: Reported | None,
     advance: Advance,
     *,
-    steps: int,
+    most_steps: int,
     work_limit: int,
-) -> bool:
-    """Run ensembles until they have converged, for so many steps or so much work; whether they have."""
+) -> tuple[str, ...]:
+    """Run ensembles until they have converged, or say at which limit they have stopped."""
     with ThreadPoolExecutor(max_workers=min(ENSEMBLES, os.cpu_count() or 1)) as workers:
 
         def run_to(end: int, *, tune: bool) -> None:
@@ -201,16 +155,19 @@ def _run(
         done = max(ensemble.steps for ensemble in ensembles)
         advance(done)
         run_to(WARM_UP, tune=True)
-        end = min(max(WARM_UP + ROUND, done), steps)
+        end = max(WARM_UP + min(ROUND, most_steps), done)
         while True:
             run_to(end, tune=False)
             points = _points(mixture, ensembles)
             effective = MARGIN * _ess_goal(ensembles)
             if settled(joined(points), ordered(points), reported, r_hat=R_HAT_GOAL, effective=effective):
-                return True
-            if end >= steps or sum(ensemble.work for ensemble in ensembles) >= work_limit:
-                return False
-            end = min(end + ROUND, steps)
+                return ()
+            work = sum(ensemble.work for ensemble in ensembles)
+            if work >= work_limit:
+                return (work_sentence(work_limit),)
+            if end >= WARM_UP + most_steps:
+                return (f"It stopped after {most_steps} steps.",)
+            end = min(end + ROUND, WARM_UP + most_steps)
 
 
 def _places(

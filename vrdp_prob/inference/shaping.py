@@ -49,8 +49,6 @@ CORRELATION = 2.0
 """Places of walkers that are worth one independent draw."""
 EFFECTIVE_PER_DIMENSION = 8.0
 """Weights are flattened until so many effective draws per dimension shape the next proposal."""
-FEWEST_PER_DIMENSION = 2.0
-"""Independent draws per dimension from which on a cloud takes their shape."""
 REFINEMENTS = 2
 JITTER = 0.1
 """Distance, in standard deviations, by which chains set out from where a walker was."""
@@ -83,9 +81,11 @@ class Shaped:
     gradients: int
 
     def arrays(self) -> dict[str, np.ndarray]:
-        """Everything that the clouds from which it set out do not know; the places for its chains among it."""
+        """Everything that the clouds from which it set out do not know."""
         return {
-            **clouds_arrays(self.mixture),
+            "shift": np.stack([cloud.shift.numpy() for cloud in self.mixture.components]),
+            "scale": np.stack([cloud.scale.numpy() for cloud in self.mixture.components]),
+            "log_weights": self.mixture.log_weights,
             "places": self.places,
             "component": self.component,
             "costs": np.array([self.evaluations, self.gradients]),
@@ -94,26 +94,13 @@ class Shaped:
     @classmethod
     def of_arrays(cls, arrays: Mapping[str, np.ndarray], start: Mixture) -> "Shaped":
         """What `arrays` was made of, with the clouds from which it set out."""
+        clouds = [
+            replace(cloud, shift=torch.from_numpy(shift), scale=torch.from_numpy(scale))
+            for cloud, shift, scale in zip(start.components, arrays["shift"], arrays["scale"], strict=True)
+        ]
         evaluations, gradients = (int(cost) for cost in arrays["costs"])
-        return cls(clouds_of(arrays, start), arrays["places"], arrays["component"], evaluations, gradients)
-
-
-def clouds_arrays(mixture: Mixture) -> dict[str, np.ndarray]:
-    """What the clouds of a mixture have in place of the shift, shape and weights that they set out with."""
-    return {
-        "shift": np.stack([cloud.shift.numpy() for cloud in mixture.components]),
-        "scale": np.stack([cloud.scale.numpy() for cloud in mixture.components]),
-        "log_weights": mixture.log_weights,
-    }
-
-
-def clouds_of(arrays: Mapping[str, np.ndarray], start: Mixture) -> Mixture:
-    """The mixture that `clouds_arrays` was made of, with the clouds from which it set out."""
-    clouds = [
-        replace(cloud, shift=torch.from_numpy(shift), scale=torch.from_numpy(scale))
-        for cloud, shift, scale in zip(start.components, arrays["shift"], arrays["scale"], strict=True)
-    ]
-    return Mixture(tuple(clouds), arrays["log_weights"])
+        mixture = Mixture(tuple(clouds), arrays["log_weights"])
+        return cls(mixture, arrays["places"], arrays["component"], evaluations, gradients)
 
 
 def starting_places(
@@ -166,30 +153,6 @@ def shaped(density: LogDensity, start: Mixture, generator: np.random.Generator, 
         TRIAL_DRAWS + refining + sum(swarm.evaluations for swarm in swarms),
         sum(swarm.evaluations for swarm in swarms),
     )
-
-
-def reshaped(mixture: Mixture, points: Float[np.ndarray, "draw dimension"], independent: float) -> Mixture:
-    """A mixture with the shape and weights of draws of the posterior, as far as these differ by more than chance.
-
-    Parameters
-    ----------
-    mixture
-        The mixture.
-    points
-        The draws; each shapes the cloud that it most probably comes from.
-    independent
-        Number of independent draws that all are worth.
-    """
-    regions = mixture.regions(points)
-    shares = np.bincount(regions, minlength=len(mixture.components)) / len(points)
-    clouds = []
-    for index, cloud in enumerate(mixture.components):
-        own = points[regions == index]
-        enough = shares[index] * independent > FEWEST_PER_DIMENSION * mixture.dimension
-        weights = np.full(len(own), 1 / max(len(own), 1))
-        clouds.append(_fitted(cloud, cloud.whitened(own), weights, shares[index] * independent) if enough else cloud)
-    heavy = np.maximum(shares, LEAST_WEIGHT)
-    return Mixture(tuple(clouds), np.log(heavy / heavy.sum()))
 
 
 def _as_it_is(start: Mixture, trial: Weighted, generator: np.random.Generator) -> Shaped:

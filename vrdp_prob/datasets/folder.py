@@ -154,9 +154,9 @@ def _read_bodies(path: Path) -> dict[tuple[str, str], Body]:
 def _shape(row: Row) -> Shape:
     name = row.text("shape")
     try:
-        return Shape(name)
-    except ValueError as error:
-        raise InputError(f"{row.place}: shape '{name}' is not known; use sphere, cube or cylinder.") from error
+        return Shape.named(name)
+    except InputError as error:
+        raise InputError(f"{row.place}: {error}") from error
 
 
 def _read_walls(path: Path, videos: Sequence[str]) -> dict[str, tuple[Wall, ...]]:

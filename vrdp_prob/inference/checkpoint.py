@@ -14,13 +14,13 @@ from pathlib import Path
 
 import numpy as np
 
-import vrdp_prob
 from vrdp_prob.errors import InputError
 from vrdp_prob.files import check_writable, write_atomically
 from vrdp_prob.models.physics import PhysicsModel
 from vrdp_prob.scene import Camera, Tracks
 
 Arrays = Mapping[str, np.ndarray]
+PACKAGE = Path(__file__).parents[1]
 
 
 def fingerprint(tracks: Tracks, model: PhysicsModel, **settings: object) -> dict[str, str]:
@@ -62,10 +62,9 @@ def program_facts(**settings: object) -> dict[str, str]:
 @cache
 def _code() -> str:
     """All modules of this package, in a short text: versions between releases differ, too."""
-    root = Path(vrdp_prob.__file__).parent
     text = sha256()
-    for module in sorted(root.rglob("*.py")):
-        text.update(str(module.relative_to(root)).encode())
+    for module in sorted(PACKAGE.rglob("*.py")):
+        text.update(str(module.relative_to(PACKAGE)).encode())
         text.update(module.read_bytes())
     return text.hexdigest()[:12]
 

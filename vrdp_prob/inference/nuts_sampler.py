@@ -284,25 +284,23 @@ def _in_proportion(
     A draw counts for the mode that it is in, whichever its chain set out from: chains are restricted, not trusted to
     stay.
     """
-    chains = np.stack([run.points(mode) for mode in inhabited])  # mode chain draw dimension
-    own = np.moveaxis(chains.reshape(len(inhabited), RESULTS, -1, *chains.shape[2:]), 1, 0)
-    by_result = own.reshape(RESULTS, -1, *own.shape[3:])
+    chains = [run.points(mode) for mode in inhabited]
+    by_result = np.concatenate([one.reshape(RESULTS, -1, *one.shape[1:]) for one in chains], axis=1)
     if len(inhabited) == 1:
         return _Drawn(joined(by_result), ordered(by_result))
     regions = run.mixture.regions(by_result.reshape(-1, run.mixture.dimension)).reshape(by_result.shape[:3])
     counts = np.array([(regions == mode).sum(axis=(1, 2)).min() for mode in inhabited])
     weights = np.array([modes[mode].weight for mode in inhabited])
     there = counts >= FEWEST_IN_MODE
-    missed = tuple(mode for mode, enough in zip(inhabited, there, strict=True) if not enough)
+    held, missed = np.array(inhabited)[there], tuple(np.array(inhabited)[~there].tolist())
     if not there.any():
         return _Drawn(joined(by_result), ordered(by_result), missed)
     wanted = np.floor(weights[there] * (counts[there] / weights[there]).min()).astype(int)
-    sorted_by = [mode for mode, enough in zip(inhabited, there, strict=True) if enough]
-    labels = generator.permutation(np.repeat(sorted_by, wanted))
+    labels = generator.permutation(np.repeat(held, wanted))
     shape = (RESULTS, len(labels), run.mixture.dimension)
     drawn = _Drawn(np.empty(shape), np.empty(shape), missed)
     for points, where, by_chain, by_time in zip(by_result, regions, drawn.by_chain, drawn.by_time, strict=True):
-        for mode, count in zip(sorted_by, wanted, strict=True):
+        for mode, count in zip(held, wanted, strict=True):
             chain, time = np.nonzero(where == mode)
             chosen = np.linspace(0, len(chain) - 1, count).round().astype(int)
             chain, time = chain[chosen], time[chosen]

@@ -42,12 +42,12 @@ def untold_noise(tracks: Tracks) -> float | None:
     noise = noise_scale(tracks)
     if tracks.position_covariance is not None or not np.isfinite(noise):
         return None
-    positions = tracks.positions
-    least = max(SHARPEST * prior_noise(tracks), _rounding(positions))
+    least = max(SHARPEST * prior_noise(tracks), _rounding(tracks.positions))
     if noise < least:
         return least
-    moving = ~_kept(positions).all(axis=1)
-    return noise if moving.any() and _kept(positions)[moving].any(axis=1).all() else None
+    kept = _kept(tracks.positions)
+    moving = ~kept.all(axis=1)
+    return noise if moving.any() and kept[moving].any(axis=1).all() else None
 
 
 def _kept(positions: Float[np.ndarray, "time body 2"]) -> Bool[np.ndarray, "body 2"]:

@@ -85,14 +85,17 @@ def unknowns(
     With a model error the noise is none of them: it has the size that was found together with the error. Nor is noise
     that the tracks do not tell.
     """
+    untold = untold_noise(tracks)
     entries = [
         *_motion(tracks, structure),
         *_turning(tracks, model, structure),
         *_matter(tracks, model, structure),
         *_physics(tracks, model, structure),
-        *(_measurement(tracks, noise) if model_error is None else ()),
+        *(_measurement(tracks, noise, told=untold is None) if model_error is None else ()),
     ]
     defaults = _defaults(tracks, model)
+    if untold is not None:
+        defaults[NOISE] = np.full(1, untold / Observations.of(tracks).position_reference)
     if model_error is not None:
         defaults[NOISE] = np.full(1, model_error.noise_scale)
         defaults[ANGLE_NOISE] = np.full(1, model_error.angle_noise_scale)
@@ -186,8 +189,9 @@ def _by_material(tracks: Tracks) -> dict[str, tuple[int, ...]]:
     }
 
 
-def _measurement(tracks: Tracks, noise: NoiseFamily) -> Iterator[Coordinate]:
-    if untold_noise(tracks) is None:
+def _measurement(tracks: Tracks, noise: NoiseFamily, *, told: bool) -> Iterator[Coordinate]:
+    """Size and shape of the measurement noise, its size as far as the tracks tell it."""
+    if told:
         yield Coordinate(NOISE, None, Transform.LOG, Prior(0.0, NOISE_LOG_SD), scale=0.1)
     if Observations.of(tracks).angle_bodies:
         yield Coordinate(ANGLE_NOISE, None, Transform.LOG, Prior(0.0, NOISE_LOG_SD), scale=0.1)
@@ -201,7 +205,6 @@ def _defaults(tracks: Tracks, model: PhysicsModel) -> dict[str, Float[np.ndarray
     first = first_positions(tracks)
     known = [wall.restitution for wall in tracks.walls]
     mass, of_wall = _mass_default(tracks, model), model.believed(WALL_RESTITUTION).default
-    noise = untold_noise(tracks)
     defaults = {
         "x": first[:, 0],
         "y": first[:, 1],
@@ -209,7 +212,7 @@ def _defaults(tracks: Tracks, model: PhysicsModel) -> dict[str, Float[np.ndarray
         MASS.name: np.array([mass if body.mass is None else body.mass for body in tracks.bodies]),
         RESTITUTION.name: np.full(count, model.believed(RESTITUTION).default),
         WALL_RESTITUTION.name: np.array([of_wall if value is None else value for value in known]),
-        NOISE: np.ones(1) if noise is None else np.full(1, noise / Observations.of(tracks).position_reference),
+        NOISE: np.ones(1),
         ANGLE_NOISE: np.ones(1),
         DEGREES_OF_FREEDOM: np.full(1, math.exp(DEGREES_PRIOR.mean)),
     }

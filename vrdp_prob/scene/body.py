@@ -19,6 +19,19 @@ class Shape(StrEnum):
     CUBE = "cube"
     CYLINDER = "cylinder"
 
+    @classmethod
+    def named(cls, name: str) -> "Shape":
+        """The shape of a name.
+
+        Raises
+        ------
+        InputError
+            If there is none.
+        """
+        if name not in list(cls):
+            raise InputError(f"shape '{name}' is not known; use sphere, cube or cylinder.")
+        return cls(name)
+
     @property
     def is_disc(self) -> bool:
         """Whether the outline in the plane is a disc."""
@@ -64,9 +77,10 @@ class Body:
     attribute_probabilities: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        if self.shape not in list(Shape):
-            raise InputError(f"object {self.id}: shape '{self.shape}' is not known; use sphere, cube or cylinder.")
-        object.__setattr__(self, "shape", Shape(self.shape))  # a plain text is as good
+        try:
+            object.__setattr__(self, "shape", Shape.named(self.shape))  # a plain text is as good
+        except InputError as error:
+            raise InputError(f"object {self.id}: {error}") from error
         for name in ("radius", "mass", "inertia"):
             value = getattr(self, name)
             if value is not None and not (math.isfinite(value) and value > 0):

@@ -64,7 +64,7 @@ def exact_moments() -> tuple[float, float]:
 def test_the_map_has_an_inverse_leaves_the_mode_alone_and_keeps_volumes() -> None:
     straightening = Straightening.of(mode(), Rates.of(tracks(), coordinates()))
     points = torch.from_numpy(mode().point + np.random.default_rng(0).standard_normal((20, 2)))
-    (straight,) = all_straightened([straightening], straightening.bent(points).numpy())
+    (straight,) = all_straightened([straightening], straightening.bent(points).numpy()[None])
     torch.testing.assert_close(torch.from_numpy(straight), points)
     centre = torch.from_numpy(mode().point)
     torch.testing.assert_close(straightening.bent(centre), centre)

@@ -18,6 +18,7 @@ from jaxtyping import Float
 from scipy.linalg import solve_triangular
 from torch import Tensor
 
+from vrdp_prob.inference.contact_ridges import ContactRidge
 from vrdp_prob.inference.least_squares import Residuals, robust_cost
 from vrdp_prob.inference.samples import Gaussian
 from vrdp_prob.inference.second_differences import second_differences
@@ -44,7 +45,9 @@ class CurvedGaussian:
     shift, scale
         Affine map that comes before, by which later knowledge moves and shapes the whole.
     straightening
-        Shear that comes last, and that bends what a Gaussian can only hold straight; None for none.
+        Shear that comes next, and that bends what a Gaussian can only hold straight; None for none.
+    ridges
+        Shears that come last, one after the other.
     """
 
     gaussian: Gaussian
@@ -53,21 +56,29 @@ class CurvedGaussian:
     shift: Float[Tensor, "dimension"]
     scale: Float[Tensor, "dimension dimension"]
     straightening: Straightening | None = None
+    ridges: tuple[ContactRidge, ...] = ()
 
     @classmethod
-    def straight(cls, gaussian: Gaussian, straightening: Straightening | None = None) -> "CurvedGaussian":
-        """A Gaussian as it is."""
+    def straight(
+        cls, gaussian: Gaussian, straightening: Straightening | None = None, ridges: Sequence[ContactRidge] = ()
+    ) -> "CurvedGaussian":
+        """A Gaussian as it is, with shears."""
         count = len(gaussian.mean)
         none = torch.zeros(count, 0, dtype=torch.float64)
         zero, unit = torch.zeros(count, dtype=torch.float64), torch.eye(count, dtype=torch.float64)
-        return cls(gaussian, none, torch.zeros(0, 0, count, dtype=torch.float64), zero, unit, straightening)
+        flat = torch.zeros(0, 0, count, dtype=torch.float64)
+        return cls(gaussian, none, flat, zero, unit, straightening, tuple(ridges))
 
     @classmethod
     def around(
-        cls, gaussian: Gaussian, residuals: Residuals, straightening: Straightening | None = None
+        cls,
+        gaussian: Gaussian,
+        residuals: Residuals,
+        straightening: Straightening | None = None,
+        ridges: Sequence[ContactRidge] = (),
     ) -> "CurvedGaussian":
         """The Gaussian with its strongest bends, from second differences of the residuals around its mean."""
-        straight = cls.straight(gaussian, straightening)
+        straight = cls.straight(gaussian, straightening, ridges)
         tensor = _bends(straight, residuals)
         count = len(gaussian.mean)
         directions, sizes, _ = np.linalg.svd(tensor.reshape(count, -1), full_matrices=False)
@@ -118,7 +129,11 @@ class CurvedGaussian:
             products = (along[..., :, None] * along[..., None, :]).flatten(-2)
             places = places + products @ self.bend.flatten(0, 1) / 2
         points = self._mean + places @ self._root
-        return points if self.straightening is None else self.straightening.bent(points)
+        if self.straightening is not None:
+            points = self.straightening.bent(points)
+        for ridge in self.ridges:
+            points = ridge.bent(points)
+        return points
 
     def points(self, whitened: Float[np.ndarray, "*batch dimension"]) -> Float[np.ndarray, "*batch dimension"]:
         """The same for arrays."""
@@ -167,17 +182,28 @@ class SeveralClouds:
             own = cloud.axes.shape[1]
             self._axes[index, :, :own] = cloud.axes.numpy()
             self._bend[index, :own, :own] = cloud.bend.numpy()
+        self._ridges = [cloud.ridges for cloud in clouds]
         self._straightenings = [cloud.straightening for cloud in clouds]
 
     def whitened(self, points: Float[np.ndarray, "point dimension"]) -> Float[np.ndarray, "component point dimension"]:
         """Standard normal coordinates of points in each cloud."""
-        straight = all_straightened(self._straightenings, points)
+        straight = all_straightened(self._straightenings, self._beside_straight_ridges(points))
         bent = np.matmul(straight - self._mean[:, None], np.swapaxes(self._unroot, 1, 2))
         if self._axes.shape[2]:
             along = np.matmul(bent, self._axes)
             products = (along[..., :, None] * along[..., None, :]).reshape(*along.shape[:2], along.shape[2] ** 2)
             bent = bent - np.matmul(products, self._bend.reshape(len(bent), -1, bent.shape[2])) / 2
         return np.asarray(np.matmul(bent - self._shift[:, None], np.swapaxes(self._unscale, 1, 2)))
+
+    def _beside_straight_ridges(
+        self, points: Float[np.ndarray, "point dimension"]
+    ) -> Float[np.ndarray, "component point dimension"]:
+        """Points as they lie beside the ridges of each cloud before these are bent."""
+        straight = np.tile(points, (len(self._ridges), 1, 1))
+        for index, ridges in enumerate(self._ridges):
+            for ridge in reversed(ridges):
+                straight[index] = ridge.straightened(straight[index])
+        return straight
 
 
 def _bends(straight: CurvedGaussian, residuals: Residuals) -> Float[np.ndarray, "dimension dimension dimension"]:

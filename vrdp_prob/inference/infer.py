@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +11,7 @@ import numpy as np
 from vrdp_prob.errors import InputError
 from vrdp_prob.inference.assembly import posterior_from
 from vrdp_prob.inference.checkpoint import Checkpoint, fingerprint
+from vrdp_prob.inference.contact_ridges import contact_ridges
 from vrdp_prob.inference.diagnostics import Reported
 from vrdp_prob.inference.emcee_sampler import sample_emcee
 from vrdp_prob.inference.laplace import sample_laplace
@@ -160,7 +162,7 @@ def sampled(fit: MapFit, sampler: str, *, generator: np.random.Generator, **opti
         What else the sampler takes.
     """
     likelihood, rates = fit.likelihood, Rates.of(fit.likelihood.tracks, fit.likelihood.coordinates)
-    start = proposals(fit.modes, likelihood.residuals, rates)
+    start = proposals(fit.modes, likelihood.residuals, rates, partial(contact_ridges, likelihood))
     ways = {
         "jumps": yaw_jumps(likelihood, fit.point, rates, generator),
         "rate_steps": RateSteps.of(fit.modes[0], rates),

@@ -13,6 +13,7 @@ import torch
 from jaxtyping import Float
 
 from vrdp_prob.errors import InputError
+from vrdp_prob.inference.at_rest import with_bodies_at_rest
 from vrdp_prob.inference.clues import Clues
 from vrdp_prob.inference.descent import Descent
 from vrdp_prob.inference.events import Pairs, first_contacts
@@ -165,6 +166,9 @@ def fit_map(
         evaluations += sum(one.evaluations for one in turned) + sum(one.evaluations for one in elsewhere)
         # A model error may explain what another yaw explains, too; so both are candidates under one.
         found = sorted([*found, *elsewhere], key=lambda one: -one.log_density)
+    likelihood, structure, found = with_bodies_at_rest(
+        likelihood, structure, found, lambda source, starts, other: _refined(source, starts, other, stages)
+    )
     misfit = judge(likelihood, found[0].point, clues)
     for _ in range(TURNS if model_error else 0):
         error = next_model_error(likelihood, found[0].point, clues, misfit)
@@ -182,7 +186,7 @@ def fit_map(
         climbed = _climbed(widened, found)
         likelihood = widened
         evaluations += sum(one.evaluations for one in climbed)
-    likelihood, modes = without_idle(likelihood, distinct_modes(likelihood, climbed), clues.moving)
+    likelihood, modes = without_idle(likelihood, distinct_modes(likelihood, climbed), structure.moving)
     converged = found[0].converged or max(climbed, key=lambda one: one.log_density).converged
     search = ModeSearch(stages.alternatives, len(attempts), not _in_doubt(attempts))
     return MapFit(likelihood, modes, converged, search, clues, misfit, evaluations)

@@ -138,21 +138,22 @@ class Straightening:
 
 
 def all_straightened(
-    shears: Sequence[Straightening | None], points: Float[np.ndarray, "point dimension"]
+    shears: Sequence[Straightening | None], points: Float[np.ndarray, "shear point dimension"]
 ) -> Float[np.ndarray, "shear point dimension"]:
-    """Points straightened by each of several shears along the same rates; None leaves them as they are.
+    """The points of each of several shears along the same rates, straightened; None leaves them as they are.
 
     This is the inverse of `bent`: the shift depends on the rates alone, which it leaves as they are.
     """
-    straight = np.tile(points, (len(shears), 1, 1))
+    straight = points.copy()
     known = [(index, shear) for index, shear in enumerate(shears) if shear is not None]
     if not known:
         return straight
     directions = known[0][1].directions.numpy()
     centres = np.stack([shear.centre.numpy() for _, shear in known]) @ directions.T
     displacement = np.stack([shear.displacement.numpy() for _, shear in known])
-    change = np.minimum(points @ directions.T - centres[:, None], LARGEST)
-    straight[[index for index, _ in known]] -= np.matmul(np.expm1(change) - change, displacement)
+    moved = [index for index, _ in known]
+    change = np.minimum(points[moved] @ directions.T - centres[:, None], LARGEST)
+    straight[moved] -= np.matmul(np.expm1(change) - change, displacement)
     return straight
 
 

@@ -1,0 +1,64 @@
+"""Bodies that are hit before four frames have shown whether they move."""
+
+import numpy as np
+import pytest
+
+from tests.inference.generator import Scene, observe
+from tests.inference.prior_scenes import prior_scene
+from vrdp_prob.inference import default_model
+from vrdp_prob.inference.clues import Clues
+from vrdp_prob.inference.map_fit import MapFit, fit_map
+from vrdp_prob.scene import Shape, Tracks
+
+HIT = 0.1
+"""Time (s) of the contact: three frames come before it."""
+GRAZED = 901
+"""Seed of a scene in which a disc at rest is grazed at once; a small error of its place would make it pass by."""
+
+
+def hit_soon(velocity: tuple[float, float], shape: Shape = Shape.CYLINDER) -> Tracks:
+    """A body that is hit soon by another one."""
+    speeds = np.array([[2.0, 0.2], velocity])
+    places = np.array([[-0.4, 0.0], [0.0, 0.05]]) - HIT * speeds
+    scene = Scene(
+        (Shape.CYLINDER, shape),
+        places,
+        speeds,
+        np.array([1.0, 1.5]),
+        np.array([0.9, 0.9]),
+        np.full(2, 0.2),
+        np.full(2, 0.4),
+    )
+    tracks = observe(scene, noise=0.01, frames=45, seed=3)
+    assert abs(scene.contacts[0][0] - HIT) < 0.03
+    return tracks
+
+
+def moving(fit: MapFit) -> set[int | None]:
+    """Bodies with a release velocity."""
+    return {entry.owner for entry in fit.likelihood.coordinates.entries if entry.field == "velocity_x"}
+
+
+@pytest.mark.parametrize("shape", [Shape.CYLINDER, Shape.CUBE])
+def test_a_body_at_rest_has_no_release_velocity_though_few_frames_show_it(shape: Shape) -> None:
+    tracks = hit_soon((0.0, 0.0), shape)
+    assert 1 in Clues.of(tracks).moving
+    fit = fit_map(tracks, default_model(), np.random.default_rng(0))
+    assert moving(fit) == {0}
+    assert ("spin", 1) not in fit.likelihood.coordinates.places
+    assert fit.misfit.ratio < 1.2
+
+
+@pytest.mark.parametrize("velocity", [(-0.8, 0.0), (0.0, 0.9)])
+def test_a_body_that_moves_keeps_its_release_velocity(velocity: tuple[float, float]) -> None:
+    fit = fit_map(hit_soon(velocity), default_model(), np.random.default_rng(0))
+    assert moving(fit) == {0, 1}
+
+
+def test_a_body_at_rest_that_is_grazed_is_found_at_another_place() -> None:
+    scene = prior_scene(GRAZED)
+    assert scene is not None
+    assert not scene.scene.velocity[0].any()
+    fit = fit_map(scene.tracks, default_model(), np.random.default_rng(GRAZED))
+    assert moving(fit) == {1}
+    assert fit.misfit.ratio < 1.2

@@ -5,7 +5,7 @@ import pytest
 
 from tests.inference.generator import Scene, observe
 from tests.inference.prior_scenes import prior_scene
-from vrdp_prob.inference import default_model
+from vrdp_prob.inference import default_model, infer
 from vrdp_prob.inference.clues import Clues
 from vrdp_prob.inference.map_fit import MapFit, fit_map
 from vrdp_prob.scene import Shape, Tracks
@@ -45,8 +45,15 @@ def test_a_body_at_rest_has_no_release_velocity_though_few_frames_show_it(shape:
     assert 1 in Clues.of(tracks).moving
     fit = fit_map(tracks, default_model(), np.random.default_rng(0))
     assert moving(fit) == {0}
+    assert fit.believed_at_rest == {1}
     assert ("spin", 1) not in fit.likelihood.coordinates.places
     assert fit.misfit.ratio < 1.2
+
+
+def test_a_posterior_says_that_it_takes_a_body_to_have_been_at_rest() -> None:
+    posterior = infer(hit_soon((0.0, 0.0)), sampler="laplace", seed=0, draws=100)
+    assert "Object 1 was hit too soon to show motion: taken to have been at rest." in posterior.warnings
+    assert (posterior.data["posterior"]["velocity"].values[..., 1, :] == 0).all()
 
 
 @pytest.mark.parametrize("velocity", [(-0.8, 0.0), (0.0, 0.9)])

@@ -1,6 +1,6 @@
 """A posterior out of a fit and its draws: what can be told from the data, what limits it, and every draw by name."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -135,6 +135,10 @@ def _warnings(fit: MapFit, convergence: Convergence, status: dict[str, BodyStatu
         sentences.append(
             f"The tracks look as if objects {names[first]} and {names[second]} collided, but the best fit does without."
         )
+    if at_rest := [names[body] for body in sorted(fit.believed_at_rest)]:
+        sentences.append(
+            _named(at_rest, "was hit", "were hit") + " too soon to show motion: taken to have been at rest."
+        )
     sentences += convergence.notes if convergence.converged else (convergence.sentence,)
     return [*sentences, *_untold(fit, status, drawn=drawn)]
 
@@ -151,11 +155,13 @@ def _of_tracks(tracks: Tracks) -> Iterator[str]:
             "taken."
         )
     if unsized := [body.id for body in tracks.bodies if body.radius is None]:
-        several = len(unsized) > 1
-        yield (
-            f"Object{'s' * several} {', '.join(unsized)} {'have' if several else 'has'} no radius and so cannot meet "
-            "anything: state radii, and collisions are looked for."
-        )
+        subject = _named(unsized, "has", "have")
+        yield f"{subject} no radius and so cannot meet anything: state radii, and collisions are looked for."
+
+
+def _named(objects: Sequence[str], one_does: str, several_do: str) -> str:
+    """The beginning of a sentence about some objects."""
+    return f"Object {objects[0]} {one_does}" if len(objects) == 1 else f"Objects {', '.join(objects)} {several_do}"
 
 
 def _fastest(tracks: Tracks) -> float:
@@ -179,5 +185,4 @@ def _untold(fit: MapFit, status: dict[str, BodyStatus], *, drawn: bool) -> Itera
             groups[BOUNCED if bounced else LATE if name in met else ALONE].append(name)
     for (one_does, several_do, values), group in groups.items():
         if group:
-            subject = f"Objects {', '.join(group)} {several_do}" if len(group) > 1 else f"Object {group[0]} {one_does}"
-            yield f"{subject}: {values[drawn]}, not measured."
+            yield f"{_named(group, one_does, several_do)}: {values[drawn]}, not measured."

@@ -70,6 +70,8 @@ class MapFit:
         How the residuals compare with the noise.
     evaluations
         Number of worlds simulated.
+    believed_at_rest
+        Bodies that were hit before the tracks had shown whether they moved, and that rest explains better.
     """
 
     likelihood: Likelihood
@@ -79,6 +81,7 @@ class MapFit:
     clues: Clues
     misfit: Misfit
     evaluations: int
+    believed_at_rest: frozenset[int] = frozenset()
 
     @property
     def point(self) -> Float[np.ndarray, "dimension"]:
@@ -189,7 +192,7 @@ def fit_map(
     likelihood, modes = without_idle(likelihood, distinct_modes(likelihood, climbed), structure.moving)
     converged = found[0].converged or max(climbed, key=lambda one: one.log_density).converged
     search = ModeSearch(stages.alternatives, len(attempts), not _in_doubt(attempts))
-    return MapFit(likelihood, modes, converged, search, clues, misfit, evaluations)
+    return MapFit(likelihood, modes, converged, search, clues, misfit, evaluations, clues.moving - structure.moving)
 
 
 def _refined(

@@ -1,5 +1,7 @@
 """Two discs that meet before the tracks tell how they came: what leads to one parting lies on a straight line."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 import torch
@@ -7,6 +9,7 @@ import torch
 from tests.inference.generator import Scene, observe
 from vrdp_prob.inference import default_model
 from vrdp_prob.inference.contact_ridges import ContactRidge, contact_ridges
+from vrdp_prob.inference.curved_gaussian import CurvedGaussian, SeveralClouds
 from vrdp_prob.inference.importance import Weighted, effective_count, smoothed_weights
 from vrdp_prob.inference.map_fit import MapFit, fit_map
 from vrdp_prob.inference.proposals import proposals
@@ -134,7 +137,30 @@ def test_a_contact_that_many_frames_show_before_it_has_no_ridge() -> None:
     late = scene()
     late.position -= 0.8 * late.velocity
     fitted = fit_map(observe(late, noise=0.008, frames=45, seed=1), default_model(), np.random.default_rng(0))
+    assert fitted.contacts == ((0, 1),)
     assert not contact_ridges(fitted.likelihood, fitted.point)
+
+
+def test_one_place_without_hope_does_not_decide_whether_a_ridge_helps(fit: MapFit, ridge: ContactRidge) -> None:
+    gaussian = Gaussian.from_precision(fit.point, fit.precision)
+    places = fit.likelihood.coordinates.places
+
+    def residuals(points: np.ndarray) -> np.ndarray:
+        found = fit.likelihood.residuals(points)
+        place = places["restitution", 0]
+        lost = points[:, place] > fit.point[place] + 0.5 * gaussian.sd[place]
+        return np.where(lost[:, None], 1e3 * points[:, places["velocity_x", 0], None], found)
+
+    assert ridge.helps(gaussian, residuals)
+
+
+def test_clouds_with_and_without_ridges_know_their_inverses(fit: MapFit, ridge: ContactRidge) -> None:
+    gaussian = Gaussian.from_precision(fit.point, fit.precision)
+    other = dataclasses.replace(ridge, restitution=0.5 * ridge.restitution)
+    clouds = [CurvedGaussian.straight(gaussian, None, ridges) for ridges in ((), (ridge,), (ridge, other))]
+    whitened = np.random.default_rng(2).standard_normal((5, len(fit.point)))
+    for index, cloud in enumerate(clouds):
+        assert SeveralClouds(clouds).whitened(cloud.points(whitened))[index] == pytest.approx(whitened, abs=1e-9)
 
 
 def test_cubes_have_a_ridge_along_which_their_spins_follow() -> None:

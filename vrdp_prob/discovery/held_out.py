@@ -12,11 +12,11 @@ import numpy as np
 from jaxtyping import Float
 
 from vrdp_prob.inference.parallel import in_parallel
+from vrdp_prob.inference.prior_mass import log_prior_constant
 from vrdp_prob.inference.several_videos.arrow import LOG_TWO_PI
 from vrdp_prob.inference.several_videos.ascent import STEEP
 from vrdp_prob.inference.several_videos.fitting import SharedFit
 from vrdp_prob.inference.several_videos.joint_fit import expand, expand_prior
-from vrdp_prob.inference.several_videos.prior_mass import log_prior_constant
 
 LEAST_CURVATURE = 1e-9
 

@@ -8,31 +8,36 @@ video, as the evidence of both explanations says.
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import torch
 from jaxtyping import Float
 
+from vrdp_prob.inference.clues import REST_LOOK
 from vrdp_prob.inference.mode import Mode
+from vrdp_prob.inference.modes import in_unknowns_of
+from vrdp_prob.inference.prior_mass import log_prior_constant
 from vrdp_prob.inference.refinement import Refined, mode_at
+from vrdp_prob.inference.samples import Gaussian, evaluate
 from vrdp_prob.models.likelihood import Likelihood
 from vrdp_prob.models.simulator.events import RolloutEventKind
-from vrdp_prob.models.unknowns import Structure, unknowns
+from vrdp_prob.models.unknowns import Structure
 
 BELIEVED = math.log(20.0)
 """Nats by which the evidence of rest has to exceed that of motion."""
+WORSE = 6.0
+"""Nats by which rest may explain the video worse; by chance it is more once in a hundred times."""
 SLOW = 10.0
-"""A body may rest if its release velocity is no more standard deviations from none, or if it stops before it is hit."""
+"""A body may rest if its release velocity is no more standard deviations from none; friction makes these too small."""
 
 Refine = Callable[[Likelihood, Sequence[Float[np.ndarray, "dimension"]], Likelihood], list[Refined]]
 """Refines starts in the unknowns of one density in those of another one; the best first."""
 
 
-def with_bodies_at_rest(
-    likelihood: Likelihood, structure: Structure, found: list[Refined], refined: Refine
-) -> tuple[Likelihood, Structure, list[Refined]]:
-    """The explanations of a video in which bodies rest until they are hit, where these are the better ones.
+@dataclass(frozen=True)
+class Explained:
+    """How a video is explained.
 
     Parameters
     ----------
@@ -42,62 +47,96 @@ def with_bodies_at_rest(
         Which bodies have which of its unknowns.
     found
         Its maxima, best first.
-    refined
-        How to go on from them in other unknowns.
+    evaluations
+        Worlds simulated on the way.
     """
-    mode = mode_at(likelihood, found[0])
-    for body in _slow(likelihood, mode):
-        still = replace(structure, moving=structure.moving - {body})
-        coordinates = unknowns(
-            likelihood.tracks, likelihood.model, still, likelihood.noise, model_error=likelihood.model_error
-        )
-        without = replace(likelihood, coordinates=coordinates)
-        starts = [one.point for one in found]
-        others = refined(likelihood, [*starts, _stopped(likelihood, mode, body)], without)
-        rests = mode_at(without, others[0])
-        moves = mode.log_evidence + _log_prior_at_rest(likelihood, body)
-        if rests.log_evidence > moves + BELIEVED:
-            likelihood, structure, found, mode = without, still, others, rests
-    return likelihood, structure, found
+
+    likelihood: Likelihood
+    structure: Structure
+    found: list[Refined]
+    evaluations: int = 0
+
+    def log_evidence(self, chosen: Sequence[bool] | None = None) -> float:
+        """Evidence (nats) of the heaviest of some maxima, with the constants of the priors; -inf where none is."""
+        kept = self.found if chosen is None else [one for one, used in zip(self.found, chosen, strict=True) if used]
+        constants = log_prior_constant(self.likelihood.coordinates.entries)
+        return max((mode_at(self.likelihood, one).log_evidence + constants for one in kept), default=-math.inf)
 
 
-def _motion(likelihood: Likelihood, body: int) -> list[int]:
-    """Coordinates of a body's release velocity and spin."""
-    found = [likelihood.coordinates.places.get((name, body)) for name in ("velocity_x", "velocity_y", "spin")]
-    return [place for place in found if place is not None]
+def with_bodies_at_rest(explained: Explained, refined: Refine) -> Explained:
+    """The explanation of a video in which bodies rest until they are hit, where it is the better one.
+
+    Parameters
+    ----------
+    explained
+        The explanation in which they move.
+    refined
+        How to go on in other unknowns.
+    """
+    for body in _slow(explained.likelihood, mode_at(explained.likelihood, explained.found[0])):
+        rests = _at_rest(explained, body, refined)
+        falls = explained.found[0].log_density - rests.found[0].log_density
+        evidence = rests.log_evidence()
+        # Where friction stops it before it is hit, its velocity may be anything to the curvature, and is next to none.
+        in_motion = explained.log_evidence(_in_motion_when_hit(explained, body))
+        better = math.isfinite(evidence) and evidence > in_motion + BELIEVED
+        spent = explained.evaluations + sum(one.evaluations for one in rests.found)
+        explained = replace(rests if better and falls < WORSE else explained, evaluations=spent)
+    return explained
+
+
+def _at_rest(explained: Explained, body: int, refined: Refine) -> Explained:
+    """The best explanation in which a body rests."""
+    likelihood, structure = explained.likelihood, explained.structure
+    still = replace(structure, moving=structure.moving - {body})
+    without = in_unknowns_of(likelihood, still)
+    starts = [one.point for one in explained.found]
+    stopped = _stopped(likelihood, mode_at(likelihood, explained.found[0]), body)
+    carried = likelihood.coordinates.carried(stopped, without.coordinates)
+    if np.isfinite(evaluate(without.log_density, carried[None])[0]):
+        starts.append(stopped)
+    return Explained(without, still, refined(likelihood, starts, without))
+
+
+def _in_motion_when_hit(explained: Explained, body: int) -> list[bool]:
+    """Whether a body moves at its first contact, at each of the maxima."""
+    points = torch.from_numpy(np.array([one.point for one in explained.found]))
+    with torch.no_grad():
+        events = explained.likelihood.rollout(points).events
+    events = events.where((events.first == body) | (events.second == body))
+    moving = []
+    for world in range(len(points)):
+        own = events.of_world(world)
+        hits, stops = (own.of_kind(kind).time for kind in (RolloutEventKind.COLLISION, RolloutEventKind.STOP))
+        moving.append(not (len(hits) and (stops < hits[0]).any()))
+    return moving
 
 
 def _stopped(likelihood: Likelihood, mode: Mode, body: int) -> Float[np.ndarray, "dimension"]:
     """The values that are most probable, to first order at a mode, where a body rests."""
-    own = _motion(likelihood, body)
-    covariance = np.linalg.inv(mode.precision)
+    places = likelihood.coordinates.places
+    own = [places[key] for name in ("velocity_x", "velocity_y", "spin") if (key := (name, body)) in places]
+    covariance = _covariance(mode)
     following = covariance[:, own] @ np.linalg.inv(covariance[np.ix_(own, own)])
     return np.asarray(mode.point - following @ mode.point[own])
 
 
-def _log_prior_at_rest(likelihood: Likelihood, body: int) -> float:
-    """Log prior density of no motion, which the log density of the tracks leaves out."""
-    sd = likelihood.coordinates.prior_sd[_motion(likelihood, body)]
-    return float(-np.log(np.sqrt(2 * np.pi) * sd).sum())
-
-
 def _slow(likelihood: Likelihood, mode: Mode) -> list[int]:
-    """Bodies that are hit and may have been at rest until then, the slowest first."""
+    """Bodies that are hit soon and may have been at rest until then, the slowest first."""
     with torch.no_grad():
         events = likelihood.rollout(torch.from_numpy(mode.point[None])).events
-    places = likelihood.coordinates.places
-    covariance = np.linalg.inv(mode.precision)
+    hits = events.of_kind(RolloutEventKind.COLLISION)
+    places, covariance = likelihood.coordinates.places, _covariance(mode)
     speeds: dict[int, float] = {}
-    for body in range(len(likelihood.tracks.bodies)):
-        of_body = [places.get((name, body)) for name in ("velocity_x", "velocity_y")]
-        own = [place for place in of_body if place is not None]
-        hits = events.where(
-            (events.kind == RolloutEventKind.COLLISION) & ((events.first == body) | (events.second == body))
-        )
-        if not own or not len(hits):
-            continue
-        stops = events.where((events.kind == RolloutEventKind.STOP) & (events.first == body))
-        speed = float(np.sqrt(mode.point[own] @ np.linalg.solve(covariance[np.ix_(own, own)], mode.point[own])))
-        if speed < SLOW or (stops.time < hits.time[0]).any():
-            speeds[body] = speed
-    return sorted(speeds, key=lambda body: speeds[body])
+    for time, *pair in zip(hits.time.tolist(), hits.first.tolist(), hits.second.tolist(), strict=True):
+        for body in pair:
+            if ("velocity_x", body) in places and time < likelihood.tracks.first_seen[body] + REST_LOOK:
+                own = [places[name, body] for name in ("velocity_x", "velocity_y")]
+                velocity = mode.point[own]
+                speeds[body] = float(np.sqrt(velocity @ np.linalg.solve(covariance[np.ix_(own, own)], velocity)))
+    return sorted((body for body, speed in speeds.items() if speed < SLOW), key=lambda body: speeds[body])
+
+
+def _covariance(mode: Mode) -> Float[np.ndarray, "dimension dimension"]:
+    root = Gaussian.from_precision(mode.point, mode.precision).root
+    return np.asarray(root @ root.T)

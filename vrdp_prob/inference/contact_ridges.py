@@ -33,7 +33,9 @@ SOON = 0.6
 LARGEST = 2.0
 """Change of a logarithm beyond which the ridge is followed no further."""
 WORTHWHILE = 0.2
-"""Nats by which the density one standard deviation along the ridge has to be higher than without the map."""
+"""Nats by which the density one standard deviation along the ridge has to be higher than without the map..."""
+LOST = 20.0
+"""...where what lies deeper below the mode counts as so deep, lest one place with no hope decide."""
 
 
 @dataclass(frozen=True)
@@ -76,8 +78,12 @@ class ContactRidge:
         _, sizes, ways = np.linalg.svd(self.drivers.numpy() @ gaussian.root, full_matrices=False)
         along = ways[sizes > 1e-6 * sizes.max()]
         ends = gaussian.points(np.concatenate([along, -along]))
-        bent, unbent = (robust_cost(residuals(one), None) for one in (self.bent(torch.from_numpy(ends)).numpy(), ends))
-        return bool(bent.mean() < unbent.mean() - WORTHWHILE)
+        middle = robust_cost(residuals(gaussian.mean[None]), None)
+        bent, unbent = (
+            np.minimum(robust_cost(residuals(one), None) - middle, LOST).mean()
+            for one in (self.bent(torch.from_numpy(ends)).numpy(), ends)
+        )
+        return bool(bent < unbent - WORTHWHILE)
 
     def _shift(self, points: Float[Tensor, "*batch dimension"]) -> Float[Tensor, "*batch dimension"]:
         change = ((points - self.centre) @ self.drivers.T).clamp(-LARGEST, LARGEST)

@@ -13,7 +13,7 @@ import torch
 from jaxtyping import Float
 
 from vrdp_prob.errors import InputError
-from vrdp_prob.inference.at_rest import with_bodies_at_rest
+from vrdp_prob.inference.at_rest import Explained, with_bodies_at_rest
 from vrdp_prob.inference.clues import Clues
 from vrdp_prob.inference.descent import Descent
 from vrdp_prob.inference.events import Pairs, first_contacts
@@ -169,9 +169,12 @@ def fit_map(
         evaluations += sum(one.evaluations for one in turned) + sum(one.evaluations for one in elsewhere)
         # A model error may explain what another yaw explains, too; so both are candidates under one.
         found = sorted([*found, *elsewhere], key=lambda one: -one.log_density)
-    likelihood, structure, found = with_bodies_at_rest(
-        likelihood, structure, found, lambda source, starts, other: _refined(source, starts, other, stages)
+    explained = with_bodies_at_rest(
+        Explained(likelihood, structure, found, evaluations),
+        lambda source, starts, other: _refined(source, starts, other, stages),
     )
+    likelihood, structure, found = explained.likelihood, explained.structure, explained.found
+    evaluations = explained.evaluations
     misfit = judge(likelihood, found[0].point, clues)
     for _ in range(TURNS if model_error else 0):
         error = next_model_error(likelihood, found[0].point, clues, misfit)

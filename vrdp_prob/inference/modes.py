@@ -49,10 +49,15 @@ def with_all_that_meet(
     wider = replace(
         structure, colliding=structure.colliding | met.colliding, bouncing=structure.bouncing | met.bouncing
     )
+    return wider, in_unknowns_of(likelihood, wider)
+
+
+def in_unknowns_of(likelihood: Likelihood, structure: Structure) -> Likelihood:
+    """The density in other unknowns of the same bodies."""
     coordinates = unknowns(
-        likelihood.tracks, likelihood.model, wider, likelihood.noise, model_error=likelihood.model_error
+        likelihood.tracks, likelihood.model, structure, likelihood.noise, model_error=likelihood.model_error
     )
-    return wider, replace(likelihood, coordinates=coordinates)
+    return replace(likelihood, coordinates=coordinates)
 
 
 def without_idle(
@@ -61,9 +66,7 @@ def without_idle(
     """The same modes without the unknowns of bodies that meet nobody in any of them, or too late to tell."""
     structure, idle = structure_at(likelihood, [mode.point for mode in modes], moving), _uninformed(likelihood, modes)
     structure = replace(structure, colliding=structure.colliding - idle, bouncing=structure.bouncing - idle)
-    coordinates = unknowns(
-        likelihood.tracks, likelihood.model, structure, likelihood.noise, model_error=likelihood.model_error
-    )
+    coordinates = in_unknowns_of(likelihood, structure).coordinates
     if len(coordinates) == len(likelihood.coordinates):
         return likelihood, tuple(modes)
     return restricted(likelihood, modes, coordinates)

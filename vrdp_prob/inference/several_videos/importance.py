@@ -13,11 +13,11 @@ from jaxtyping import Float
 from scipy.special import gammaln, logsumexp
 
 from vrdp_prob.inference.importance import effective_count, flattened, resampled, smoothed_weights
+from vrdp_prob.inference.prior_mass import log_prior_constant
 from vrdp_prob.inference.several_videos.arrow import ArrowGaussian
 from vrdp_prob.inference.several_videos.clouds import Clouds
 from vrdp_prob.inference.several_videos.joint_fit import JointFit
 from vrdp_prob.inference.several_videos.linking import LinkedVideo
-from vrdp_prob.inference.several_videos.prior_mass import log_prior_constant
 from vrdp_prob.inference.several_videos.shared_ridge import SharedRidge
 from vrdp_prob.inference.several_videos.slice_steps import (
     DEGREES_OF_FREEDOM,

@@ -11,6 +11,7 @@ from scipy.linalg import solve_triangular
 from vrdp_prob.inference.least_squares import jacobian, minimise
 from vrdp_prob.inference.noise_fit import NOISE_FIELDS, noise_curvature
 from vrdp_prob.inference.parallel import in_parallel
+from vrdp_prob.inference.prior_mass import log_prior_constant
 from vrdp_prob.inference.samples import evaluate_with_gradient
 from vrdp_prob.inference.several_videos.arrow import (
     LOG_TWO_PI,
@@ -20,7 +21,6 @@ from vrdp_prob.inference.several_videos.arrow import (
     SharedExpansion,
 )
 from vrdp_prob.inference.several_videos.linking import LinkedVideo, SharedNumbers
-from vrdp_prob.inference.several_videos.prior_mass import log_prior_constant
 from vrdp_prob.models.coordinates import Coordinates
 
 LOCAL_ITERATIONS = 8

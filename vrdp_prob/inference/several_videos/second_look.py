@@ -31,7 +31,7 @@ MOST = 2
 """One video in so many is looked at again."""
 SAME = 0.01
 """Fits whose residuals differ by a smaller share are taken for the same one, and unless they are far worse than those
-of other videos no further one is looked for."""
+of other videos no further one is looked for, but with its yaws turned."""
 WIDER, LEAST_SD = 2.0, 0.02
 """What the others say is believed with so many times its standard deviation, and at least with this one."""
 
@@ -131,16 +131,19 @@ class _Look:
 
     def __call__(self, doubted: tuple[MapFit, bool]) -> MapFit | None:
         """A better fit, if there is one; with a fit comes whether it is far worse than those of other videos."""
-        (best, far_worse), better = doubted, None
+        (best, far_worse), better, stays = doubted, None, False
         for look, plan in enumerate(self.plans):
+            if stays and not plan.yaws:
+                continue
             generator = stream(self.seed, f"{best.clues.tracks.video} {look}")
             found = fit_map(best.clues.tracks, self.told, generator, plan=plan, model_error=False)
             gained = best.misfit.residual_sd / found.misfit.residual_sd - 1
             if gained > SAME:
                 likelihood = plain_likelihood(found.clues, self.model, structure_of(found.likelihood.coordinates))
                 best = better = replace(found, likelihood=likelihood)
-            if (abs(gained) < SAME and not far_worse) or best.misfit.residual_sd < self.goal:
+            if best.misfit.residual_sd < self.goal:
                 break
+            stays = stays or (abs(gained) < SAME and not far_worse)
         return better
 
 

@@ -23,7 +23,7 @@ WORSE = 1.08
 FAR_WORSE = 1.5
 """...and by this one the video is not asked for the shared numbers."""
 LOOKS = 4
-"""Fits that are made anew of one video..."""
+"""Fits that are made anew of one video, with and without what the others say by turns..."""
 EXPLAINED = 1.2
 """...and one more, with the yaws of its cubes turned, if the video in the middle leaves no more than so many noise sd:
 then the model lacks nothing whose place a wrong yaw could take."""
@@ -31,7 +31,8 @@ MOST = 2
 """One video in so many is looked at again."""
 SAME = 0.01
 """Fits whose residuals differ by a smaller share are taken for the same one, and unless they are far worse than those
-of other videos no further one is looked for, but with its yaws turned."""
+of other videos no further one is looked for in the same way: with what the others say, or without, since what they say
+may be wrong where cubes whose yaws nobody measured are on wrong islands."""
 WIDER, LEAST_SD = 2.0, 0.02
 """What the others say is believed with so many times its standard deviation, and at least with this one."""
 
@@ -131,19 +132,23 @@ class _Look:
 
     def __call__(self, doubted: tuple[MapFit, bool]) -> MapFit | None:
         """A better fit, if there is one; with a fit comes whether it is far worse than those of other videos."""
-        (best, far_worse), better, stays = doubted, None, False
+        (best, far_worse), better = doubted, None
+        undecided = {True, False}  # whether what the others say is believed
         for look, plan in enumerate(self.plans):
-            if stays and not plan.yaws:
+            believing = look % 2 == 0
+            if believing not in undecided and not plan.yaws:
                 continue
             generator = stream(self.seed, f"{best.clues.tracks.video} {look}")
-            found = fit_map(best.clues.tracks, self.told, generator, plan=plan, model_error=False)
+            model = self.told if believing else self.model
+            found = fit_map(best.clues.tracks, model, generator, plan=plan, model_error=False)
             gained = best.misfit.residual_sd / found.misfit.residual_sd - 1
             if gained > SAME:
                 likelihood = plain_likelihood(found.clues, self.model, structure_of(found.likelihood.coordinates))
                 best = better = replace(found, likelihood=likelihood)
             if best.misfit.residual_sd < self.goal:
                 break
-            stays = stays or (abs(gained) < SAME and not far_worse)
+            if abs(gained) < SAME and not far_worse:
+                undecided.discard(believing)
         return better
 
 

@@ -14,7 +14,7 @@ from scipy.stats import chi2
 
 from vrdp_prob.discovery.finding import Check
 from vrdp_prob.discovery.fitted_contacts import FittedContacts
-from vrdp_prob.discovery.fitted_motion import FittedMotion, Kicks
+from vrdp_prob.discovery.fitted_motion import REACH, FittedMotion, Kicks
 from vrdp_prob.discovery.free_flight import NORMAL_95, FreeFlight
 from vrdp_prob.discovery.free_flight_checks import SEEN
 from vrdp_prob.discovery.linear import Score
@@ -23,8 +23,6 @@ from vrdp_prob.discovery.residual_model import ResidualModel, joined
 from vrdp_prob.discovery.words import number, opposite
 
 RUBBING = "tangential against normal impulse"
-REACH = 2.5
-"""Frames around a contact in which a kick would be taken for the contact."""
 FEWEST_FRAMES = 4
 """Frames of a body before and after a kick without which it does not show."""
 

@@ -33,6 +33,8 @@ GROWTH = 1e-5
 """Relative change of the radii by which its effect is found."""
 APART = 1e-3
 """Time in s by which a frame must be apart from a contact for the two not to change places under such a change."""
+REACH = 2.5
+"""Frames around a contact in which a kick would be taken for the contact."""
 TOUCHING = (RolloutEventKind.COLLISION, RolloutEventKind.WALL, RolloutEventKind.OBSTACLE, RolloutEventKind.KICK)
 """Events that change velocities at once."""
 

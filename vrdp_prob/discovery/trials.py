@@ -8,6 +8,7 @@ import numpy as np
 from jaxtyping import Float
 
 from vrdp_prob.discovery.finding import HeldOut
+from vrdp_prob.discovery.fitted_motion import REACH
 from vrdp_prob.discovery.forecast import held_out
 from vrdp_prob.discovery.held_out import Cavity, cavities
 from vrdp_prob.discovery.scores import CauseScore, happens_once
@@ -19,6 +20,7 @@ from vrdp_prob.inference.several_videos.second_look import MOST
 from vrdp_prob.models.effects.effect import Effect
 from vrdp_prob.models.parameters import Scope
 from vrdp_prob.models.physics import PhysicsModel
+from vrdp_prob.models.simulator.events import RolloutEventKind
 
 EACH_PARAMETER = 1.0
 """Nats by which a cause is believed less for each of its parameters.
@@ -32,7 +34,9 @@ OTHER_SPREAD = 1.25
 SPREAD_ROUNDS = 3
 """...and how often, since what bodies differ by hangs on what is believed of it."""
 PATCHED = 0.5
-"""Share of the videos with a cause that happens once from which on, if they stray still, it explains none of them."""
+"""Share of the videos with a cause that happens once from which on, if they stray still or it comes with a contact, it
+explains none of them."""
+MEETING = (RolloutEventKind.COLLISION, RolloutEventKind.WALL, RolloutEventKind.OBSTACLE)
 FELL = 5.0
 """Nats by which a video may be less probable with one more cause; beyond that it has lost its course of events."""
 
@@ -179,15 +183,33 @@ class Trial:
         return [int(video) for video in np.flatnonzero(self.choices[cause.name])]
 
     def patches(self, cause: Effect) -> bool:
-        """Whether a cause happens once in each of several videos, and most of them stray with it as well.
+        """Whether a cause that happens once in a video mends the fit of videos and explains none of them.
 
-        One kick explains a video or it does not. Where nearly every video needs one and is not explained by it, kicks
-        stand for something that acts all the time.
+        One kick explains a video or it does not. Where nearly every video needs one and strays with it as well, kicks
+        stand for something that acts all the time; where they come with contacts, for errors of these.
         """
-        if not happens_once(cause) or len(acting := self.acting(cause)) < 2:
+        if not happens_once(cause):
             return False
+        acting = self.acting(cause)
+        at_contacts = sum(self._comes_with_contact(cause, video) for video in acting)
+        if acting and at_contacts >= PATCHED * len(acting):
+            return True
         stray = [any(one.size for one in self.unexplained.straying[video]) for video in acting]
-        return sum(stray) > PATCHED * len(stray)
+        return len(acting) > 1 and sum(stray) > PATCHED * len(stray)
+
+    def _comes_with_contact(self, cause: Effect, video: int) -> bool:
+        """Whether a body meets something when a cause kicks it, so that the contact could as well be another one."""
+        part = self.fit.fits[video]
+        own = {one.name for one in cause.parameters if one.scope is Scope.BODY}
+        entries = part.likelihood.coordinates.entries
+        kicked = [entry.owner for entry in entries if entry.field in own and entry.owner is not None]
+        events, tracks = part.rollout.events, part.likelihood.tracks
+        kicks = events.of_kind(RolloutEventKind.KICK).time
+        is_pair = events.kind == RolloutEventKind.COLLISION
+        met = np.isin(events.first, kicked) | (is_pair & np.isin(events.second, kicked))
+        meets = np.isin(events.kind, MEETING) & met
+        reach = REACH * float(np.median(np.diff(tracks.times)))
+        return bool((np.abs(events.time[meets] - kicks[:, None]) < reach).any())
 
     def mended(self, lost: Sequence[int], *, seed: int) -> "Trial":
         """The fit with some videos searched anew; itself where that finds nothing better."""

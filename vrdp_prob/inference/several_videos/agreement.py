@@ -12,6 +12,9 @@ from vrdp_prob.inference.several_videos.arrow import Expansion, Expansions
 from vrdp_prob.inference.several_videos.following import follow
 from vrdp_prob.inference.several_videos.joint_fit import expand, expand_prior, settle
 from vrdp_prob.inference.several_videos.linking import LinkedVideo, SharedNumbers
+from vrdp_prob.inference.yaw_search import unseen_yaws
+from vrdp_prob.models.likelihood import Likelihood
+from vrdp_prob.models.parameters import ANGULAR_DRAG
 
 
 def first_guess(
@@ -19,6 +22,8 @@ def first_guess(
     videos: Sequence[LinkedVideo],
     starts: Sequence[Float[np.ndarray, "_ _"]],
     trusted: Sequence[bool],
+    *,
+    islands: bool = False,
 ) -> tuple[Float[np.ndarray, "shared"], list[Float[np.ndarray, "_"]]]:
     """Shared numbers that the videos' own fits agree on best, and each video's own numbers for them.
 
@@ -30,8 +35,10 @@ def first_guess(
         Vectors of each video at the modes of its own fit, the best first.
     trusted
         Whose fits are asked.
+    islands
+        See `consensus`.
     """
-    agreed = consensus(numbers, videos, [points[0] for points in starts], trusted).mean
+    agreed = consensus(numbers, videos, [points[0] for points in starts], trusted, islands=islands).mean
     return agreed, following_ones(numbers, videos, starts, agreed)
 
 
@@ -70,6 +77,8 @@ def consensus(
     videos: Sequence[LinkedVideo],
     points: Sequence[Float[np.ndarray, "_"]],
     trusted: Sequence[bool],
+    *,
+    islands: bool = False,
 ) -> Gaussian:
     """What the fits of some videos by themselves say together of the shared numbers.
 
@@ -81,6 +90,9 @@ def consensus(
         Vectors of each video at its own fit.
     trusted
         Whose fits are asked.
+    islands
+        Whether yaws of cubes that only contacts tell may be on wrong islands of the posterior. Each island has a decay
+        of the spins of its own, which it knows very well; such a video then says no more of it than the prior does.
     """
     places = [_shared_part(numbers, video, point) for video, point in zip(videos, points, strict=True)]
 
@@ -89,13 +101,29 @@ def consensus(
         found = expand(videos[index], places[index], own, central=True)
         # A video's fit is taken at its word, that it is a maximum: the data pull against the prior.
         prior = expand_prior(numbers, places[index])
-        return replace(found, shared_gradient=-prior.gradient, local_gradient=np.zeros_like(own))
+        believed = replace(found, shared_gradient=-prior.gradient, local_gradient=np.zeros_like(own))
+        doubted = islands and tells_yaws_by_contacts(videos[index].likelihood, points[index])
+        return _on_an_island(numbers, believed) if doubted else believed
 
     chosen = np.flatnonzero(trusted).tolist()
     expansions = Expansions(expand_prior(numbers, numbers.prior_mean), tuple(in_parallel(expanded, chosen)))
     asked = [places[index] for index in chosen]
     agreed = expansions.consensus(numbers.prior_mean, asked)
     return Gaussian(np.clip(agreed, np.min(asked, axis=0), np.max(asked, axis=0)), expansions.root)
+
+
+def tells_yaws_by_contacts(likelihood: Likelihood, point: Float[np.ndarray, "dimension"]) -> bool:
+    """Whether there is a cube whose yaw nothing but contacts tells."""
+    return next(unseen_yaws(likelihood, point), None) is not None
+
+
+def _on_an_island(numbers: SharedNumbers, found: Expansion) -> Expansion:
+    """What a video says, of the decay of spins no more than the prior does."""
+    factors = np.ones(len(numbers))
+    for place, entry in enumerate(numbers.entries):
+        if entry.field == ANGULAR_DRAG.name and (told := found.reduced[place, place]) > 0:
+            factors[place] = min(1.0, 1 / (entry.prior.sd * np.sqrt(told)))
+    return replace(found, shared=found.shared * factors)
 
 
 def _shared_part(

@@ -16,7 +16,7 @@ from vrdp_prob.inference.mode import Mode
 from vrdp_prob.inference.model_error_fit import TURNS, next_model_error
 from vrdp_prob.inference.parallel import in_processes
 from vrdp_prob.inference.plan import IN_DOUBT, FitPlan
-from vrdp_prob.inference.several_videos.agreement import first_guess, following_ones
+from vrdp_prob.inference.several_videos.agreement import first_guess, following_ones, tells_yaws_by_contacts
 from vrdp_prob.inference.several_videos.ascent import ROUNDS, ImpossibleStartError, climb
 from vrdp_prob.inference.several_videos.joint_fit import JointFit, with_alternatives
 from vrdp_prob.inference.several_videos.linking import LinkedVideo, SharedNumbers, check_names, link
@@ -225,28 +225,62 @@ def fit_together(
     with (progress or SilentProgress()).stage("Fitting each video (MAP)", total=len(videos)) as advance:
         fitted = partial(fit_alone, model=model, seed=seed, plan=plan, model_error=model_error)
         alone = in_processes(fitted, videos, advance=advance)
-        fits = look_again(alone, doubtful(alone), model, shared, seed=seed)
-    numbers, linked, guess = _guessed(fits, model, shared)
-    seen = [_with_misfit(fit, video, guess[0], own) for fit, video, own in zip(fits, linked, guess[1], strict=True)]
-    lost = [k for k, fit in enumerate(fits) if seen[k].misfit.residual_sd > WORSE * fit.misfit.residual_sd]
-    found_again = look_again(seen, doubtful(seen, lost), model, shared, seed=seed)
-    if any(one is not other for one, other in zip(found_again, seen, strict=True)):
-        pairs = zip(found_again, seen, fits, strict=True)
-        fits = [fit if one is other else one for one, other, fit in pairs]
-        numbers, linked, guess = _guessed(fits, model, shared)
+    fits, joint = _joined(alone, model, shared, seed=seed)
+    if _strays(fits, joint) and any(tells_yaws_by_contacts(fit.likelihood, fit.point) for fit in fits):
+        others = _joined(alone, model, shared, seed=seed, islands=True)
+        fits, joint = max((fits, joint), others, key=lambda one: one[1].log_density)
     structures = tuple(structure_of(one.likelihood.coordinates) for one in fits)
-    joint = _asking_dissenters(climb(numbers, linked, *guess), fits)
     names = None if shared is None else tuple(shared)
     found = _finished(joint, model, fits, structures, names, model_error=model_error)
     return replace(found, joint=_with_modes(found.joint, fits))
 
 
+def _joined(
+    alone: Sequence[MapFit],
+    model: PhysicsModel,
+    shared: Sequence[str] | None,
+    *,
+    seed: int,
+    islands: bool = False,
+) -> tuple[list[MapFit], JointFit]:
+    """The videos' own fits, some of them searched anew, and the joint fit from what they agree on.
+
+    Parameters
+    ----------
+    alone
+        The videos' own fits.
+    model, shared, seed
+        See `fit_together`.
+    islands
+        See `consensus`.
+    """
+    fits = look_again(alone, doubtful(alone), model, shared, seed=seed, islands=islands)
+    numbers, linked, guess = _guessed(fits, model, shared, islands=islands)
+    seen = [_with_misfit(fit, video, guess[0], own) for fit, video, own in zip(fits, linked, guess[1], strict=True)]
+    lost = [k for k, fit in enumerate(fits) if seen[k].misfit.residual_sd > WORSE * fit.misfit.residual_sd]
+    found_again = look_again(seen, doubtful(seen, lost), model, shared, seed=seed, islands=islands)
+    if any(one is not other for one, other in zip(found_again, seen, strict=True)):
+        pairs = zip(found_again, seen, fits, strict=True)
+        fits = [fit if one is other else one for one, other, fit in pairs]
+        numbers, linked, guess = _guessed(fits, model, shared, islands=islands)
+    return fits, _asking_dissenters(climb(numbers, linked, *guess), fits)
+
+
+def _strays(fits: Sequence[MapFit], joint: JointFit) -> bool:
+    """Whether some video is explained worse in a joint fit than by itself."""
+    return any(
+        _with_misfit(fit, video, joint.gaussian.mean, own.centre).misfit.residual_sd > WORSE * fit.misfit.residual_sd
+        for fit, video, own in zip(fits, joint.videos, joint.gaussian.locals, strict=True)
+    )
+
+
 def _guessed(
-    fits: Sequence[MapFit], model: PhysicsModel, shared: Sequence[str] | None
+    fits: Sequence[MapFit], model: PhysicsModel, shared: Sequence[str] | None, *, islands: bool
 ) -> tuple[SharedNumbers, tuple[LinkedVideo, ...], tuple[Float[np.ndarray, "shared"], list[Float[np.ndarray, "_"]]]]:
     """The videos linked by what they share, and where their climb begins."""
     numbers, linked = link_fits(fits, model, shared)
-    return numbers, linked, first_guess(numbers, linked, carried_starts(fits, linked), trusted(fits).tolist())
+    starts = carried_starts(fits, linked)
+    return numbers, linked, first_guess(numbers, linked, starts, trusted(fits).tolist(), islands=islands)
 
 
 def _with_misfit(

@@ -76,6 +76,7 @@ def look_again(
     *,
     seed: int,
     looks: int = LOOKS,
+    islands: bool = False,
 ) -> list[MapFit]:
     """The fits of single videos, with some of them searched anew, and improved where that is better.
 
@@ -93,6 +94,8 @@ def look_again(
         Seed of the searches.
     looks
         Fits that are made anew of one video, at most.
+    islands
+        See `consensus`.
     """
     if not chosen:
         return list(fits)
@@ -100,7 +103,7 @@ def look_again(
     goal = WORSE * float(np.median([one.misfit.residual_sd for one in fits]))
     explained = float(np.median([one.misfit.ratio for one in fits])) < EXPLAINED
     plans = (IN_DOUBT,) * looks + ((TURNING,) if explained else ())
-    look = _Look(model, _told(fits, model, shared), goal, seed, plans)
+    look = _Look(model, _told(fits, model, shared, islands=islands), goal, seed, plans)
     doubted = [(fits[index], bool(excess[index] >= FAR_WORSE)) for index in chosen]
     improved = dict(zip(chosen, in_processes(look, doubted), strict=True))
     return [improved.get(index) or fit for index, fit in enumerate(fits)]
@@ -158,11 +161,11 @@ def _excess(fits: Sequence[MapFit]) -> np.ndarray:
     return ratios / np.median(ratios)
 
 
-def _told(fits: Sequence[MapFit], model: PhysicsModel, shared: Sequence[str] | None) -> PhysicsModel:
+def _told(fits: Sequence[MapFit], model: PhysicsModel, shared: Sequence[str] | None, *, islands: bool) -> PhysicsModel:
     """The model with what the trusted videos say of shared parameters as their prior."""
     numbers, videos = link_fits(fits, model, shared)
     points = [starts[0] for starts in carried_starts(fits, videos)]
-    found = consensus(numbers, videos, points, trusted(fits).tolist())
+    found = consensus(numbers, videos, points, trusted(fits).tolist(), islands=islands)
     known = dict(zip(numbers.keys, zip(found.mean, found.sd, strict=True), strict=True))
     beliefs = {}
     for parameter in model.parameters:

@@ -14,7 +14,7 @@ from torch import Tensor
 
 from vrdp_prob.models.likelihood import EVENT_LIMIT, Likelihood
 from vrdp_prob.models.scenery import Scenery
-from vrdp_prob.models.simulator.events import EventTable, RolloutEventKind
+from vrdp_prob.models.simulator.events import CONTACTS, EventTable, RolloutEventKind
 from vrdp_prob.models.simulator.rollout import simulate
 from vrdp_prob.models.simulator.worlds import Worlds
 from vrdp_prob.scene import Tracks
@@ -35,7 +35,7 @@ APART = 1e-3
 """Time in s by which a frame must be apart from a contact for the two not to change places under such a change."""
 REACH = 2.5
 """Frames around a contact in which a kick would be taken for the contact."""
-TOUCHING = (RolloutEventKind.COLLISION, RolloutEventKind.WALL, RolloutEventKind.OBSTACLE, RolloutEventKind.KICK)
+TOUCHING = (*CONTACTS, RolloutEventKind.KICK)
 """Events that change velocities at once."""
 
 
@@ -161,9 +161,8 @@ class FittedMotion:
         """Times in s at which the velocity of a body changes at once."""
         events = self.events
         touching = np.isin(events.kind, TOUCHING)
-        both = events.kind == RolloutEventKind.COLLISION
         kicks = events.kind == RolloutEventKind.KICK
-        return np.sort(events.time[touching & ((events.first == body) | (both & (events.second == body)) | kicks)])
+        return np.sort(events.time[touching & (events.concerns([body]) | kicks)])
 
     def pushed(self, acceleration: Float[np.ndarray, "time body 2 column"]) -> Float[np.ndarray, "time body 3 column"]:
         """Changes of all places (m) and angles (rad) by further accelerations (m/s^2) of what moves."""

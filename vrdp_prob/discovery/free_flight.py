@@ -16,7 +16,7 @@ from vrdp_prob.discovery.free_flight_patterns import Pattern, Scales, patterns
 from vrdp_prob.discovery.linear import Score
 from vrdp_prob.discovery.residual_model import ResidualModel
 from vrdp_prob.models.effects.body_friction import FRICTION_RATIO
-from vrdp_prob.models.simulator.events import RolloutEventKind
+from vrdp_prob.models.simulator.events import CONTACTS, RolloutEventKind
 
 NORMAL_95 = 1.96
 FRICTION = FRICTION_RATIO.name
@@ -111,9 +111,7 @@ def after_contacts_freed(model: ResidualModel) -> ResidualModel:
     columns = []
     for video in model.videos:
         events = video.motion.events
-        touching = events.where(
-            np.isin(events.kind, (RolloutEventKind.COLLISION, RolloutEventKind.WALL, RolloutEventKind.OBSTACLE))
-        )
+        touching = events.where(np.isin(events.kind, CONTACTS))
         both = touching.kind == RolloutEventKind.COLLISION
         times = np.concatenate([touching.time, touching.time[both]])
         bodies = np.concatenate([touching.first, touching.second[both]])

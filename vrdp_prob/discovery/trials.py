@@ -20,7 +20,7 @@ from vrdp_prob.inference.several_videos.second_look import MOST
 from vrdp_prob.models.effects.effect import Effect
 from vrdp_prob.models.parameters import Scope
 from vrdp_prob.models.physics import PhysicsModel
-from vrdp_prob.models.simulator.events import RolloutEventKind
+from vrdp_prob.models.simulator.events import CONTACTS, RolloutEventKind
 
 EACH_PARAMETER = 1.0
 """Nats by which a cause is believed less for each of its parameters.
@@ -36,7 +36,6 @@ SPREAD_ROUNDS = 3
 PATCHED = 0.5
 """Share of the videos with a cause that happens once from which on, if they stray still or it comes with a contact, it
 explains none of them."""
-MEETING = (RolloutEventKind.COLLISION, RolloutEventKind.WALL, RolloutEventKind.OBSTACLE)
 FELL = 5.0
 """Nats by which a video may be less probable with one more cause; beyond that it has lost its course of events."""
 
@@ -205,9 +204,7 @@ class Trial:
         kicked = [entry.owner for entry in entries if entry.field in own and entry.owner is not None]
         events, tracks = part.rollout.events, part.likelihood.tracks
         kicks = events.of_kind(RolloutEventKind.KICK).time
-        is_pair = events.kind == RolloutEventKind.COLLISION
-        met = np.isin(events.first, kicked) | (is_pair & np.isin(events.second, kicked))
-        meets = np.isin(events.kind, MEETING) & met
+        meets = np.isin(events.kind, CONTACTS) & events.concerns(kicked)
         reach = REACH * float(np.median(np.diff(tracks.times)))
         return bool((np.abs(events.time[meets] - kicks[:, None]) < reach).any())
 

@@ -9,6 +9,7 @@ video, as the evidence of both explanations says.
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 import torch
@@ -56,11 +57,16 @@ class Explained:
     found: list[Refined]
     evaluations: int = 0
 
+    @cached_property
+    def modes(self) -> list[Mode]:
+        """The maxima with the curvature around them."""
+        return [mode_at(self.likelihood, one) for one in self.found]
+
     def log_evidence(self, chosen: Sequence[bool] | None = None) -> float:
-        """Evidence (nats) of the heaviest of some maxima, with the constants of the priors; -inf where none is."""
-        kept = self.found if chosen is None else [one for one, used in zip(self.found, chosen, strict=True) if used]
+        """Evidence (nats) of the heaviest of some modes, with the constants of the priors; -inf where there is none."""
+        kept = self.modes if chosen is None else [mode for mode, used in zip(self.modes, chosen, strict=True) if used]
         constants = log_prior_constant(self.likelihood.coordinates.entries)
-        return max((mode_at(self.likelihood, one).log_evidence + constants for one in kept), default=-math.inf)
+        return max((mode.log_evidence + constants for mode in kept), default=-math.inf)
 
 
 def with_bodies_at_rest(explained: Explained, refined: Refine) -> Explained:
@@ -73,16 +79,17 @@ def with_bodies_at_rest(explained: Explained, refined: Refine) -> Explained:
     refined
         How to go on in other unknowns.
     """
-    for body in _slow(explained.likelihood, mode_at(explained.likelihood, explained.found[0])):
+    evaluations = explained.evaluations
+    for body in _slow(explained):
         rests = _at_rest(explained, body, refined)
         falls = explained.found[0].log_density - rests.found[0].log_density
         evidence = rests.log_evidence()
         # Where friction stops it before it is hit, its velocity may be anything to the curvature, and is next to none.
         in_motion = explained.log_evidence(_in_motion_when_hit(explained, body))
         better = math.isfinite(evidence) and evidence > in_motion + BELIEVED
-        spent = explained.evaluations + sum(one.evaluations for one in rests.found)
-        explained = replace(rests if better and falls < WORSE else explained, evaluations=spent)
-    return explained
+        evaluations += sum(one.evaluations for one in rests.found)
+        explained = rests if better and falls < WORSE else explained
+    return replace(explained, evaluations=evaluations)
 
 
 def _at_rest(explained: Explained, body: int, refined: Refine) -> Explained:
@@ -91,7 +98,7 @@ def _at_rest(explained: Explained, body: int, refined: Refine) -> Explained:
     still = replace(structure, moving=structure.moving - {body})
     without = in_unknowns_of(likelihood, still)
     starts = [one.point for one in explained.found]
-    stopped = _stopped(likelihood, mode_at(likelihood, explained.found[0]), body)
+    stopped = _stopped(likelihood, explained.modes[0], body)
     carried = likelihood.coordinates.carried(stopped, without.coordinates)
     if np.isfinite(evaluate(without.log_density, carried[None])[0]):
         starts.append(stopped)
@@ -103,7 +110,7 @@ def _in_motion_when_hit(explained: Explained, body: int) -> list[bool]:
     points = torch.from_numpy(np.array([one.point for one in explained.found]))
     with torch.no_grad():
         events = explained.likelihood.rollout(points).events
-    events = events.where((events.first == body) | (events.second == body))
+    events = events.where(events.concerns([body]))
     moving = []
     for world in range(len(points)):
         own = events.of_world(world)
@@ -121,19 +128,27 @@ def _stopped(likelihood: Likelihood, mode: Mode, body: int) -> Float[np.ndarray,
     return np.asarray(mode.point - following @ mode.point[own])
 
 
-def _slow(likelihood: Likelihood, mode: Mode) -> list[int]:
+def _slow(explained: Explained) -> list[int]:
     """Bodies that are hit soon and may have been at rest until then, the slowest first."""
+    likelihood = explained.likelihood
     with torch.no_grad():
-        events = likelihood.rollout(torch.from_numpy(mode.point[None])).events
-    hits = events.of_kind(RolloutEventKind.COLLISION)
-    places, covariance = likelihood.coordinates.places, _covariance(mode)
+        hits = likelihood.rollout(torch.from_numpy(explained.found[0].point[None])).events
+    hits = hits.of_kind(RolloutEventKind.COLLISION)
+    places, first_seen = likelihood.coordinates.places, likelihood.tracks.first_seen
+    soon = [
+        body
+        for time, *pair in zip(hits.time.tolist(), hits.first.tolist(), hits.second.tolist(), strict=True)
+        for body in pair
+        if ("velocity_x", body) in places and time < first_seen[body] + REST_LOOK
+    ]
+    if not soon:
+        return []
+    covariance = _covariance(explained.modes[0])
     speeds: dict[int, float] = {}
-    for time, *pair in zip(hits.time.tolist(), hits.first.tolist(), hits.second.tolist(), strict=True):
-        for body in pair:
-            if ("velocity_x", body) in places and time < likelihood.tracks.first_seen[body] + REST_LOOK:
-                own = [places[name, body] for name in ("velocity_x", "velocity_y")]
-                velocity = mode.point[own]
-                speeds[body] = float(np.sqrt(velocity @ np.linalg.solve(covariance[np.ix_(own, own)], velocity)))
+    for body in soon:
+        own = [places[name, body] for name in ("velocity_x", "velocity_y")]
+        velocity = explained.modes[0].point[own]
+        speeds[body] = float(np.sqrt(velocity @ np.linalg.solve(covariance[np.ix_(own, own)], velocity)))
     return sorted((body for body, speed in speeds.items() if speed < SLOW), key=lambda body: speeds[body])
 
 

@@ -24,7 +24,7 @@ from vrdp_prob.inference.samples import Gaussian
 from vrdp_prob.models.coordinates import Coordinates
 from vrdp_prob.models.likelihood import Likelihood
 from vrdp_prob.models.parameters import MASS, RESTITUTION
-from vrdp_prob.models.simulator.events import RolloutEventKind
+from vrdp_prob.models.simulator.events import CONTACTS, RolloutEventKind
 from vrdp_prob.models.simulator.worlds import INERTIA_FACTORS
 from vrdp_prob.scene import Body
 
@@ -118,10 +118,9 @@ def contact_ridges(likelihood: Likelihood, point: Float[np.ndarray, "dimension"]
         rollout = likelihood.rollout(torch.from_numpy(point[None]))
         masses = likelihood.coordinates.quantities(torch.from_numpy(point[None]))[MASS.name][0].numpy()
     events, tracks = rollout.events, likelihood.tracks
-    contacts = (RolloutEventKind.COLLISION, RolloutEventKind.WALL, RolloutEventKind.OBSTACLE)
     met: set[int] = set()
     found = []
-    for number in np.flatnonzero(np.isin(events.kind, contacts)):
+    for number in np.flatnonzero(np.isin(events.kind, CONTACTS)):
         is_pair = events.kind[number] == RolloutEventKind.COLLISION
         pair = [int(events.first[number]), *([int(events.second[number])] if is_pair else [])]
         after = events.time[number] - tracks.first_seen[pair]

@@ -197,8 +197,10 @@ class SeveralClouds:
 
     def _beside_straight_ridges(
         self, points: Float[np.ndarray, "point dimension"]
-    ) -> Float[np.ndarray, "component point dimension"]:
-        """Points as they lie beside the ridges of each cloud before these are bent."""
+    ) -> Float[np.ndarray, "component_or_one point dimension"]:
+        """Points as they lie beside the ridges of each cloud before these are bent; once where no cloud has any."""
+        if not any(self._ridges):
+            return points[None]
         straight = np.tile(points, (len(self._ridges), 1, 1))
         for index, ridges in enumerate(self._ridges):
             for ridge in reversed(ridges):

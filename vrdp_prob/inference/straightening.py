@@ -138,13 +138,13 @@ class Straightening:
 
 
 def all_straightened(
-    shears: Sequence[Straightening | None], points: Float[np.ndarray, "shear point dimension"]
+    shears: Sequence[Straightening | None], points: Float[np.ndarray, "shear_or_one point dimension"]
 ) -> Float[np.ndarray, "shear point dimension"]:
     """The points of each of several shears along the same rates, straightened; None leaves them as they are.
 
     This is the inverse of `bent`: the shift depends on the rates alone, which it leaves as they are.
     """
-    straight = points.copy()
+    straight = np.broadcast_to(points, (len(shears), *points.shape[1:])).copy()
     known = [(index, shear) for index, shear in enumerate(shears) if shear is not None]
     if not known:
         return straight
@@ -152,7 +152,7 @@ def all_straightened(
     centres = np.stack([shear.centre.numpy() for _, shear in known]) @ directions.T
     displacement = np.stack([shear.displacement.numpy() for _, shear in known])
     moved = [index for index, _ in known]
-    change = np.minimum(points[moved] @ directions.T - centres[:, None], LARGEST)
+    change = np.minimum((points if len(points) == 1 else points[moved]) @ directions.T - centres[:, None], LARGEST)
     straight[moved] -= np.matmul(np.expm1(change) - change, displacement)
     return straight
 

@@ -65,6 +65,11 @@ def unseen_yaws(likelihood: Likelihood, point: Float[np.ndarray, "dimension"]) -
             yield body, before[body]
 
 
+def tells_yaws_by_contacts(likelihood: Likelihood, point: Float[np.ndarray, "dimension"]) -> bool:
+    """Whether there is a cube whose yaw nothing but contacts tells."""
+    return next(unseen_yaws(likelihood, point), None) is not None
+
+
 def bodies_met(likelihood: Likelihood, point: Float[np.ndarray, "dimension"], body: int) -> frozenset[int]:
     """A body and all that it collides with at a point."""
     with torch.no_grad():

@@ -12,8 +12,7 @@ from vrdp_prob.inference.several_videos.arrow import Expansion, Expansions
 from vrdp_prob.inference.several_videos.following import follow
 from vrdp_prob.inference.several_videos.joint_fit import expand, expand_prior, settle
 from vrdp_prob.inference.several_videos.linking import LinkedVideo, SharedNumbers
-from vrdp_prob.inference.yaw_search import unseen_yaws
-from vrdp_prob.models.likelihood import Likelihood
+from vrdp_prob.inference.yaw_search import tells_yaws_by_contacts
 from vrdp_prob.models.parameters import ANGULAR_DRAG
 
 
@@ -110,11 +109,6 @@ def consensus(
     asked = [places[index] for index in chosen]
     agreed = expansions.consensus(numbers.prior_mean, asked)
     return Gaussian(np.clip(agreed, np.min(asked, axis=0), np.max(asked, axis=0)), expansions.root)
-
-
-def tells_yaws_by_contacts(likelihood: Likelihood, point: Float[np.ndarray, "dimension"]) -> bool:
-    """Whether there is a cube whose yaw nothing but contacts tells."""
-    return next(unseen_yaws(likelihood, point), None) is not None
 
 
 def _on_an_island(numbers: SharedNumbers, found: Expansion) -> Expansion:

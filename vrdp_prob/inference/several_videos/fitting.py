@@ -7,7 +7,6 @@ from functools import partial
 from pathlib import Path
 
 import numpy as np
-from jaxtyping import Float
 
 from vrdp_prob.errors import InputError
 from vrdp_prob.inference.map_fit import MapFit
@@ -16,12 +15,13 @@ from vrdp_prob.inference.mode import Mode
 from vrdp_prob.inference.model_error_fit import TURNS, next_model_error
 from vrdp_prob.inference.parallel import in_processes
 from vrdp_prob.inference.plan import IN_DOUBT, FitPlan
-from vrdp_prob.inference.several_videos.agreement import first_guess, following_ones, tells_yaws_by_contacts
+from vrdp_prob.inference.several_videos.agreement import following_ones
 from vrdp_prob.inference.several_videos.ascent import ROUNDS, ImpossibleStartError, climb
+from vrdp_prob.inference.several_videos.joining import joined
 from vrdp_prob.inference.several_videos.joint_fit import JointFit, with_alternatives
-from vrdp_prob.inference.several_videos.linking import LinkedVideo, SharedNumbers, check_names, link
+from vrdp_prob.inference.several_videos.linking import check_names, link
 from vrdp_prob.inference.several_videos.parts import carried_starts, fit_alone, link_fits, structure_of
-from vrdp_prob.inference.several_videos.second_look import FAR_WORSE, WORSE, doubtful, look_again, trusted
+from vrdp_prob.inference.several_videos.second_look import look_again
 from vrdp_prob.inference.several_videos.transfer import first_numbers
 from vrdp_prob.models.effects.effect import Effect
 from vrdp_prob.models.likelihood import Likelihood
@@ -225,93 +225,11 @@ def fit_together(
     with (progress or SilentProgress()).stage("Fitting each video (MAP)", total=len(videos)) as advance:
         fitted = partial(fit_alone, model=model, seed=seed, plan=plan, model_error=model_error)
         alone = in_processes(fitted, videos, advance=advance)
-    fits, joint = _joined(alone, model, shared, seed=seed)
-    if _strays(fits, joint) and any(tells_yaws_by_contacts(fit.likelihood, fit.point) for fit in fits):
-        others = _joined(alone, model, shared, seed=seed, islands=True)
-        fits, joint = max((fits, joint), others, key=lambda one: one[1].log_density)
+        fits, joint = joined(alone, model, shared, seed=seed)
     structures = tuple(structure_of(one.likelihood.coordinates) for one in fits)
     names = None if shared is None else tuple(shared)
     found = _finished(joint, model, fits, structures, names, model_error=model_error)
     return replace(found, joint=_with_modes(found.joint, fits))
-
-
-def _joined(
-    alone: Sequence[MapFit],
-    model: PhysicsModel,
-    shared: Sequence[str] | None,
-    *,
-    seed: int,
-    islands: bool = False,
-) -> tuple[list[MapFit], JointFit]:
-    """The videos' own fits, some of them searched anew, and the joint fit from what they agree on.
-
-    Parameters
-    ----------
-    alone
-        The videos' own fits.
-    model, shared, seed
-        See `fit_together`.
-    islands
-        See `consensus`.
-    """
-    fits = look_again(alone, doubtful(alone), model, shared, seed=seed, islands=islands)
-    numbers, linked, guess = _guessed(fits, model, shared, islands=islands)
-    seen = [_with_misfit(fit, video, guess[0], own) for fit, video, own in zip(fits, linked, guess[1], strict=True)]
-    lost = [k for k, fit in enumerate(fits) if seen[k].misfit.residual_sd > WORSE * fit.misfit.residual_sd]
-    found_again = look_again(seen, doubtful(seen, lost), model, shared, seed=seed, islands=islands)
-    if any(one is not other for one, other in zip(found_again, seen, strict=True)):
-        pairs = zip(found_again, seen, fits, strict=True)
-        fits = [fit if one is other else one for one, other, fit in pairs]
-        numbers, linked, guess = _guessed(fits, model, shared, islands=islands)
-    return fits, _asking_dissenters(climb(numbers, linked, *guess), fits)
-
-
-def _strays(fits: Sequence[MapFit], joint: JointFit) -> bool:
-    """Whether some video is explained worse in a joint fit than by itself."""
-    return any(
-        _with_misfit(fit, video, joint.gaussian.mean, own.centre).misfit.residual_sd > WORSE * fit.misfit.residual_sd
-        for fit, video, own in zip(fits, joint.videos, joint.gaussian.locals, strict=True)
-    )
-
-
-def _guessed(
-    fits: Sequence[MapFit], model: PhysicsModel, shared: Sequence[str] | None, *, islands: bool
-) -> tuple[SharedNumbers, tuple[LinkedVideo, ...], tuple[Float[np.ndarray, "shared"], list[Float[np.ndarray, "_"]]]]:
-    """The videos linked by what they share, and where their climb begins."""
-    numbers, linked = link_fits(fits, model, shared)
-    starts = carried_starts(fits, linked)
-    return numbers, linked, first_guess(numbers, linked, starts, trusted(fits).tolist(), islands=islands)
-
-
-def _with_misfit(
-    fit: MapFit, video: LinkedVideo, shared: Float[np.ndarray, "shared"], own: Float[np.ndarray, "_"]
-) -> MapFit:
-    """A video's own fit with what its residuals are where it shares numbers with the others."""
-    point = video.points(shared, own)
-    return replace(fit, misfit=judge(video.likelihood, point, fit.clues))
-
-
-def _asking_dissenters(joint: JointFit, fits: Sequence[MapFit]) -> JointFit:
-    """The joint fit, or a better one from what the video says alone that is explained far worse among the others.
-
-    Several videos that are explained in the same wrong way outvote the one in which that shows.
-    """
-    if len(fits) == 1:
-        return joint
-    worse = [
-        _with_misfit(fit, video, joint.gaussian.mean, own.centre).misfit.residual_sd / fit.misfit.residual_sd
-        for fit, video, own in zip(fits, joint.videos, joint.gaussian.locals, strict=True)
-    ]
-    dissenter = int(np.argmax(worse))
-    if worse[dissenter] < FAR_WORSE:
-        return joint
-    starts = carried_starts(fits, joint.videos)
-    asked = [index == dissenter for index in range(len(fits))]
-    try:
-        other = climb(joint.numbers, joint.videos, *first_guess(joint.numbers, joint.videos, starts, asked))
-    except ImpossibleStartError:  # a video has no world at what the dissenter says
-        return joint
-    return max(joint, other, key=lambda one: one.log_density)
 
 
 def _with_modes(joint: JointFit, fits: Sequence[MapFit]) -> JointFit:

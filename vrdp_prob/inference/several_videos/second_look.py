@@ -102,8 +102,8 @@ def look_again(
     excess = _excess(fits)
     goal = WORSE * float(np.median([one.misfit.residual_sd for one in fits]))
     explained = float(np.median([one.misfit.ratio for one in fits])) < EXPLAINED
-    plans = (IN_DOUBT,) * looks + ((TURNING,) if explained else ())
-    look = _Look(model, _told(fits, model, shared, islands=islands), goal, seed, plans)
+    ways = [(look % 2 == 0, IN_DOUBT) for look in range(looks)] + ([(True, TURNING)] if explained else [])
+    look = _Look(model, _told(fits, model, shared, islands=islands), goal, seed, tuple(ways))
     doubted = [(fits[index], bool(excess[index] >= FAR_WORSE)) for index in chosen]
     improved = dict(zip(chosen, in_processes(look, doubted), strict=True))
     return [improved.get(index) or fit for index, fit in enumerate(fits)]
@@ -123,24 +123,24 @@ class _Look:
         Residuals in units of the noise that are good enough.
     seed
         Seed of the searches.
-    plans
-        How each of them is made, at most.
+    ways
+        Whether each of them believes what other videos say, and how it is made.
     """
 
     model: PhysicsModel
     told: PhysicsModel
     goal: float
     seed: int
-    plans: tuple[FitPlan, ...]
+    ways: tuple[tuple[bool, FitPlan], ...]
 
     def __call__(self, doubted: tuple[MapFit, bool]) -> MapFit | None:
         """A better fit, if there is one; with a fit comes whether it is far worse than those of other videos."""
         (best, far_worse), better = doubted, None
-        undecided = {True, False}  # whether what the others say is believed
-        for look, plan in enumerate(self.plans):
-            believing = look % 2 == 0
-            if believing not in undecided and not plan.yaws:
+        settled: set[tuple[bool, FitPlan]] = set()
+        for look, way in enumerate(self.ways):
+            if way in settled:
                 continue
+            believing, plan = way
             generator = stream(self.seed, f"{best.clues.tracks.video} {look}")
             model = self.told if believing else self.model
             found = fit_map(best.clues.tracks, model, generator, plan=plan, model_error=False)
@@ -151,7 +151,7 @@ class _Look:
             if best.misfit.residual_sd < self.goal:
                 break
             if abs(gained) < SAME and not far_worse:
-                undecided.discard(believing)
+                settled.add(way)
         return better
 
 

@@ -1,11 +1,12 @@
 """The events of simulated worlds as a table."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import IntEnum
 from typing import NamedTuple
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 
 
 class RolloutEventKind(IntEnum):
@@ -21,6 +22,10 @@ class RolloutEventKind(IntEnum):
     KICK = 5
     CROSSING = 6
     """A body crosses the boundary of an effect."""
+
+
+CONTACTS = (RolloutEventKind.COLLISION, RolloutEventKind.WALL, RolloutEventKind.OBSTACLE)
+"""Events at which a body meets something."""
 
 
 class Tapes(NamedTuple):
@@ -79,6 +84,11 @@ class EventTable:
     def of_kind(self, kind: RolloutEventKind) -> "EventTable":
         """The events of one kind."""
         return self.where(self.kind == kind)
+
+    def concerns(self, bodies: Sequence[int] | Int[np.ndarray, "body"]) -> Bool[np.ndarray, "event"]:
+        """Whether one of some bodies takes part in each event."""
+        is_pair = self.kind == RolloutEventKind.COLLISION
+        return np.asarray(np.isin(self.first, bodies) | (is_pair & np.isin(self.second, bodies)))
 
     def where(self, keep: np.ndarray) -> "EventTable":
         """Some of the events, by a boolean or index array with the axis `event`."""

@@ -1,0 +1,100 @@
+"""From each video's own fit to a joint one: second looks, what all agree on, and the climb from there."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from jaxtyping import Float
+
+from vrdp_prob.inference.map_fit import MapFit
+from vrdp_prob.inference.misfit import judge
+from vrdp_prob.inference.several_videos.agreement import first_guess
+from vrdp_prob.inference.several_videos.ascent import ImpossibleStartError, climb
+from vrdp_prob.inference.several_videos.joint_fit import JointFit
+from vrdp_prob.inference.several_videos.linking import LinkedVideo, SharedNumbers
+from vrdp_prob.inference.several_videos.parts import carried_starts, link_fits
+from vrdp_prob.inference.several_videos.second_look import FAR_WORSE, WORSE, doubtful, look_again, trusted
+from vrdp_prob.inference.yaw_search import tells_yaws_by_contacts
+from vrdp_prob.models.physics import PhysicsModel
+
+
+def joined(
+    alone: Sequence[MapFit], model: PhysicsModel, shared: Sequence[str] | None, *, seed: int
+) -> tuple[list[MapFit], JointFit]:
+    """The videos' own fits, some of them searched anew, and the joint fit from what they agree on.
+
+    Where a video strays in it, and cubes may be on wrong islands of yaw and spin, the videos are joined once more
+    without what these say of the decay of spins; the more probable fit is taken.
+
+    Parameters
+    ----------
+    alone
+        The videos' own fits.
+    model, shared, seed
+        See `fit_together`.
+    """
+    fits, joint = _joined(alone, model, shared, seed=seed, islands=False)
+    strays = (_worsened(fits, joint) > WORSE).any()
+    if strays and any(tells_yaws_by_contacts(fit.likelihood, fit.point) for fit in fits):
+        others = _joined(alone, model, shared, seed=seed, islands=True)
+        return max((fits, joint), others, key=lambda one: one[1].log_density)
+    return fits, joint
+
+
+def _joined(
+    alone: Sequence[MapFit], model: PhysicsModel, shared: Sequence[str] | None, *, seed: int, islands: bool
+) -> tuple[list[MapFit], JointFit]:
+    fits = look_again(alone, doubtful(alone), model, shared, seed=seed, islands=islands)
+    numbers, linked, guess = _guessed(fits, model, shared, islands=islands)
+    seen = [_with_misfit(fit, video, guess[0], own) for fit, video, own in zip(fits, linked, guess[1], strict=True)]
+    lost = [k for k, fit in enumerate(fits) if seen[k].misfit.residual_sd > WORSE * fit.misfit.residual_sd]
+    found_again = look_again(seen, doubtful(seen, lost), model, shared, seed=seed, islands=islands)
+    if any(one is not other for one, other in zip(found_again, seen, strict=True)):
+        pairs = zip(found_again, seen, fits, strict=True)
+        fits = [fit if one is other else one for one, other, fit in pairs]
+        numbers, linked, guess = _guessed(fits, model, shared, islands=islands)
+    return fits, _asking_dissenters(climb(numbers, linked, *guess), fits)
+
+
+def _worsened(fits: Sequence[MapFit], joint: JointFit) -> Float[np.ndarray, "video"]:
+    """Residuals of each video in a joint fit, in units of those that it has by itself."""
+    parts = zip(fits, joint.videos, joint.gaussian.locals, strict=True)
+    seen = [_with_misfit(fit, video, joint.gaussian.mean, own.centre) for fit, video, own in parts]
+    return np.array([one.misfit.residual_sd / fit.misfit.residual_sd for one, fit in zip(seen, fits, strict=True)])
+
+
+def _guessed(
+    fits: Sequence[MapFit], model: PhysicsModel, shared: Sequence[str] | None, *, islands: bool
+) -> tuple[SharedNumbers, tuple[LinkedVideo, ...], tuple[Float[np.ndarray, "shared"], list[Float[np.ndarray, "_"]]]]:
+    """The videos linked by what they share, and where their climb begins."""
+    numbers, linked = link_fits(fits, model, shared)
+    starts = carried_starts(fits, linked)
+    return numbers, linked, first_guess(numbers, linked, starts, trusted(fits).tolist(), islands=islands)
+
+
+def _with_misfit(
+    fit: MapFit, video: LinkedVideo, shared: Float[np.ndarray, "shared"], own: Float[np.ndarray, "_"]
+) -> MapFit:
+    """A video's own fit with what its residuals are where it shares numbers with the others."""
+    point = video.points(shared, own)
+    return replace(fit, misfit=judge(video.likelihood, point, fit.clues))
+
+
+def _asking_dissenters(joint: JointFit, fits: Sequence[MapFit]) -> JointFit:
+    """The joint fit, or a better one from what the video says alone that is explained far worse among the others.
+
+    Several videos that are explained in the same wrong way outvote the one in which that shows.
+    """
+    if len(fits) == 1:
+        return joint
+    worse = _worsened(fits, joint)
+    dissenter = int(np.argmax(worse))
+    if worse[dissenter] < FAR_WORSE:
+        return joint
+    starts = carried_starts(fits, joint.videos)
+    asked = [index == dissenter for index in range(len(fits))]
+    try:
+        other = climb(joint.numbers, joint.videos, *first_guess(joint.numbers, joint.videos, starts, asked))
+    except ImpossibleStartError:  # a video has no world at what the dissenter says
+        return joint
+    return max(joint, other, key=lambda one: one.log_density)

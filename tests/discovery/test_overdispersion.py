@@ -8,13 +8,13 @@ import pytest
 from tests.discovery.fitted import fitted
 from vrdp_prob.discovery.overdispersion import overdispersion
 from vrdp_prob.discovery.residual_model import ResidualModel
-from vrdp_prob.inference.several_videos.population import with_learned_spreads
+from vrdp_prob.inference.several_videos.population import with_learned_population
 
 
 @pytest.fixture(scope="module")
 def null() -> ResidualModel:
     _, fit = fitted(seed=1)
-    return ResidualModel.of(fit.under(with_learned_spreads(fit), model_error=False))
+    return ResidualModel.of(fit.under(with_learned_population(fit), model_error=False))
 
 
 def _with(model: ResidualModel, extra: list[np.ndarray]) -> ResidualModel:

@@ -11,10 +11,9 @@ from vrdp_prob.discovery.overdispersion import overdispersion
 from vrdp_prob.discovery.proposals import hidden_things
 from vrdp_prob.discovery.scores import CauseScore, happens_once, score_causes
 from vrdp_prob.discovery.single_videos import causes_of_lost_videos, lost_videos
-from vrdp_prob.discovery.trials import Trial, gain, weights, with_own_spreads
+from vrdp_prob.discovery.trials import Trial, gain, weights, with_own_population
 from vrdp_prob.inference.parallel import in_processes
 from vrdp_prob.inference.several_videos.fitting import SharedFit, fit_together
-from vrdp_prob.inference.several_videos.population import with_learned_spreads
 from vrdp_prob.inference.several_videos.second_look import doubtful
 from vrdp_prob.models.effects.effect import Effect
 from vrdp_prob.models.effects.external_impulse import ExternalImpulse
@@ -110,10 +109,9 @@ def search(
         Told how far the work is.
     """
     needed = float(np.log(len(catalogue) / FALSE_ALARM))
-    fit = fit.under(with_learned_spreads(fit), model_error=False)
     with (progress or SilentProgress()).stage("Trying causes", total=None) as advance:
         searcher = _Searcher(tuple(catalogue), seed, needed, advance)
-        chain = [Trial((), fit)]
+        chain = [Trial((), with_own_population(fit)).continued()]
         steps = [searcher.first(chain[0])]
         while len(chain) <= MOST_CAUSES:
             step = steps[-1] = searcher.tried(chain[-1], steps[-1])
@@ -218,7 +216,7 @@ class _Searcher:
             tracks = [part.clues.tracks for part in trial.fit.fits]
             fit = fit_together(tracks, model=model, shared=trial.fit.shared, seed=self.seed, model_error=False)
             self.advance(1)
-            return Trial((*trial.causes, effect), with_own_spreads(fit), trial.choices)
+            return Trial((*trial.causes, effect), with_own_population(fit), trial.choices)
 
         return [searched(effect) for effect in again]
 

@@ -15,7 +15,7 @@ from vrdp_prob.discovery.scores import CauseScore, happens_once
 from vrdp_prob.discovery.unexplained import Unexplained, unexplained
 from vrdp_prob.inference.several_videos.ascent import ImpossibleStartError
 from vrdp_prob.inference.several_videos.fitting import Owned, SharedFit
-from vrdp_prob.inference.several_videos.population import with_learned_spreads
+from vrdp_prob.inference.several_videos.population import own_parameters, with_learned_population
 from vrdp_prob.inference.several_videos.second_look import MOST
 from vrdp_prob.models.effects.effect import Effect
 from vrdp_prob.models.parameters import Scope
@@ -31,6 +31,8 @@ FIRST_ROUNDS = 5
 """Common steps with which it is seen whether a cause can win."""
 OTHER_SPREAD = 1.25
 """Factor by which bodies must differ more or less under a model than was believed, for the belief to be changed..."""
+OTHER_MIDDLE = 0.25
+"""...or by which share of it their middle must be elsewhere..."""
 SPREAD_ROUNDS = 3
 """...and how often, since what bodies differ by hangs on what is believed of it."""
 PATCHED = 0.5
@@ -144,7 +146,7 @@ class Trial:
         ]
         model = self.fit.model.with_effect(effect)
         fit = self.fit.under(model, start=score.start, own=starts, rounds=FIRST_ROUNDS, model_error=False)
-        return Trial((*self.causes, effect), with_own_spreads(fit), self.choices)
+        return Trial((*self.causes, effect), with_own_population(fit), self.choices)
 
     def _with_single_events(self, score: CauseScore) -> "Trial":
         """The fit with an effect that happens at most once in each video, where its scan has found it."""
@@ -215,39 +217,44 @@ class Trial:
 
     def without(self, cause: Effect) -> "Trial":
         """The fit without one of its causes."""
-        left = _with_stated_spreads(self.fit.model.without_effect(cause))
+        left = _with_stated_population(self.fit.model.without_effect(cause))
         choices = {name: one for name, one in self.choices.items() if name != cause.name}
         gone = {parameter.name for parameter in cause.parameters}
         held = [{key: one.held[key] for key in one.held if key[0] not in gone} for one in self.fit.structures]
         fit = self.fit.under(left, held=held, rounds=FIRST_ROUNDS, model_error=False)
-        return Trial(tuple(one for one in self.causes if one is not cause), with_own_spreads(fit), choices)
+        return Trial(tuple(one for one in self.causes if one is not cause), with_own_population(fit), choices)
 
 
-def with_own_spreads(fit: SharedFit) -> SharedFit:
-    """A fit that believes bodies to differ in their own parameters as much as they do under its very model.
+def with_own_population(fit: SharedFit) -> SharedFit:
+    """A fit that believes bodies to be in their own parameters as they are under its very model.
 
-    What a model lacks shows as such differences, and a cause that explains them away is worth that they are less.
+    What a model lacks shows as differences between them, and a cause that explains these away is worth that they are
+    less. And no cause is worth that it shifts all restitutions to where they are believed to be.
     """
     for _ in range(SPREAD_ROUNDS):
-        model = with_learned_spreads(fit)
-        before, after = _spreads(fit.model), _spreads(model)
-        if not len(after) or np.abs(np.log(after / before)).max() < np.log(OTHER_SPREAD):
+        model = with_learned_population(fit)
+        if not _believes_otherwise(model, fit.model):
             break
         fit = fit.under(model, rounds=FIRST_ROUNDS, model_error=False)
     return fit
 
 
-def _with_stated_spreads(model: PhysicsModel) -> PhysicsModel:
-    """A model in which bodies may differ as much as they may before anything is learned.
+def _with_stated_population(model: PhysicsModel) -> PhysicsModel:
+    """A model in which bodies may be what they may before anything is learned.
 
     What a cause has explained, they have to explain by themselves without it, and would lose their way to it.
     """
-    own = {one.name for one in model.parameters if one.scope is Scope.BODY}
+    own = {one.name for one in own_parameters(model)}
     return replace(model, beliefs={name: one for name, one in model.beliefs.items() if name not in own})
 
 
-def _spreads(model: PhysicsModel) -> Float[np.ndarray, "parameter"]:
-    return np.array([one.prior.sd for one in model.parameters if one.scope is Scope.BODY])
+def _believes_otherwise(model: PhysicsModel, before: PhysicsModel) -> bool:
+    """Whether a model believes something else of what bodies have of their own."""
+    pairs = [(model.believed(one).prior, before.believed(one).prior) for one in own_parameters(model)]
+    return any(
+        abs(np.log(now.sd / then.sd)) > np.log(OTHER_SPREAD) or abs(now.mean - then.mean) > OTHER_MIDDLE * now.sd
+        for now, then in pairs
+    )
 
 
 def gains(

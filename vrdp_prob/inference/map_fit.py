@@ -32,7 +32,7 @@ from vrdp_prob.inference.modes import (
 )
 from vrdp_prob.inference.plan import FitPlan
 from vrdp_prob.inference.refinement import Refined, climb, refine
-from vrdp_prob.inference.yaw_search import other_yaws
+from vrdp_prob.inference.yaw_search import with_other_yaws
 from vrdp_prob.models.likelihood import Likelihood
 from vrdp_prob.models.noise import NoiseFamily
 from vrdp_prob.models.physics import PhysicsModel
@@ -45,6 +45,8 @@ AGREED = 1.0
 """Fits are grown anew until the two best agree to so many nats."""
 GOOD_COST = 1.15
 """A fit is plausible up to this factor on the cost that noise alone would make."""
+LIKE_NOISE = 1.15
+"""Residuals in units of the noise up to which no further yaws are looked for."""
 LBFGS_ITERATIONS = 30
 MAY_CATCH_UP = 15.0
 """Nats that a start may gain on the best one after the first turn of a refinement."""
@@ -164,11 +166,15 @@ def fit_map(
     found = _refined(everything, starts, likelihood, stages)
     evaluations = sum(one.evaluations for one in attempts) + sum(one.evaluations for one in found)
     if stages.alternatives and stages.yaws:
-        turned = other_yaws(likelihood, found[0].point)
-        elsewhere = _refined(likelihood, [one.point for one in turned], likelihood, stages)
-        evaluations += sum(one.evaluations for one in turned) + sum(one.evaluations for one in elsewhere)
+        turned = with_other_yaws(
+            likelihood,
+            found,
+            lambda starts: _refined(likelihood, starts, likelihood, stages),
+            lambda one: judge(likelihood, one.point, clues).ratio < LIKE_NOISE,
+        )
         # A model error may explain what another yaw explains, too; so both are candidates under one.
-        found = sorted([*found, *elsewhere], key=lambda one: -one.log_density)
+        found = turned.found
+        evaluations += turned.evaluations
     explained = with_bodies_at_rest(
         Explained(likelihood, structure, found, evaluations),
         lambda source, starts, other: _refined(source, starts, other, stages),

@@ -1,10 +1,14 @@
 """Other yaws and spins with which a cube may have met others, looked for over the whole plane of both.
 
 How a cube lies when it is hit, and how fast it turns then, is told by that contact alone, if by anything: many pairs of
-them explain it, on islands that no descent crosses between.
+them explain it, on islands that no descent crosses between. At a later contact it lies as the spin since the first one
+has turned it, so fast that a spread of spins over the prior misses most of these yaws: there, the yaw at the first
+contact is kept, and the spin is changed by as little as turns the cube otherwise at the later one.
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 import torch
@@ -16,7 +20,10 @@ from vrdp_prob.inference.hypothesis import QUARTER, different, frames_before_con
 from vrdp_prob.inference.least_squares import Minimum
 from vrdp_prob.inference.noise_fit import NOISE_FIELDS
 from vrdp_prob.inference.plan import Optimiser
+from vrdp_prob.inference.refinement import Refined
 from vrdp_prob.models.likelihood import Likelihood
+from vrdp_prob.models.parameters import ANGULAR_DRAG
+from vrdp_prob.models.simulator.events import CONTACTS
 
 YAWS, SPINS = 16, 6
 """Yaws over a quarter turn and spins over the prior that are tried together."""
@@ -30,6 +37,66 @@ THEN_ITERATIONS, NEARLY = 5, 10.0
 """Further steps on all frames, and nats by which a result may be worse after them."""
 MOST_KEPT = 16, 8
 """Results that are kept after either."""
+ODD = 1.0
+"""Prior standard deviations from the middle at which a decay of spins is an odd one."""
+TURNS = 3
+"""Quarter turns over which yaws at a later contact are spread: with each the spin is another one."""
+CLOSE = 0.15
+"""Contacts (s) after another one that get no yaws of their own."""
+MOST_LOOKS = 6
+"""Looks for other yaws, at first contacts and at later ones by turns..."""
+WRONG, ENOUGH = 10.0, 1.0
+"""...of which only the first takes place unless it brings so many nats, or the fit is far from noise; and two in a row
+that bring less than so many are the last ones."""
+
+Refine = Callable[[Sequence[Float[np.ndarray, "dimension"]]], list[Refined]]
+"""Refines starts, the best first."""
+
+
+@dataclass(frozen=True)
+class Turned:
+    """Maxima with other yaws.
+
+    Parameters
+    ----------
+    found
+        The maxima, those from which they were found among them, best first.
+    evaluations
+        Worlds simulated on the way.
+    """
+
+    found: list[Refined]
+    evaluations: int
+
+
+def with_other_yaws(
+    likelihood: Likelihood, found: Sequence[Refined], refined: Refine, explained: Callable[[Refined], bool]
+) -> Turned:
+    """Maxima with those of other yaws and spins of cubes, looked for until they are no better.
+
+    Parameters
+    ----------
+    likelihood
+        The density.
+    found
+        Its maxima, best first.
+    refined
+        How what may be near other maxima is refined.
+    explained
+        Whether a maximum is about as good as noise would make it.
+    """
+    best, evaluations, idle = sorted(found, key=lambda one: -one.log_density), 0, 0
+    for look in range(MOST_LOOKS):
+        starts = (other_later_yaws if look % 2 else other_yaws)(likelihood, best[0].point)
+        others = refined([one.point for one in starts])
+        evaluations += sum(one.evaluations for one in [*starts, *others])
+        before = best[0].log_density
+        best = sorted([*best, *others], key=lambda one: -one.log_density)
+        gain = best[0].log_density - before
+        idle = 0 if gain > ENOUGH else idle + 1
+        if idle > 1 or (look == 0 and gain < WRONG and explained(best[0])):
+            break
+    return Turned(best, evaluations)
 
 
 def other_yaws(likelihood: Likelihood, point: Float[np.ndarray, "dimension"]) -> list[Minimum]:
@@ -42,18 +109,72 @@ def other_yaws(likelihood: Likelihood, point: Float[np.ndarray, "dimension"]) ->
     point
         A maximum. Every cube that meets something there, and whose yaw nobody measured, is turned by itself.
     """
-    descent = Descent(likelihood, Optimiser.GAUSS_NEWTON)
-    known = ~likelihood.coordinates.mask(NOISE_FIELDS)
     found: list[Minimum] = []
     for body, frame in unseen_yaws(likelihood, point):
-        local = owned(likelihood.coordinates, bodies_met(likelihood, point, body)) & known
-        until = min(frame + AFTER, len(likelihood.tracks.times))
-        starts = turned_worlds(likelihood, point, body, frame, spins=SPINS, yaws=YAWS)
-        first = descent(starts, local, frame_count=until, iterations=FIRST_ITERATIONS)
-        kept = different(likelihood, first, worse=HOPELESS, most=MOST_KEPT[0], frame_count=until)
-        then = descent(np.array([one.point for one in kept]), local, iterations=THEN_ITERATIONS)
-        found += different(likelihood, then, worse=NEARLY, most=MOST_KEPT[1])
+        for one in _with_usual_decay(likelihood, point):
+            starts = turned_worlds(likelihood, one, body, frame, spins=SPINS, yaws=YAWS)
+            found += _descended(likelihood, starts, bodies_met(likelihood, point, body), frame)
     return found
+
+
+def other_later_yaws(likelihood: Likelihood, point: Float[np.ndarray, "dimension"]) -> list[Minimum]:
+    """The same where a cube has met something again with another yaw, which the spin since its first contact gave it.
+
+    Parameters
+    ----------
+    likelihood, point
+        See `other_yaws`.
+    """
+    tracks, places = likelihood.tracks, likelihood.coordinates.places
+    found: list[Minimum] = []
+    for body, _ in unseen_yaws(likelihood, point):
+        first, *later = _contact_times(likelihood, point, body)
+        if (spin := places.get(("spin", body))) is None:
+            continue
+        for before, time in pairwise([first, *later]):
+            if time - before < CLOSE:
+                continue
+            turn = QUARTER * ((np.arange(TURNS * YAWS) + 0.5) / YAWS - TURNS / 2)
+            change = turn / (time - first)
+            starts = np.tile(point, (len(turn), 1))
+            starts[:, spin] += change
+            starts[:, places["angle", body]] -= change * (first - float(tracks.first_seen[body]))
+            frame = int(np.searchsorted(tracks.times, time))
+            found += _descended(likelihood, starts, bodies_met(likelihood, point, body), frame)
+    return found
+
+
+def _with_usual_decay(likelihood: Likelihood, point: Float[np.ndarray, "dimension"]) -> list[np.ndarray]:
+    """A point, and where spins decay oddly in it the same with the usual decay: wrong yaws ask for odd ones."""
+    coordinates = likelihood.coordinates
+    place = coordinates.places.get((ANGULAR_DRAG.name, None))
+    if place is None or abs(point[place] - coordinates.prior_mean[place]) < ODD * coordinates.prior_sd[place]:
+        return [point]
+    usual = point.copy()
+    usual[place] = coordinates.prior_mean[place]
+    return [point, usual]
+
+
+def _descended(
+    likelihood: Likelihood, starts: Float[np.ndarray, "start dimension"], bodies: frozenset[int], frame: int
+) -> list[Minimum]:
+    """The best of what becomes of starts in the coordinates of some bodies that meet around a frame."""
+    descent = Descent(likelihood, Optimiser.GAUSS_NEWTON)
+    local = owned(likelihood.coordinates, bodies) & ~likelihood.coordinates.mask(NOISE_FIELDS)
+    until = min(frame + AFTER, len(likelihood.tracks.times))
+    first = descent(starts, local, frame_count=until, iterations=FIRST_ITERATIONS)
+    kept = different(likelihood, first, worse=HOPELESS, most=MOST_KEPT[0], frame_count=until)
+    if not kept:
+        return []
+    then = descent(np.array([one.point for one in kept]), local, iterations=THEN_ITERATIONS)
+    return different(likelihood, then, worse=NEARLY, most=MOST_KEPT[1])
+
+
+def _contact_times(likelihood: Likelihood, point: Float[np.ndarray, "dimension"], body: int) -> list[float]:
+    """Times (s) at which a body meets others or walls at a point."""
+    with torch.no_grad():
+        events = likelihood.rollout(torch.from_numpy(point[None])).events
+    return sorted(events.time[np.isin(events.kind, CONTACTS) & events.concerns([body])].tolist())
 
 
 def unseen_yaws(likelihood: Likelihood, point: Float[np.ndarray, "dimension"]) -> Iterator[tuple[int, int]]:

@@ -2,18 +2,21 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from jaxtyping import Float
 
 from vrdp_prob.inference.map_fit import MapFit
 from vrdp_prob.inference.misfit import judge
+from vrdp_prob.inference.parallel import in_processes
+from vrdp_prob.inference.plan import TURNING
 from vrdp_prob.inference.several_videos.agreement import first_guess
 from vrdp_prob.inference.several_videos.ascent import ImpossibleStartError, climb
 from vrdp_prob.inference.several_videos.joint_fit import JointFit
 from vrdp_prob.inference.several_videos.linking import LinkedVideo, SharedNumbers
-from vrdp_prob.inference.several_videos.parts import carried_starts, link_fits
-from vrdp_prob.inference.several_videos.second_look import FAR_WORSE, WORSE, doubtful, look_again, trusted
+from vrdp_prob.inference.several_videos.parts import carried_starts, fit_alone, link_fits
+from vrdp_prob.inference.several_videos.second_look import FAR_WORSE, WORSE, doubtful, explained, look_again, trusted
 from vrdp_prob.inference.yaw_search import tells_yaws_by_contacts
 from vrdp_prob.models.physics import PhysicsModel
 
@@ -23,8 +26,9 @@ def joined(
 ) -> tuple[list[MapFit], JointFit]:
     """The videos' own fits, some of them searched anew, and the joint fit from what they agree on.
 
-    Where a video strays in it, and cubes may be on wrong islands of yaw and spin, the videos are joined once more
-    without what these say of the decay of spins; the more probable fit is taken.
+    Where a video strays in it though each is explained by itself, cubes may be on wrong islands of yaw and spin. Then
+    the cubes of all videos are turned, and where a video strays still, the videos are joined without what cubes say of
+    the decay of spins; the most probable fit is taken.
 
     Parameters
     ----------
@@ -33,12 +37,34 @@ def joined(
     model, shared, seed
         See `fit_together`.
     """
-    fits, joint = _joined(alone, model, shared, seed=seed, islands=False)
-    strays = (_worsened(fits, joint) > WORSE).any()
-    if strays and any(tells_yaws_by_contacts(fit.likelihood, fit.point) for fit in fits):
-        others = _joined(alone, model, shared, seed=seed, islands=True)
-        return max((fits, joint), others, key=lambda one: one[1].log_density)
-    return fits, joint
+    found = [_joined(alone, model, shared, seed=seed, islands=False)]
+    if not _strays(*found[0]) or not any(_has_unseen_yaws(fit) for fit in alone):
+        return found[0]
+    turned = _turned(alone, model, seed=seed) if explained(alone) else alone
+    found += [_joined(turned, model, shared, seed=seed, islands=False)] if turned is not alone else []
+    if _strays(*found[-1]):
+        found.append(_joined(turned, model, shared, seed=seed, islands=True))
+    return max(found, key=lambda one: one[1].log_density)
+
+
+def _strays(fits: Sequence[MapFit], joint: JointFit) -> bool:
+    """Whether a video is explained worse in a joint fit than by itself, or none of them settles."""
+    return not joint.converged or bool((_worsened(fits, joint) > WORSE).any())
+
+
+def _has_unseen_yaws(fit: MapFit) -> bool:
+    return tells_yaws_by_contacts(fit.likelihood, fit.point)
+
+
+def _turned(alone: Sequence[MapFit], model: PhysicsModel, *, seed: int) -> list[MapFit]:
+    """The videos' own fits, with cubes whose yaw nobody measured turned where that explains a video better."""
+    chosen = [index for index, fit in enumerate(alone) if _has_unseen_yaws(fit)]
+    turn = partial(fit_alone, model=model, seed=seed, plan=TURNING)
+    again = in_processes(turn, [alone[index].clues.tracks for index in chosen])
+    better = {
+        index: fit for index, fit in zip(chosen, again, strict=True) if fit.log_density > alone[index].log_density
+    }
+    return [better.get(index, fit) for index, fit in enumerate(alone)]
 
 
 def _joined(

@@ -5,9 +5,9 @@ from dataclasses import replace
 
 from vrdp_prob.inference.several_videos.fitting import SharedFit
 from vrdp_prob.inference.several_videos.linking import shared_key
-from vrdp_prob.inference.several_videos.population import with_learned_spread, with_learned_spreads
+from vrdp_prob.inference.several_videos.population import with_learned_population
 from vrdp_prob.models.coordinates import Coordinate
-from vrdp_prob.models.parameters import MASS, RESTITUTION, WALL_RESTITUTION, Scope
+from vrdp_prob.models.parameters import WALL_RESTITUTION, Scope
 from vrdp_prob.models.physics import PhysicsModel
 from vrdp_prob.scene import Tracks, Wall
 
@@ -19,12 +19,10 @@ def learned_model(fit: SharedFit) -> PhysicsModel:
     (masses, restitutions, frictions) it is learned how far apart they are, of restitutions their middle, too; that of
     masses cannot be seen.
     """
-    model = with_learned_spreads(fit)
+    model = with_learned_population(fit)
     gaussian = fit.joint.gaussian
     told = dict(zip(fit.joint.numbers.keys, zip(gaussian.mean, gaussian.sd, strict=True), strict=True))
     beliefs = dict(model.beliefs)
-    beliefs[MASS.name] = with_learned_spread(fit, MASS)
-    beliefs[RESTITUTION.name] = with_learned_spread(fit, RESTITUTION, mean=True)
     for parameter in model.parameters:
         if parameter.scope is Scope.SHARED and (parameter.name, ()) in told:
             mean, sd = map(float, told[parameter.name, ()])

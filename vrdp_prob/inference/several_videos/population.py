@@ -12,7 +12,7 @@ from jaxtyping import Float
 from scipy.optimize import minimize_scalar
 
 from vrdp_prob.inference.several_videos.fitting import SharedFit
-from vrdp_prob.models.parameters import Parameter, Prior, Scope
+from vrdp_prob.models.parameters import MASS, RESTITUTION, Parameter, Prior, Scope
 from vrdp_prob.models.physics import PhysicsModel
 
 FEWEST = 6
@@ -23,17 +23,22 @@ TELLING = 0.5
 """...and the share of its variance below which the tracks tell a quantity."""
 
 
-def with_learned_spreads(fit: SharedFit) -> PhysicsModel:
-    """The model, believing that bodies differ in their own parameters as much as those of the videos do.
+def with_learned_population(fit: SharedFit) -> PhysicsModel:
+    """The model, believing of the bodies' own parameters that the bodies of any video are like those of all videos.
 
-    A parameter of which too few bodies tell something keeps its prior.
+    It is learned how far apart bodies are, of restitutions their middle, too: that of masses cannot be seen, and that
+    of other parameters is a shared one. A parameter of which too few bodies tell something keeps its prior.
     """
-    model = fit.model
-    beliefs = dict(model.beliefs)
-    for parameter in replace(model, beliefs={}).parameters:
-        if parameter.scope is Scope.BODY:
-            beliefs[parameter.name] = with_learned_spread(fit, parameter)
-    return replace(model, beliefs=beliefs)
+    beliefs = dict(fit.model.beliefs)
+    for parameter in own_parameters(fit.model):
+        beliefs[parameter.name] = with_learned_spread(fit, parameter, mean=parameter.name == RESTITUTION.name)
+    return replace(fit.model, beliefs=beliefs)
+
+
+def own_parameters(model: PhysicsModel) -> tuple[Parameter, ...]:
+    """What each body has of its own, as it is stated before anything is learned."""
+    stated = replace(model, beliefs={}).parameters
+    return (MASS, RESTITUTION, *(one for one in stated if one.scope is Scope.BODY))
 
 
 def with_learned_spread(fit: SharedFit, parameter: Parameter, *, mean: bool = False) -> Parameter:

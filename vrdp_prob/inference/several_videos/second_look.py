@@ -25,8 +25,8 @@ FAR_WORSE = 1.5
 LOOKS = 4
 """Fits that are made anew of one video, with and without what the others say by turns..."""
 EXPLAINED = 1.2
-"""...and one more, with the yaws of its cubes turned, if the video in the middle leaves no more than so many noise sd:
-then the model lacks nothing whose place a wrong yaw could take."""
+"""...and one more, with the yaws of its cubes turned, if the video in the middle leaves no more than so many noise
+sd."""
 MOST = 2
 """One video in so many is looked at again."""
 SAME = 0.01
@@ -60,6 +60,11 @@ def doubtful(fits: Sequence[MapFit], among: Collection[int] | None = None) -> li
         for index in order
         if excess[index] > WORSE and index in possible and may_take_another_course(fits[index])
     ]
+
+
+def explained(fits: Sequence[MapFit]) -> bool:
+    """Whether the model lacks nothing whose place a wrong yaw could take: it explains most videos."""
+    return float(np.median([one.misfit.ratio for one in fits])) < EXPLAINED
 
 
 def may_take_another_course(fit: MapFit) -> bool:
@@ -101,8 +106,7 @@ def look_again(
         return list(fits)
     excess = _excess(fits)
     goal = WORSE * float(np.median([one.misfit.residual_sd for one in fits]))
-    explained = float(np.median([one.misfit.ratio for one in fits])) < EXPLAINED
-    ways = [(look % 2 == 0, IN_DOUBT) for look in range(looks)] + ([(True, TURNING)] if explained else [])
+    ways = [(look % 2 == 0, IN_DOUBT) for look in range(looks)] + ([(True, TURNING)] if explained(fits) else [])
     look = _Look(model, _told(fits, model, shared, islands=islands), goal, seed, tuple(ways))
     doubted = [(fits[index], bool(excess[index] >= FAR_WORSE)) for index in chosen]
     improved = dict(zip(chosen, in_processes(look, doubted), strict=True))

@@ -6,7 +6,7 @@ import pytest
 from tests.discovery.hidden import hide
 from tests.discovery.scenes import Setting
 from vrdp_prob.discovery.scores import score_causes
-from vrdp_prob.discovery.trials import Trial, gain, gains, with_own_spreads
+from vrdp_prob.discovery.trials import Trial, gain, gains, with_own_population
 from vrdp_prob.inference import default_model
 from vrdp_prob.inference.several_videos.fitting import SharedFit, fit_together
 from vrdp_prob.models.effects.body_friction import FRICTION_RATIO
@@ -23,7 +23,7 @@ def spread_of(fit: SharedFit) -> float:
 def test_friction_by_mass_makes_bodies_alike_and_is_worth_it() -> None:
     data = hide(["mass_dependent_friction"], seed=1, effect_size=3.0, setting=Setting(videos=6, bodies=3))
     fit = fit_together(data.tracks, model=default_model(), model_error=False)
-    base = Trial((), with_own_spreads(fit))
+    base = Trial((), with_own_population(fit))
     (score,) = score_causes(base.fit, base.unexplained.plain, [MassDependentFriction()], seed=0)
     found = base.with_cause(score)
     assert found is not None

@@ -89,7 +89,7 @@ def with_other_yaws(
     for look in range(MOST_LOOKS):
         starts = (other_later_yaws if look % 2 else other_yaws)(likelihood, best[0].point)
         others = refined([one.point for one in starts])
-        evaluations += sum(one.evaluations for one in [*starts, *others])
+        evaluations += sum(one.evaluations for one in starts) + sum(one.evaluations for one in others)
         before = best[0].log_density
         best = sorted([*best, *others], key=lambda one: -one.log_density)
         gain = best[0].log_density - before

@@ -1,4 +1,4 @@
-"""How far apart bodies are in their own friction, learned from all videos."""
+"""How bodies are in what each has of its own, learned from all videos."""
 
 import math
 
@@ -18,6 +18,14 @@ def test_the_spread_of_friction_is_that_of_the_bodies(spread: float) -> None:
     # A dozen bodies move: the logarithm of their spread has a standard deviation of about 0.2.
     assert spread / 2.2 < learned < 2.2 * spread
     assert len(data.tracks) == 5
+
+
+def test_the_middle_of_restitutions_is_learned_and_that_of_masses_is_not() -> None:
+    _, fit = fitted(seed=1, setting=Setting(videos=5, bodies=3))
+    beliefs = with_learned_population(fit).beliefs
+    # Ten or so factors of restitution, whose logarithms differ by 0.05.
+    assert beliefs[RESTITUTION.name].prior.mean == pytest.approx(math.log(0.88), abs=0.06)
+    assert beliefs[MASS.name].prior.mean == MASS.prior.mean
 
 
 def test_too_few_bodies_leave_the_prior() -> None:

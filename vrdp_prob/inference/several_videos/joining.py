@@ -20,6 +20,9 @@ from vrdp_prob.inference.several_videos.second_look import FAR_WORSE, WORSE, dou
 from vrdp_prob.inference.yaw_search import tells_yaws_by_contacts
 from vrdp_prob.models.physics import PhysicsModel
 
+LOST = 10.0
+"""Nats per video that a joint fit may be less probable than the videos by themselves, which agree on nothing."""
+
 
 def joined(
     alone: Sequence[MapFit], model: PhysicsModel, shared: Sequence[str] | None, *, seed: int
@@ -48,8 +51,9 @@ def joined(
 
 
 def _strays(fits: Sequence[MapFit], joint: JointFit) -> bool:
-    """Whether a video is explained worse in a joint fit than by itself, or none of them settles."""
-    return not joint.converged or bool((_worsened(fits, joint) > WORSE).any())
+    """Whether a video is explained worse in a joint fit than by itself, or all together are far less probable."""
+    lost = sum(fit.log_density for fit in fits) - joint.log_density
+    return lost > LOST * len(fits) or bool((_worsened(fits, joint) > WORSE).any())
 
 
 def _has_unseen_yaws(fit: MapFit) -> bool:

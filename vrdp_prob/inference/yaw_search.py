@@ -44,10 +44,9 @@ TURNS = 3
 CLOSE = 0.15
 """Contacts (s) after another one that get no yaws of their own."""
 MOST_LOOKS = 6
-"""Looks for other yaws, at first contacts and at later ones by turns..."""
-WRONG, ENOUGH = 10.0, 1.0
-"""...of which only the first takes place unless it brings so many nats, or the fit is far from noise; and two in a row
-that bring less than so many are the last ones."""
+"""Looks for other yaws, at first contacts and at later ones by turns, until a fit leaves no more than noise..."""
+ENOUGH = 1.0
+"""...or two in a row bring less than so many nats."""
 
 Refine = Callable[[Sequence[Float[np.ndarray, "dimension"]]], list[Refined]]
 """Refines starts, the best first."""
@@ -72,7 +71,7 @@ class Turned:
 def with_other_yaws(
     likelihood: Likelihood, found: Sequence[Refined], refined: Refine, explained: Callable[[Refined], bool]
 ) -> Turned:
-    """Maxima with those of other yaws and spins of cubes, looked for until they are no better.
+    """Maxima with those of other yaws and spins of cubes, looked for at least once.
 
     Parameters
     ----------
@@ -94,7 +93,7 @@ def with_other_yaws(
         best = sorted([*best, *others], key=lambda one: -one.log_density)
         gain = best[0].log_density - before
         idle = 0 if gain > ENOUGH else idle + 1
-        if idle > 1 or (look == 0 and gain < WRONG and explained(best[0])):
+        if idle > 1 or explained(best[0]):
             break
     return Turned(best, evaluations)
 

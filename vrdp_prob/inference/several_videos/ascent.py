@@ -29,7 +29,8 @@ ROUNDS = 15
 TOLERANCE = 0.2
 """Gain (nats) of a step, expected or real, below which the search ends..."""
 EXPECTED = 1.0
-"""...and has converged, if no more than so much was expected."""
+"""...and has converged, if no more than so much was expected; where a common step brought nothing, none is tried until
+the videos by themselves have gained as much."""
 STEEP = 5.0
 """Gain (nats) that its own step promises a video which has just looked for its best own numbers, from which on it is
 taken to be at an edge: where two orders of events meet, or a contact just happens."""
@@ -101,6 +102,7 @@ def climb(
         settled = _settled(videos, state, slopes.videos)
         state = _improved(numbers, videos, settled, towards - shared)
         slopes = _expanded(numbers, videos, state)
+    refused = -np.inf
     for _ in range(rounds):
         inside = _inside(slopes)
         smooth = _of(slopes, inside) if inside.any() else slopes
@@ -109,8 +111,11 @@ def climb(
         if converged:
             break
         trial = _settled(videos, state, slopes.videos)
-        if _gained(trial, state, ~inside) < EXPECTED:
-            trial = _improved(numbers, videos, trial, smooth.shared_step)
+        if _gained(trial, state, ~inside) < EXPECTED and trial.total(numbers) > refused + EXPECTED:
+            own = trial
+            trial = _improved(numbers, videos, own, smooth.shared_step)
+            if trial is own:
+                refused = own.total(numbers)
         gain = trial.total(numbers) - state.total(numbers)
         if gain > 0:
             state = trial

@@ -24,11 +24,15 @@ FEWEST = 10
 
 
 class Calibration(NamedTuple):
-    """Ranks of one kind of quantity, one per scene, and the probability that uniform ones deviate as much."""
+    """Ranks of one kind of quantity, one per scene, and the probability that uniform ones deviate as much.
+
+    `squared_error` is the mean squared difference of the posterior's mean from the truth, in its standard deviations.
+    """
 
     kind: str
     ranks: np.ndarray
     below: np.ndarray
+    squared_error: float
     probability: float
 
     @property
@@ -67,8 +71,10 @@ def calibrations(results: Sequence[Result]) -> list[Calibration]:
         chosen = [_one(result, kind) for result in results]
         ranks = np.array([one["rank"] for one in chosen if one], dtype=int)
         below = np.array([one["below"] for one in chosen if one])
+        errors = np.array([one["error"] for one in chosen if one and one["error"] is not None])
         if len(ranks) >= FEWEST:
-            found.append(Calibration(kind, ranks, below, uniformity(ranks, LEVELS)))
+            squared = float(np.mean(errors**2)) if len(errors) else float("nan")
+            found.append(Calibration(kind, ranks, below, squared, uniformity(ranks, LEVELS)))
     return found
 
 
@@ -89,8 +95,12 @@ def tables(results: Results) -> str:
             if not kinds:
                 parts.append(f"### {name}, {group}: {len(chosen)} scenes")
                 continue
-            rows = [(one.kind, str(len(one.ranks)), *_shown(one), f"{one.probability:.4f}") for one in kinds]
-            head = ("kind", "scenes", *(f"{100 * interval:.0f} %" for interval in INTERVALS), "uniform ranks, p")
+            rows = [
+                (one.kind, str(len(one.ranks)), *_shown(one), f"{one.squared_error:.2f}", f"{one.probability:.4f}")
+                for one in kinds
+            ]
+            shares_of = (f"{100 * interval:.0f} %" for interval in INTERVALS)
+            head = ("kind", "scenes", *shares_of, "squared error", "uniform ranks, p")
             parts.append(f"### {name}, {group}: {len(chosen)} scenes\n\n{_table(head, rows)}")
     return "\n\n".join(parts)
 
@@ -154,7 +164,11 @@ def _table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
 
 def page(results: Results, path: Path) -> None:
     """Write the tables and figures between the marks of a page."""
-    pictures = [f"![Ranks of the truth, {name}](figures/calibration-{name}.svg)" for name in results]
+    pictures = [
+        f"![Ranks of the truth, {name}](figures/calibration-{name}.svg)"
+        for name, found in results.items()
+        if _drawn(found)
+    ]
     write_between(path, "\n\n".join([*pictures, tables(results)]))
 
 
@@ -168,7 +182,9 @@ def figures(results: Results, folder: Path) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     mpl.rcParams.update({"svg.hashsalt": "calibration", "font.size": 9})
     for name, found in results.items():
-        chosen = {group: {one.kind: one for one in calibrations(part)} for group, part in groups(found).items()}
+        chosen = _drawn(found)
+        if not chosen:
+            continue
         kinds = [kind for kind in KINDS if any(kind in part for part in chosen.values())]
         rows = -(-len(kinds) // 3)
         figure, axes = plt.subplots(
@@ -185,6 +201,12 @@ def figures(results: Results, folder: Path) -> None:
         figure.supylabel("share of scenes at or below it, minus the rank", fontsize=9)
         figure.savefig(folder / f"calibration-{name}.svg", metadata={"Date": None})
         plt.close(figure)
+
+
+def _drawn(results: Sequence[Result]) -> dict[str, dict[str, Calibration]]:
+    """What is drawn of each group of scenes; nothing where there are too few."""
+    chosen = {group: {one.kind: one for one in calibrations(part)} for group, part in groups(results).items()}
+    return chosen if any(chosen.values()) else {}
 
 
 _COLOURS = {"converged": "#1f5fa8", "not converged": "#d1670d"}

@@ -1,12 +1,13 @@
 """Whether posteriors are calibrated: ranks and coverage of true values over scenes from the prior, by sampler.
 
-    python benchmarks/calibration.py [--json FILE] [--docs docs] [--scenes 200] [--samplers laplace,emcee,nuts]
+    python benchmarks/calibration.py [--json FILE] [--docs docs] [--scenes 200] [--samplers laplace,emcee,nuts] [--show]
 
 `laplace-alone` is `laplace` without emcee, on to which it hands what it cannot be trusted with.
 Scenes come from the prior that the inference believes in, their motion from an integrator that is not the simulator
 (`tests/inference/prior_scenes.py`). Each scene's result is written to `--results` (a folder) as it comes, so that a run
-that was interrupted goes on; results of another version of the code are to be deleted by hand. `--docs` writes the
-tables into `calibration.md` there, and the figures beside it. One process per core; the figures need matplotlib.
+that was interrupted goes on; results of another version of the code are to be deleted by hand. `--show` only reads the
+results there are. `--docs` writes the tables into `calibration.md` there, and the figures beside it. One process per
+core; the figures need matplotlib.
 """
 
 import argparse
@@ -23,7 +24,7 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 import torch
 from _calibration_page import checks, figures, page, tables
-from _resumable import Result, measured
+from _resumable import Result, measured, read
 
 from tests.inference.prior_scenes import PriorScene, prior_scene
 from tests.inference.scene_ranks import ranks
@@ -46,15 +47,19 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--scenes", type=int, default=200, help="scenes per sampler")
     parser.add_argument("--samplers", default="laplace,emcee,nuts")
     parser.add_argument("--results", type=Path, default=RESULTS, help="folder of the results, which are gone on with")
+    parser.add_argument("--show", action="store_true", help="compute nothing, show all results there are")
     parser.add_argument("--processes", type=int, default=os.cpu_count() or 1)
     options = parser.parse_args(arguments)
-    compile_model(default_model())
     names = options.samplers.split(",")
     unknown = [name for name in names if name not in (*SAMPLERS, ALONE)]
     if unknown:
         parser.error(f"no sampler {unknown[0]}; there are {', '.join(SAMPLERS)} and {ALONE}")
-    seeds = list(islice(accepted(), options.scenes))
-    results = {name: measure(name, seeds, options.results, options.processes) for name in names}
+    if options.show:
+        results = {name: read(results_of(name, options.results)) for name in names}
+    else:
+        compile_model(default_model())
+        seeds = list(islice(accepted(), options.scenes))
+        results = {name: measure(name, seeds, options.results, options.processes) for name in names}
     print(tables(results))
     if options.docs:
         figures(results, options.docs / "figures")
@@ -67,8 +72,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def measure(sampler: str, seeds: Sequence[int], folder: Path, processes: int) -> list[Result]:
     """Results of some scenes, those that are not there yet computed and written one by one."""
     asked = {seed: (sampler, seed) for seed in seeds}
-    path, label = folder / f"{sampler}.jsonl", f"Calibration ({sampler})"
-    return measured(one, asked, path, field="seed", label=label, processes=processes)
+    label = f"Calibration ({sampler})"
+    return measured(one, asked, results_of(sampler, folder), field="seed", label=label, processes=processes)
+
+
+def results_of(sampler: str, folder: Path) -> Path:
+    """File of the results of a sampler."""
+    return folder / f"{sampler}.jsonl"
 
 
 def accepted() -> Iterator[int]:

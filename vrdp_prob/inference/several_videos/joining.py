@@ -16,12 +16,17 @@ from vrdp_prob.inference.several_videos.ascent import ImpossibleStartError, clim
 from vrdp_prob.inference.several_videos.joint_fit import JointFit
 from vrdp_prob.inference.several_videos.linking import LinkedVideo, SharedNumbers
 from vrdp_prob.inference.several_videos.parts import carried_starts, fit_alone, link_fits
-from vrdp_prob.inference.several_videos.second_look import FAR_WORSE, WORSE, doubtful, explained, look_again, trusted
+from vrdp_prob.inference.several_videos.second_look import (
+    FAR_WORSE,
+    MOST,
+    WORSE,
+    doubtful,
+    explained,
+    look_again,
+    trusted,
+)
 from vrdp_prob.inference.yaw_search import tells_yaws_by_contacts
 from vrdp_prob.models.physics import PhysicsModel
-
-LOST = 10.0
-"""Nats per video that a joint fit may be less probable than the videos by themselves, which agree on nothing."""
 
 
 def joined(
@@ -51,9 +56,11 @@ def joined(
 
 
 def _strays(fits: Sequence[MapFit], joint: JointFit) -> bool:
-    """Whether a video is explained worse in a joint fit than by itself, or all together are far less probable."""
-    lost = sum(fit.log_density for fit in fits) - joint.log_density
-    return lost > LOST * len(fits) or bool((_worsened(fits, joint) > WORSE).any())
+    """Whether some videos, but no more than half of them, are explained worse in a joint fit than by themselves.
+
+    Where more are, it is the model that lacks something.
+    """
+    return 0 < int((_worsened(fits, joint) > WORSE).sum()) <= len(fits) / MOST
 
 
 def _has_unseen_yaws(fit: MapFit) -> bool:

@@ -33,6 +33,9 @@ SAME = 0.01
 """Fits whose residuals differ by a smaller share are taken for the same one, and unless they are far worse than those
 of other videos no further one is looked for in the same way: with what the others say, or without, since what they say
 may be wrong where cubes whose yaws nobody measured are on wrong islands."""
+FELL = 20.0
+"""Nats by which a fit may be less probable than the one it replaces: residuals of a video that has gone astray
+altogether count as outliers, and what is left looks small."""
 WIDER, LEAST_SD = 2.0, 0.02
 """What the others say is believed with so many times its standard deviation, and at least with this one."""
 
@@ -149,7 +152,7 @@ class _Look:
             model = self.told if believing else self.model
             found = fit_map(best.clues.tracks, model, generator, plan=plan, model_error=False)
             gained = best.misfit.residual_sd / found.misfit.residual_sd - 1
-            if gained > SAME:
+            if gained > SAME and found.log_density > best.log_density - FELL:
                 likelihood = plain_likelihood(found.clues, self.model, structure_of(found.likelihood.coordinates))
                 best = better = replace(found, likelihood=likelihood)
             if best.misfit.residual_sd < self.goal:

@@ -110,9 +110,10 @@ def other_yaws(likelihood: Likelihood, point: Float[np.ndarray, "dimension"]) ->
     """
     found: list[Minimum] = []
     for body, frame in unseen_yaws(likelihood, point):
+        met = bodies_met(likelihood, point, body)
         for one in _with_usual_decay(likelihood, point):
             starts = turned_worlds(likelihood, one, body, frame, spins=SPINS, yaws=YAWS)
-            found += _descended(likelihood, starts, bodies_met(likelihood, point, body), frame)
+            found += _descended(likelihood, starts, met, frame)
     return found
 
 
@@ -127,9 +128,10 @@ def other_later_yaws(likelihood: Likelihood, point: Float[np.ndarray, "dimension
     tracks, places = likelihood.tracks, likelihood.coordinates.places
     found: list[Minimum] = []
     for body, _ in unseen_yaws(likelihood, point):
-        first, *later = _contact_times(likelihood, point, body)
         if (spin := places.get(("spin", body))) is None:
             continue
+        first, *later = _contact_times(likelihood, point, body)
+        met = bodies_met(likelihood, point, body)
         for before, time in pairwise([first, *later]):
             if time - before < CLOSE:
                 continue
@@ -139,7 +141,7 @@ def other_later_yaws(likelihood: Likelihood, point: Float[np.ndarray, "dimension
             starts[:, spin] += change
             starts[:, places["angle", body]] -= change * (first - float(tracks.first_seen[body]))
             frame = int(np.searchsorted(tracks.times, time))
-            found += _descended(likelihood, starts, bodies_met(likelihood, point, body), frame)
+            found += _descended(likelihood, starts, met, frame)
     return found
 
 

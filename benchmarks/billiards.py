@@ -14,7 +14,6 @@ the tables into `billiards.md` there.
 import argparse
 import json
 import os
-import pickle
 import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -24,23 +23,20 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 import numpy as np
 import torch
+from _extension import extended_model, fit_of
 from _page import table_row, write_between
 from _resumable import Result, measured
 from jaxtyping import Float
 
 from vrdp_prob.datasets import load_all
-from vrdp_prob.discovery.discover import discover
-from vrdp_prob.discovery.document import write_finding
 from vrdp_prob.evaluation.scores import calibration_error
 from vrdp_prob.files import write_atomically
 from vrdp_prob.inference import default_model, infer
 from vrdp_prob.inference.map_fit import fit_map
-from vrdp_prob.inference.several_videos import SharedFit, fit_together
 from vrdp_prob.inference.several_videos.learned import learned_model, with_learned_walls
 from vrdp_prob.models.physics import PhysicsModel
 from vrdp_prob.models.simulator.events import RolloutEventKind
 from vrdp_prob.models.simulator.rollout import compile_model, simulate
-from vrdp_prob.progress import progress_display
 from vrdp_prob.scene import Tracks
 
 DATA = Path(__file__).parents[2] / "shared" / "data" / "billiards_three_cushion"
@@ -75,9 +71,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     names = {part: [_video(one) for one in asked if one["split"] == part] for part in ("train", "test")}
     training = [_up_to(ASKED, tracks) for tracks in load_all(DATA, videos=names["train"][: options.train])]
     compile_model(default_model())
-    extended = _found(training, options.results)
+    extended = extended_model(training, options.results / "finding")
     fits = {
-        name: _fitted(training, model, options.results / f"{name.replace(' ', '-')}.pickle")
+        name: fit_of(training, model, options.results / f"{name.replace(' ', '-')}.pickle")
         for name, model in ((BASE, default_model()), (EXTENDED, extended))
     }
     questions = {_video(one): tuple(one["questions"]) for one in asked}
@@ -121,26 +117,6 @@ def _video(entry: Mapping[str, str]) -> str:
 
 def _up_to(frames: int, tracks: Tracks) -> Tracks:
     return replace(tracks, data=tracks.data.isel(time=slice(frames)))
-
-
-def _found(training: Sequence[Tracks], folder: Path) -> PhysicsModel:
-    """The model extended by what discovery finds on the training videos."""
-    if not (folder / "finding" / "model.toml").exists():
-        finding = discover(training, seed=0, progress=progress_display(quiet=False))
-        write_finding(finding, folder / "finding")
-    return PhysicsModel.read(folder / "finding" / "model.toml")
-
-
-def _fitted(training: Sequence[Tracks], model: PhysicsModel, path: Path) -> SharedFit:
-    """What the training videos tell under a model."""
-    if not path.exists():
-        progress = progress_display(quiet=False)
-        fit = fit_together(training, model=model, seed=0, progress=progress)
-        with write_atomically(path) as temporary:
-            temporary.write_bytes(pickle.dumps(fit))
-    fit = pickle.loads(path.read_bytes())
-    assert isinstance(fit, SharedFit)
-    return fit
 
 
 def answered(task: Task) -> Result:

@@ -16,6 +16,7 @@ from vrdp_prob.command_inputs import (
     check_concepts,
     concepts_at,
     model_at,
+    questions_about,
     questions_of,
     scene_range,
     videos_at,
@@ -45,6 +46,7 @@ from vrdp_prob.discovery.document import write_finding
 from vrdp_prob.discovery.summary import lines as finding_lines
 from vrdp_prob.errors import InputError
 from vrdp_prob.evaluation import evaluate
+from vrdp_prob.evaluation.compared_answers import with_answers
 from vrdp_prob.evaluation.document import table, to_document, write_evaluation
 from vrdp_prob.files import check_writable
 from vrdp_prob.inference import OPTIONS, check_options, default_model
@@ -55,7 +57,7 @@ from vrdp_prob.reasoning import ask, infer
 from vrdp_prob.reasoning.adaptive import check_mc_error
 from vrdp_prob.reasoning.checking import check_question
 from vrdp_prob.report.answer_lines import answer_lines
-from vrdp_prob.report.pipeline import Report
+from vrdp_prob.report.pipeline import Report, check_questions
 from vrdp_prob.report.pipeline import report as write_report
 from vrdp_prob.report.wording import with_names
 from vrdp_prob.scene import Choice, Question
@@ -220,6 +222,9 @@ def discover_causes(
         Path, typer.Argument(metavar="FOLDER", help="A tracks folder, or a folder of annotations or videos.")
     ],
     *,
+    questions: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="CLEVRER question file: which answers does the finding change?")
+    ] = None,
     out: Annotated[Path, typer.Option(metavar="DIR", help="Folder of the finding.")] = Path("vrdp-prob-finding"),
     as_json: Annotated[bool, typer.Option("--json", help="One JSON document on standard output.")] = False,
     camera: CameraOption = None,
@@ -231,6 +236,7 @@ def discover_causes(
             metavar="|".join(OPTIONS["sampler"]), help="Of no effect here: causes are compared by fits, without draws."
         ),
     ] = SAMPLER_OF_FITS,
+    word: Words = None,
     seed: Seed = 0,
     quiet: Quiet = False,
 ) -> None:
@@ -239,9 +245,15 @@ def discover_causes(
     check_options(sampler=sampler)
     check_writable(out)
     physics = model_at(model)
-    check_video_count(video_names(folder), source=folder)
+    names, words = video_names(folder), words_at(word)
+    check_video_count(names, source=folder)
+    asked = {} if questions is None else questions_about(questions, names, words)
     videos = load_all(folder, camera=camera, progress=progress)
+    for tracks in videos:
+        check_questions(asked.get(tracks.video, ()), tracks=tracks, words=words)
     finding = discover(videos, model=physics, seed=seed, processes=processes, progress=progress)
+    if asked:
+        finding = with_answers(finding, videos, asked, words=words, seed=seed, processes=processes, progress=progress)
     if sampler != SAMPLER_OF_FITS:
         note = f"Causes are compared by fits, without draws: --sampler {sampler} changed nothing."
         finding = replace(finding, notes=(*finding.notes, note))

@@ -7,6 +7,7 @@ from vrdp_prob.concepts.perceived.concepts import Concepts
 from vrdp_prob.concepts.perceived.storage import read_concepts
 from vrdp_prob.concepts.physical import LearnedWord
 from vrdp_prob.datasets import read_questions, video_files, video_names
+from vrdp_prob.datasets.folder import some
 from vrdp_prob.errors import InputError
 from vrdp_prob.models.physics import PhysicsModel
 from vrdp_prob.reasoning.vocabulary import ChangeWord, Vocabulary
@@ -54,14 +55,26 @@ def words_at(paths: list[Path] | None) -> tuple[LearnedWord, ...]:
 
 def questions_of(path: Path, names: list[str], words: Sequence[ChangeWord] = ()) -> dict[str, list[Question]]:
     """The questions about each video, understood as far as that goes before the video is looked at."""
-    asked = read_questions(path)
+    asked = questions_about(path, names, words)
     for name in names:
         if name not in asked:
             raise InputError(
                 f"{path}: there is no question about {name}; "
                 "the stem of a scene's 'video_filename' must be the name of the video."
             )
-        check_questions(asked[name], words=words)
+    return asked
+
+
+def questions_about(path: Path, names: list[str], words: Sequence[ChangeWord] = ()) -> dict[str, list[Question]]:
+    """The questions about some videos, at least one of which is asked about, understood as far as that goes."""
+    asked = {name: questions for name, questions in read_questions(path).items() if name in names}
+    if not asked:
+        raise InputError(
+            f"{path}: there is no question about {some(names)}; "
+            "the stem of a scene's 'video_filename' must be the name of the video."
+        )
+    for questions in asked.values():
+        check_questions(questions, words=words)
     return asked
 
 

@@ -137,6 +137,51 @@ def test_options_reach_the_search(videos: Path, tmp_path: Path, monkeypatch: pyt
     assert sorted(path.name for path in (tmp_path / "vrdp-prob-finding").iterdir()) == FILES
 
 
+def asked_in(path: Path, video: str, program: list[str]) -> Path:
+    """A question file about one video."""
+    question = {"question_id": 0, "question": "How many objects are there?", "program": program, "answer": "2"}
+    path.write_text(json.dumps([{"video_filename": f"{video}.mp4", "questions": [question]}]))
+    return path
+
+
+def test_questions_are_answered_with_both_models(
+    videos: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    let_find(monkeypatch, named())
+    questions = asked_in(tmp_path / "questions.json", "b", ["objects", "count"])
+    command = ["discover", str(videos), "--questions", str(questions), "--processes", "1", "--out", str(tmp_path)]
+    assert cli.run(command) == 0
+    assert (
+        "Of one question about these videos, none is answered otherwise with the extended model; 1 of 1 answers are"
+        in (capsys.readouterr().out)
+    )
+    (answer,) = json.loads((tmp_path / "finding.json").read_text())["answers"]
+    assert (answer["video"], answer["differs"]) == ("b", False)
+    assert (answer["options"][0]["words"], answer["options"][0]["right"]) == ("2", True)
+
+
+@pytest.mark.parametrize(
+    ("asked", "words"),
+    [
+        (("d", ["objects", "count"]), "there is no question about a, b, c"),
+        (("b", ["objects", "total"]), "question 0: "),
+        (("b", ["objects", "filter_color", "green", "unique", "query_shape"]), "question 0: "),
+    ],
+)
+def test_questions_that_cannot_be_answered_are_refused_before_the_search(
+    videos: Path,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+    asked: tuple[str, list[str]],
+    words: str,
+) -> None:
+    given = let_find(monkeypatch, named())
+    questions = asked_in(tmp_path / "questions.json", *asked)
+    assert words in refused(capsys, "discover", videos, "--questions", questions, "--out", tmp_path / "out")
+    assert not given
+
+
 @pytest.mark.parametrize(("names", "there_are"), [(("a",), "is 1 video"), (("a", "b"), "are 2 videos")])
 def test_too_few_videos_are_refused(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], names: tuple[str, ...], there_are: str

@@ -6,6 +6,8 @@ import numpy as np
 
 from vrdp_prob.discovery.finding import (
     Check,
+    ComparedAnswer,
+    ComparedOption,
     Description,
     Estimate,
     Finding,
@@ -223,6 +225,39 @@ def at_its_limits() -> Finding:
     return replace(named(), causes=(cause,), checks=checks, checks_after=(), upper_bounds=bounds)
 
 
+ANSWERS = (
+    ComparedAnswer(
+        "run_03",
+        "What shape is the object that stops first?",
+        (
+            ComparedOption("cube", 0.64, 0.21, chosen_before=True, chosen_after=False, right=False),
+            ComparedOption("sphere", 0.36, 0.79, chosen_before=False, chosen_after=True, right=True),
+        ),
+    ),
+    ComparedAnswer(
+        "run_05",
+        "What will happen next?",
+        (
+            ComparedOption("The cube hits the sphere", 0.91, 0.62, chosen_before=True, chosen_after=True, right=True),
+            ComparedOption("The discs collide", 0.05, 0.02, chosen_before=False, chosen_after=False, right=False),
+        ),
+    ),
+    ComparedAnswer(
+        "run_05",
+        "How many collisions happen?",
+        (
+            ComparedOption("2", 0.98, 0.97, chosen_before=True, chosen_after=True, right=False),
+            ComparedOption("3", 0.02, 0.03, chosen_before=False, chosen_after=False, right=True),
+        ),
+    ),
+)
+
+
+def with_answers() -> Finding:
+    """Two causes, and what they change in the answers to three questions."""
+    return replace(named(), answers=ANSWERS)
+
+
 EVERY_KIND = {
     "named": named,
     "nothing": nothing,
@@ -230,4 +265,5 @@ EVERY_KIND = {
     "with_a_rest": with_a_rest,
     "with_many_videos": with_many_videos,
     "at_its_limits": at_its_limits,
+    "with_answers": with_answers,
 }

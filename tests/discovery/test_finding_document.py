@@ -8,7 +8,7 @@ from pathlib import Path
 import jsonschema
 import pytest
 
-from tests.discovery.findings import BASE, EVERY_KIND, VIDEOS, at_its_limits, named, nothing, unknown
+from tests.discovery.findings import BASE, EVERY_KIND, VIDEOS, at_its_limits, named, nothing, unknown, with_answers
 from vrdp_prob.discovery.document import to_document, write_finding
 from vrdp_prob.models.physics import PhysicsModel
 from vrdp_prob.report import schema
@@ -60,6 +60,21 @@ def test_evidence_bounds_and_notes():
     assert found["upper_bounds"][-1]["bound"] is None
     assert found["notes"] == ["Two videos end before 1 s; their errors at 1 s are not counted."]
     assert found["videos"] == list(VIDEOS)
+
+
+def test_answers_of_both_models():
+    assert to_document(named())["answers"] is None
+    first, second, _ = to_document(with_answers())["answers"]
+    assert (first["video"], first["question"]) == ("run_03", "What shape is the object that stops first?")
+    assert first["options"][1] == {
+        "words": "sphere",
+        "before": 0.36,
+        "after": 0.79,
+        "chosen_before": False,
+        "chosen_after": True,
+        "right": True,
+    }
+    assert (first["differs"], second["differs"]) == (True, False)
 
 
 def test_the_unknown_is_described():

@@ -5,9 +5,21 @@ from dataclasses import replace
 
 import pytest
 
-from tests.discovery.findings import CHECKS, EVERY_KIND, TILT, named, nothing, unknown, with_a_rest, with_many_videos
+from tests.discovery.findings import (
+    ANSWERS,
+    CHECKS,
+    EVERY_KIND,
+    TILT,
+    named,
+    nothing,
+    unknown,
+    with_a_rest,
+    with_answers,
+    with_many_videos,
+)
 from tests.report.browser import Browser, find_chromium
 from tests.report.outline import Outline
+from vrdp_prob.discovery.changed_answers import answers_sentence
 from vrdp_prob.discovery.page import render
 from vrdp_prob.discovery.summary import lines, summary, verdict_sentence
 from vrdp_prob.discovery.wording import TIMES
@@ -114,6 +126,44 @@ def test_the_unknown_is_marked_as_a_description():
     assert "a_x = 0.041 sin(6.2 t) - 0.11 v_y" in text
     assert "follows 61 % of its variance in videos that were left out" in text
     assert "A description, not a cause" in text_of(render(with_a_rest()))
+
+
+def test_answers_that_change_lead_and_those_that_do_not_are_left_out():
+    page = render(with_answers())
+    stops, happens = (page.index(answer.question) for answer in ANSWERS[:2])
+    assert stops < happens
+    assert ANSWERS[2].question not in page
+    told = text_of(page)
+    assert "Of three questions about these videos, one is answered otherwise with the extended model; 2 of 3 " in told
+    assert "answers are right with it, 1 without." in told
+    rows = re.sub(r"\s+", " ", page[stops:happens])
+    assert "<td>cube</td><td><b>64 %</b></td><td>21 %</td>" in rows
+    assert '<td>sphere <span class="right">right</span></td><td>36 %</td><td><b>79 %</b></td>' in rows
+
+
+def test_of_many_changed_answers_most_are_folded_away():
+    page = render(replace(named(), answers=(ANSWERS[0],) * 12))
+    assert page.count(ANSWERS[0].question) == 12
+    assert "Four more questions" in text_of(page)
+    assert "What it changes in the answers" not in text_of(render(named()))
+
+
+@pytest.mark.parametrize(
+    ("answers", "said"),
+    [
+        ((), "no question about these videos could be answered with both models"),
+        (ANSWERS[2:], "of one question about these videos, none is answered otherwise with the extended model; 0 of 1"),
+    ],
+)
+def test_how_many_answers_change_in_a_sentence(answers, said):
+    assert answers_sentence(answers).startswith(said)
+
+
+def test_nothing_is_said_of_right_answers_that_nobody_knows():
+    unjudged = replace(ANSWERS[0], options=tuple(replace(option, right=None) for option in ANSWERS[0].options))
+    assert answers_sentence((unjudged,)) == (
+        "of one question about these videos, one is answered otherwise with the extended model"
+    )
 
 
 def test_many_videos_are_stacked_dots():

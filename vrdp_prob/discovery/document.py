@@ -8,7 +8,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from vrdp_prob.discovery.finding import Check, Finding, FoundCause, Gain
+from vrdp_prob.discovery.finding import Check, ComparedAnswer, Finding, FoundCause, Gain
 from vrdp_prob.discovery.page import NO_FIGURES, render
 from vrdp_prob.discovery.summary import verdict_sentence
 from vrdp_prob.files import write_atomically
@@ -46,6 +46,7 @@ def to_document(finding: Finding, *, model: Path | None = None) -> dict[str, Any
         "evidence": _evidence(finding.checks),
         "evidence_after": _evidence(finding.checks_after),
         "upper_bounds": [asdict(bound) for bound in finding.upper_bounds],
+        "answers": None if finding.answers is None else [_answer(answer) for answer in finding.answers],
         "description": None if finding.description is None else asdict(finding.description),
         "model": None if model is None else str(model.absolute()),
         "base_model": _model(finding.model),
@@ -114,6 +115,10 @@ def _gain(gain: Gain) -> dict[str, Any]:
         "after": asdict(gain.after),
         "elpd_difference_by_video": dict(gain.by_video),
     }
+
+
+def _answer(answer: ComparedAnswer) -> dict[str, Any]:
+    return {**asdict(answer), "differs": answer.differs}
 
 
 def _evidence(checks: Sequence[Check]) -> list[dict[str, Any]]:

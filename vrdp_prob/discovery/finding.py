@@ -180,6 +180,65 @@ class Description:
 
 
 @dataclass(frozen=True)
+class ComparedOption:
+    """What may be answered to a question: a value, or one of its choices.
+
+    Parameters
+    ----------
+    words
+        The value or the choice.
+    before, after
+        Its probability under the model that was given and under the extended one; of a choice, that it is correct.
+    chosen_before, chosen_after
+        Whether it is (part of) the answer.
+    right
+        Whether it should be; None where that is not known.
+    """
+
+    words: str
+    before: float
+    after: float
+    chosen_before: bool
+    chosen_after: bool
+    right: bool | None = None
+
+
+@dataclass(frozen=True)
+class ComparedAnswer:
+    """The answer to a question about one of the videos, by the model that was given and by the extended one.
+
+    Parameters
+    ----------
+    video, question
+        The video, and the question in English.
+    options
+        What may be answered.
+    """
+
+    video: str
+    question: str
+    options: tuple[ComparedOption, ...]
+
+    @property
+    def differs(self) -> bool:
+        """Whether the models give different answers."""
+        return any(option.chosen_before != option.chosen_after for option in self.options)
+
+    @property
+    def change(self) -> float:
+        """The largest change of a probability."""
+        return max((abs(option.after - option.before) for option in self.options), default=0.0)
+
+    @property
+    def right(self) -> tuple[bool, bool] | None:
+        """Whether either answer is right; None where that is not known."""
+        if any(option.right is None for option in self.options):
+            return None
+        before = all(option.chosen_before == option.right for option in self.options)
+        return before, all(option.chosen_after == option.right for option in self.options)
+
+
+@dataclass(frozen=True)
 class Finding:
     """What the simulation gets wrong in some videos.
 
@@ -203,6 +262,8 @@ class Finding:
         Limits of the result, in sentences.
     figures
         What the model misses, and the extended one, as SVG by title.
+    answers
+        Answers to questions about the videos under both models; None where nothing was asked or nothing is named.
     """
 
     verdict: Verdict
@@ -216,6 +277,7 @@ class Finding:
     description: Description | None = None
     notes: tuple[str, ...] = ()
     figures: Mapping[str, str] = field(default_factory=dict)
+    answers: tuple[ComparedAnswer, ...] | None = None
 
     @property
     def named(self) -> tuple[FoundCause, ...]:

@@ -7,6 +7,7 @@ from typing import Any
 from markupsafe import Markup
 
 from vrdp_prob.datasets.folder import some
+from vrdp_prob.discovery.changed_answers import rows
 from vrdp_prob.discovery.finding import Check, Description, Finding, FoundCause, Verdict
 from vrdp_prob.discovery.gain_figure import error_figure, video_figure
 from vrdp_prob.discovery.summary import POSSIBLE, possible, summary, verdict_sentence
@@ -56,6 +57,7 @@ def render(finding: Finding, figures: Mapping[str, str] = NO_FIGURES) -> str:
         "errors": error_figure(named) if named else None,
         "description": None if finding.description is None else _description(finding.description),
         "causes": [{**_cause(cause, finding), "videos": video_figure(cause.gain)} for cause in named],
+        "answers": None if finding.answers is None else rows(finding.answers),
         **_others(finding),
         "coverage": _coverage(named),
         "checks": _checks(finding),

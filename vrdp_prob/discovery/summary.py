@@ -3,6 +3,7 @@
 import re
 from collections.abc import Sequence
 
+from vrdp_prob.discovery.changed_answers import answers_sentence
 from vrdp_prob.discovery.finding import Check, Finding, FoundCause, Gain, UpperBound, Verdict
 from vrdp_prob.discovery.wording import (
     bound_words,
@@ -42,10 +43,15 @@ def summary(finding: Finding) -> list[str]:
     told = [_gains(finding.named)] if finding.named else []
     if others := possible(finding):
         told.append(_others(others, beside=finding.named))
-    told += [f"{sentence(line)}." for line in (*_carried(finding.named), _checks(finding), _rest(finding)) if line]
+    told += [f"{sentence(line)}." for line in _lines(finding) if line]
     if finding.verdict is Verdict.NONE:
         told.append("No cause of the catalogue predicts videos that are left out better.")
     return told
+
+
+def _lines(finding: Finding) -> list[str]:
+    answers = "" if finding.answers is None else answers_sentence(finding.answers)
+    return [*_carried(finding.named), answers, _checks(finding), _rest(finding)]
 
 
 def possible(finding: Finding) -> list[FoundCause]:

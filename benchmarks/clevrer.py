@@ -1,0 +1,200 @@
+"""What the planar model misses in scenes of a 3D engine, and whether the model that discovery extends answers better.
+
+    python benchmarks/clevrer.py [--json FILE] [--docs docs] [--train 30] [--test 30] [--results FOLDER]
+
+Tracks of ../shared/data/clevrer_bullet. Discovery, and what the scenes share, see the even scenes; the odd ones are
+never seen by either. Of each of these the first 60 % of the frames are fitted and the positions in the rest are
+predicted by the best fit; its questions are answered from the whole video by posterior draws. The finding, the learned
+models and each scene's results are kept in `--results` as they come, so that a run that was interrupted goes on; delete
+that folder after a change of the code. `--docs` writes the tables into `clevrer.md` there.
+"""
+
+import argparse
+import json
+import os
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+os.environ.setdefault("OMP_NUM_THREADS", "1")
+
+import numpy as np
+import torch
+from _answer_goals import GOALS, title
+from _extension import extended_model, fit_of
+from _page import table_row, write_between
+from _resumable import Result, measured
+
+from vrdp_prob.datasets import load_all, read_questions
+from vrdp_prob.evaluation.judgement import Judgement, judge
+from vrdp_prob.evaluation.scores import Interval, Scores, bootstrap, brier_gain
+from vrdp_prob.files import write_atomically
+from vrdp_prob.inference import default_model, infer
+from vrdp_prob.inference.map_fit import fit_map
+from vrdp_prob.inference.several_videos.learned import learned_model
+from vrdp_prob.models.physics import PhysicsModel
+from vrdp_prob.models.simulator.rollout import compile_model
+from vrdp_prob.reasoning import PosteriorWorlds
+from vrdp_prob.scene import Tracks
+
+DATA = Path(__file__).parents[2] / "shared" / "data" / "clevrer_bullet"
+RESULTS = Path("out") / "clevrer"
+SCENES = range(60)
+SEEN_SHARE = 0.6
+AHEAD = 1.0
+"""Time in s after the last frame that is fitted, up to which the nearer error counts."""
+DRAWS = 100
+PLAIN, BASE, EXTENDED = "base model, nothing learned", "base model", "extended model"
+
+
+@dataclass(frozen=True)
+class Task:
+    """A test scene under one of the models."""
+
+    tracks: Tracks
+    name: str
+    model: PhysicsModel
+
+    @property
+    def key(self) -> str:
+        """By which its result is found again."""
+        return f"{self.tracks.video}, {self.name}"
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    options = _parser().parse_args(arguments)
+    if not DATA.is_dir():
+        print(f"no data at {DATA}: nothing measured")
+        return 0
+    training = load_all(DATA, videos=[f"video_{scene:05d}" for scene in SCENES[0::2][: options.train]])
+    compile_model(default_model())
+    models = {PLAIN: default_model()}
+    for name, model in ((BASE, default_model()), (EXTENDED, extended_model(training, options.results / "finding"))):
+        compile_model(model)
+        models[name] = learned_model(fit_of(training, model, options.results / f"{name.replace(' ', '-')}.pickle"))
+    tasks = [
+        Task(tracks, name, model)
+        for tracks in load_all(DATA, videos=[f"video_{scene:05d}" for scene in SCENES[1::2][: options.test]])
+        for name, model in models.items()
+    ]
+    results = measured(
+        scored,
+        {task.key: task for task in tasks},
+        options.results / "test.jsonl",
+        field="key",
+        label="Test scenes",
+        processes=options.processes,
+    )
+    text = "\n".join([*_errors(results, len(training)), "", *_answers(results)])
+    print(text)
+    if options.docs:
+        write_between(options.docs / "clevrer.md", text)
+    if options.json:
+        with write_atomically(options.json) as temporary:
+            temporary.write_text(json.dumps({"results": results}, indent=1) + "\n", encoding="utf-8")
+    return 0
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--json", type=Path, help="file for the results")
+    parser.add_argument("--docs", type=Path, help="folder of the documentation, whose page is written anew")
+    parser.add_argument("--train", type=int, default=30, help="how many of the even scenes, from the first")
+    parser.add_argument("--test", type=int, default=30, help="how many of the odd scenes, from the first")
+    parser.add_argument("--results", type=Path, default=RESULTS, help="folder of the results, which are gone on with")
+    parser.add_argument("--processes", type=int, default=os.cpu_count() or 1)
+    return parser
+
+
+def scored(task: Task) -> Result:
+    """Errors (m^2 per axis) and judgements of a test scene under a model."""
+    torch.set_num_threads(1)
+    posterior = infer(task.tracks, sampler="laplace", model=task.model, seed=0, hand_on=False)
+    worlds = PosteriorWorlds(posterior, draws=DRAWS)
+    questions = read_questions(DATA / "questions.json")[task.tracks.video]
+    return {
+        "key": task.key,
+        "scene": task.tracks.video,
+        "model": task.name,
+        **_forecast_errors(task),
+        "judgements": [judge(task.tracks.video, worlds, one).to_document() for one in questions],
+    }
+
+
+def _forecast_errors(task: Task) -> dict[str, float]:
+    """Mean squared error per axis in m^2: of the frames that are fitted, of the second after them, and of all later."""
+    times = task.tracks.times
+    last = times[int(SEEN_SHARE * len(times)) - 1]
+    seen = task.tracks.until(last)
+    fit = fit_map(seen, task.model, np.random.default_rng(0), model_error=False)
+    known = [body.id for body in seen.bodies]
+    longer = replace(seen, data=task.tracks.data.sel(body=known))
+    likelihood = replace(fit.likelihood, tracks=longer)
+    predicted = likelihood.rollout(torch.from_numpy(fit.point[None])).trajectory[0, :, :, :2].numpy()
+    squares = ((predicted - longer.positions) ** 2).mean(axis=-1)
+    parts = {"fitted": times <= last, "next": (times > last) & (times <= last + AHEAD), "later": times > last}
+    return {name: float(np.nanmean(squares[part])) for name, part in parts.items()}
+
+
+def _errors(results: Sequence[Result], training: int) -> list[str]:
+    """Errors in the scene in the middle, and in how many scenes the extended model is nearer."""
+    head = ("error, mm", "frames that are fitted", "the next second", "all that is left", "nearer than the base model")
+    lines = [f"Learned on {training} scenes, tested on {len(_of(results, BASE))} others.", ""]
+    lines += [table_row(*head), table_row(*["---"] * len(head))]
+    base = np.array([one["later"] for one in _of(results, BASE)])
+    for name in (PLAIN, BASE, EXTENDED):
+        mine = _of(results, name)
+        middle = [1e3 * np.median(np.sqrt([one[part] for one in mine])) for part in ("fitted", "next", "later")]
+        later = np.array([one["later"] for one in mine])
+        nearer = f"{(later < base).sum()} of {len(base)}" if name != BASE else ""
+        lines.append(table_row(name, *(f"{value:.1f}" for value in middle), nearer))
+    return [*lines, "", _ratio(results)]
+
+
+def _ratio(results: Sequence[Result]) -> str:
+    """How the extended model's errors compare with the base model's; the middle 95 % when scenes are drawn anew."""
+    logarithms = [
+        (ours["scene"], [float(np.log(ours["later"] / base["later"])) / 2])
+        for ours, base in zip(_of(results, EXTENDED), _of(results, BASE), strict=True)
+    ]
+    mean = float(np.mean([value for _, values in logarithms for value in values]))
+    interval = bootstrap(logarithms, np.random.default_rng(0))
+    said = "" if interval is None else f" (95 %: {np.exp(interval.low):.2f} to {np.exp(interval.high):.2f})"
+    return f"Errors of all that is left are {np.exp(mean):.2f} times those of the base model{said}, geometric mean."
+
+
+def _of(results: Sequence[Result], name: str) -> list[Result]:
+    return [one for one in results if one["model"] == name]
+
+
+def _answers(results: Sequence[Result]) -> list[str]:
+    head = ("questions", "model", "right, per question", "per option", "Brier", "lower than the base model's by")
+    lines = [table_row(*head), table_row(*["---"] * len(head))]
+    rows = {name: _judgements(_of(results, name)) for name in (PLAIN, BASE, EXTENDED)}
+    for kind in GOALS:
+        base = [one for one in rows[BASE] if one.kind is kind]
+        for name, made in rows.items():
+            mine = [one for one in made if one.kind is kind]
+            score = Scores.of(mine)
+            shares = [_percent(score.accuracy_per_question), _percent(score.accuracy_per_option)]
+            brier = "" if score.brier is None else f"{score.brier:.4f}"
+            lower = "" if name == BASE else _gain(*brier_gain(mine, base))
+            lines.append(table_row(f"{title(kind)} ({score.questions})", name, *shares, brier, lower))
+    return lines
+
+
+def _judgements(results: Sequence[Result]) -> list[Judgement]:
+    return [Judgement.of_document(one) for result in results for one in result["judgements"]]
+
+
+def _gain(gain: float, interval: Interval | None) -> str:
+    return f"{gain:.4f}" + ("" if interval is None else f" ({interval.low:.4f} to {interval.high:.4f})")
+
+
+def _percent(value: float | None) -> str:
+    return "" if value is None else f"{100 * value:.1f} %"
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -161,25 +161,19 @@ def test_questions_are_answered_with_both_models(
 
 
 @pytest.mark.parametrize(
-    ("asked", "words"),
+    ("video", "program", "words"),
     [
-        (("d", ["objects", "count"]), "there is no question about a, b, c"),
-        (("b", ["objects", "total"]), "question 0: "),
-        (("b", ["objects", "filter_color", "green", "unique", "query_shape"]), "question 0: "),
+        ("d", ["objects", "count"], "there is no question about a, b, c"),
+        ("b", ["objects", "total"], "question 0: "),
+        ("b", ["objects", "filter_color", "green", "unique", "query_shape"], "question 0: "),
     ],
 )
-def test_questions_that_cannot_be_answered_are_refused_before_the_search(
-    videos: Path,
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
-    monkeypatch: pytest.MonkeyPatch,
-    asked: tuple[str, list[str]],
-    words: str,
+def test_questions_that_cannot_be_answered_are_refused(
+    videos: Path, capsys: pytest.CaptureFixture[str], video: str, program: list[str], words: str
 ) -> None:
-    given = let_find(monkeypatch, named())
-    questions = asked_in(tmp_path / "questions.json", *asked)
-    assert words in refused(capsys, "discover", videos, "--questions", questions, "--out", tmp_path / "out")
-    assert not given
+    questions = asked_in(videos.parent / "questions.json", video, program)
+    assert words in refused(capsys, "discover", videos, "--questions", questions, "--out", videos.parent / "out")
+    assert not (videos.parent / "out").exists()
 
 
 @pytest.mark.parametrize(("names", "there_are"), [(("a",), "is 1 video"), (("a", "b"), "are 2 videos")])

@@ -53,12 +53,16 @@ class Step:
         is in doubt.
     overdispersion
         Of each video, by what the model leaves unexplained before the step.
+    pair
+        A refit of `tried` and one with a further cause, which are established together; None where nothing was left to
+        look for a second cause in, or no two are.
     """
 
     scores: tuple[CauseScore, ...]
     beside_chance: tuple[CauseScore, ...]
     tried: tuple[Trial, ...]
     overdispersion: Float[np.ndarray, "video"]
+    pair: tuple[Trial, Trial] | None = None
 
 
 @dataclass(frozen=True)
@@ -114,22 +118,26 @@ def search(
         chain = [Trial((), with_own_population(fit)).continued()]
         steps = [searcher.first(chain[0])]
         while len(chain) <= MOST_CAUSES:
-            step = steps[-1] = searcher.tried(chain[-1], steps[-1])
-            if not step.tried or gain(step.tried[0], chain[-1])[0] < needed:
-                break
-            winner = step.tried[0]
-            without = winner.without(winner.causes[-1])
-            if gain(without, chain[-1])[0] > needed:
-                # The refit has found a better course of events, which is no merit of the cause.
-                chain[-1] = without
-                if gain(winner, without)[0] < needed:
-                    steps[-1] = searcher.first(without)
-                    continue
-            after = searcher.first(winner)
-            if searcher.doubted(winner, chain[-1], after.overdispersion):
+            step = steps[-1] = searcher.tried(chain[-1])
+            winner = next(iter(step.tried), None)
+            if winner is not None and gain(winner, chain[-1])[0] < needed:
+                winner = None
+            if winner is not None:
+                without = winner.without(winner.causes[-1])
+                if gain(without, chain[-1])[0] > needed:
+                    # The refit has found a better course of events, which is no merit of the cause.
+                    chain[-1] = without
+                    if gain(winner, without)[0] < needed:
+                        steps[-1] = searcher.first(without)
+                        continue
+                if searcher.doubted(winner, chain[-1], searcher.first(winner).overdispersion):
+                    winner = None
+            if winner is None and step.pair is not None:
+                winner, _ = step.pair
+            if winner is None:
                 break
             chain.append(winner)
-            steps.append(after)
+            steps.append(searcher.first(winner))
         best = searcher.unpatched(chain[-1])
         if best is not chain[-1]:
             chain.append(best)
@@ -147,6 +155,7 @@ class _Searcher:
     needed: float
     advance: Advance
     _known: dict[Trial, Step] = field(default_factory=dict)
+    _refitted_before: dict[Trial, list[Trial]] = field(default_factory=dict)
 
     def first(self, trial: Trial) -> Step:
         """A step in which nothing was tried yet; a trial that is asked for again is not scored again."""
@@ -159,25 +168,53 @@ class _Searcher:
             self._known[trial] = Step(tuple(scores), tuple(beside), (), overdispersion(found.model, seed=self.seed))
         return self._known[trial]
 
-    def tried(self, trial: Trial, step: Step) -> Step:
+    def tried(self, trial: Trial) -> Step:
         """The step with the causes tried that may be the best one.
 
         Hidden things are tried only where nothing explains the videos better than that bodies change their velocity all
         at once.
         """
-        likely = _shortlist(step.scores)
+        found = self._refits(trial)
+        pair = None
+        if not self._settled(trial, found):
+            pair = self._pair(trial, found)
+            if pair is None or not self._settled(trial, [pair[1]]):
+                found = sorted([*found, *self._lost(trial, found)], key=_merit, reverse=True)
+        return replace(self.first(trial), tried=tuple(self._in_order(trial, found)), pair=pair)
+
+    def _refits(self, trial: Trial) -> list[Trial]:
+        """Refits with one more cause, the best first; those of a trial that is asked for again are not made again."""
+        if trial not in self._refitted_before:
+            self._refitted_before[trial] = self._new_refits(trial, self.first(trial).scores)
+        return self._refitted_before[trial]
+
+    def _new_refits(self, trial: Trial, scores: Sequence[CauseScore]) -> list[Trial]:
+        likely = _shortlist(scores)
         close = [one for one in likely if one.size > CLOSE * likely[0].size]
         found = self._refitted(trial, close)
         if not self._settled(trial, found):
             found += self._refitted(trial, [one for one in likely if one not in close])
             found.sort(key=_merit, reverse=True)
-        kicks = next((one for one in step.scores if isinstance(one.effect, ExternalImpulse) and one.sites), None)
+        kicks = next((one for one in scores if isinstance(one.effect, ExternalImpulse) and one.sites), None)
         if kicks is not None and (not found or found[0].causes[-1].name == kicks.effect.name):
             found += self._hidden(trial, found, kicks)
-        found.sort(key=_merit, reverse=True)
-        if not self._settled(trial, found):
-            found += self._lost(trial, found)
-        return replace(step, tried=tuple(self._in_order(trial, found)))
+        return sorted(found, key=_merit, reverse=True)
+
+    def _pair(self, trial: Trial, found: Sequence[Trial]) -> tuple[Trial, Trial] | None:
+        """The cause that brings most where all else is noise, and with a second one, if both together are established.
+
+        What two causes leave when one is known may follow chance as well as what both leave: then neither stands out
+        beside chance by itself.
+        """
+        lasting = [one for one in found if not happens_once(one.causes[-1])]
+        first = max(lasting, key=lambda one: one.brought(trial) + one.log_prior, default=trial)
+        if first.brought(trial) < self.needed:
+            return None
+        second = next(iter(self._in_order(first, self._refits(first))), first)
+        if second is first or gain(second, trial)[0] < 2 * self.needed or gain(second, first)[0] < self.needed:
+            return None
+        divisor = self.first(second).overdispersion
+        return None if self.doubted(second, trial, divisor) or self.doubted(second, first, divisor) else (first, second)
 
     def _in_order(self, trial: Trial, found: Sequence[Trial]) -> list[Trial]:
         """Trials by merit; those that patch several videos last, unless the best other one is in doubt."""

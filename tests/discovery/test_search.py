@@ -12,7 +12,7 @@ from vrdp_prob.discovery.trials import Trial
 def _refit(cause: str, gained: float, *, patches: bool = False) -> Mock:
     """A refit, with what it gains in each of three videos, and whether its cause patches several of them."""
     refit = create_autospec(Trial, instance=True)
-    refit.causes, refit.log_density, refit.log_prior = (cause,), np.full(3, gained), 0.0
+    refit.causes, refit.log_density, refit.log_prior = tuple(cause.split("+")), np.full(3, gained), 0.0
     refit.fit = Mock(videos=(0, 1, 2))
     refit.patches.return_value = patches
     return refit
@@ -42,3 +42,24 @@ def test_kicks_come_last_unless_the_best_other_cause_is_in_doubt(
 def test_kicks_alone_are_ordered_by_merit() -> None:
     kicks, weaker = _refit("kicks", 30.0, patches=True), _refit("kicks", 5.0, patches=True)
     assert _searcher()._in_order(_refit("nothing", 0.0), [weaker, kicks]) == [kicks, weaker]
+
+
+@pytest.mark.parametrize(
+    ("both", "in_doubt", "is_found"),
+    [(8.0, False, True), (8.0, True, False), (0.5, False, False)],
+    ids=["both stand out", "too few videos speak for both", "both bring too little"],
+)
+def test_two_causes_are_found_of_which_neither_stands_out_beside_chance(
+    both: float, in_doubt: bool, is_found: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    nothing, tilt, drag, kicks = (_refit(*one) for one in (("", 0.0), ("tilt", -1.0), ("drag", 0.5), ("kicks", 0.2)))
+    for one, brought in ((tilt, 60.0), (drag, 20.0), (kicks, 90.0)):
+        one.brought.return_value = brought
+    second = _refit("tilt+drag", both)
+    monkeypatch.setattr(search, "happens_once", lambda cause: cause == "kicks")
+    monkeypatch.setattr(search._Searcher, "_refits", lambda _self, trial: [second] if trial is tilt else [])
+    monkeypatch.setattr(search._Searcher, "_in_order", lambda _self, _trial, found: found)
+    monkeypatch.setattr(search._Searcher, "first", Mock())
+    monkeypatch.setattr(search._Searcher, "doubted", lambda *_given: in_doubt)
+    searcher = search._Searcher((), seed=0, needed=2.0, advance=lambda _count: None)
+    assert searcher._pair(nothing, [drag, kicks, tilt]) == ((tilt, second) if is_found else None)

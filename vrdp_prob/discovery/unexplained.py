@@ -11,20 +11,21 @@ section 2.7.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
 from jaxtyping import Float
+from scipy.linalg import solve_triangular
 from scipy.optimize import minimize
 from scipy.stats import chi2
 
 from vrdp_prob.discovery.held_out import left_out
-from vrdp_prob.discovery.linear import LinearFit, LinearVideo
+from vrdp_prob.discovery.linear import LinearFit, LinearVideo, log_evidence
 from vrdp_prob.discovery.residual_model import ResidualModel, VideoResiduals
 from vrdp_prob.inference.parallel import in_processes
 from vrdp_prob.inference.several_videos.fitting import SharedFit
-from vrdp_prob.models.model_error import Factors, Strand, Whitening, factors
+from vrdp_prob.models.model_error import Factors, Strand, Whitening, by_law, factors
 
 NEEDED = 6.0
 """Gain (nats) in the probability of a video from which on something is said to be unexplained in it."""
@@ -133,6 +134,7 @@ class _Search:
     video: VideoResiduals
     shown: float
     prior: Float[np.ndarray, "shared shared"]
+    _last: dict[int, tuple[Straying, Float[np.ndarray, "number column"], float]] = field(default_factory=dict)
 
     def found(self) -> tuple[Straying, ...]:
         """The most probable straying; that of noise by itself where this does as well.
@@ -179,8 +181,46 @@ class _Search:
 
     def _density(self, straying: tuple[Straying, ...]) -> float:
         """Log density (nats, up to a constant) of the video by itself."""
-        whitening = self.whitening(straying)
-        return _stretch(whitening) + _log_density(self._alone.straying(whitening))
+        parts = [self._independent(axis, one) for axis, one in enumerate(straying)]
+        rows = np.concatenate([*(rows for rows, _ in parts), self._rows[self.video.positions :]])
+        return sum(stretch for _, stretch in parts) + log_evidence(rows[:, :-1], rows[:, -1])
+
+    def _independent(self, axis: int, one: Straying) -> tuple[Float[np.ndarray, "number column"], float]:
+        """Rows of an axis made independent, and the logarithm of the factor by which the residuals were stretched.
+
+        The last ones are kept: the search changes one axis at a time.
+        """
+        known = self._last.get(axis)
+        if known is None or known[0] != one:
+            unit = self.video.noise.slope(2) / self.video.noise_sd
+            found, stretch = [], 0.0
+            for alike in self._alike[axis]:
+                variance = np.full(self.video.positions, one.noise)
+                root = np.linalg.cholesky(alike[0].covariance(one.size * unit, one.duration, variance))
+                side_by_side = np.concatenate([self._rows[strand.places] for strand in alike], axis=1)
+                independent = solve_triangular(root, side_by_side, lower=True, check_finite=False)
+                found += np.split(independent, len(alike), axis=1)
+                stretch -= len(alike) * float(np.log(np.diag(root)).sum())
+            known = self._last[axis] = one, np.concatenate(found), stretch
+        return known[1:]
+
+    @cached_property
+    def _rows(self) -> Float[np.ndarray, "residual column"]:
+        """Derivatives by the unknowns, and the residuals in the last column."""
+        alone = self._alone
+        return np.concatenate([alone.own, alone.residuals[:, None]], axis=1)
+
+    @cached_property
+    def _alike(self) -> list[list[list[Strand]]]:
+        """Strands of each axis, those together that stray alike."""
+        variance = np.ones(self.video.positions)
+        return [by_law(some, variance) for some in self._strands]
+
+    @cached_property
+    def _strands(self) -> list[list[Strand]]:
+        """Strands of each axis."""
+        positions = self.video.likelihood.strands.positions
+        return [[strand for strand in positions if _axes(strand) == axes] for axes in self._axes]
 
     @cached_property
     def _alone(self) -> LinearVideo:
@@ -190,8 +230,7 @@ class _Search:
         """What makes the residuals independent."""
         video, unit = self.video, self.video.noise.slope(2) / self.video.noise_sd
         positions: Factors = ()
-        for axes, one in zip(self._axes, straying, strict=True):
-            some = [strand for strand in video.likelihood.strands.positions if _axes(strand) == axes]
+        for some, one in zip(self._strands, straying, strict=True):
             positions += factors(some, one.size * unit, one.duration, np.full(video.positions, one.noise))
         return Whitening(positions, self._angles)
 
@@ -249,12 +288,6 @@ def _about_parabolas(values: Float[np.ndarray, "seen axis"], times: Float[np.nda
 def _stretch(whitening: Whitening) -> float:
     """Logarithm of the factor by which the residuals of a video are stretched when they are made independent."""
     return float(whitening.position_log_volume.sum())
-
-
-def _log_density(video: LinearVideo) -> float:
-    """Log density (nats, up to a constant) of a video by itself, its unknowns integrated out."""
-    left = video.left
-    return video.log_volume - float(left @ left) / 2
 
 
 def _log_densities(linear: LinearFit, stretched: Sequence[float]) -> Float[np.ndarray, "video"]:

@@ -19,7 +19,7 @@ from vrdp_prob.inference.least_squares import jacobian
 from vrdp_prob.inference.misfit import Misfit, tempered
 from vrdp_prob.inference.noise_fit import NOISE_FIELDS
 from vrdp_prob.models.likelihood import Likelihood
-from vrdp_prob.models.model_error import ModelError, Strand
+from vrdp_prob.models.model_error import ModelError, Strand, by_law
 from vrdp_prob.models.roughness import untold_noise
 from vrdp_prob.models.unknowns import ANGLE_NOISE
 
@@ -250,7 +250,7 @@ def _linear(likelihood: Likelihood, point: Float[np.ndarray, "dimension"], clues
     strands = likelihood.strands
     return (
         _Linear(
-            _by_law(strands.positions, np.repeat(position, 2)),
+            by_law(strands.positions, np.repeat(position, 2)),
             values[:count],
             derivative[:count][:, free],
             np.repeat(position, 2),
@@ -258,7 +258,7 @@ def _linear(likelihood: Likelihood, point: Float[np.ndarray, "dimension"], clues
             prior_derivative[:, free],
         ),
         _Linear(
-            _by_law(strands.angles, angle),
+            by_law(strands.angles, angle),
             values[count:],
             derivative[count:][:, free],
             angle,
@@ -266,19 +266,6 @@ def _linear(likelihood: Likelihood, point: Float[np.ndarray, "dimension"], clues
             prior_derivative[:, free],
         ),
     )
-
-
-def _by_law(strands: Sequence[Strand], variance: Float[np.ndarray, "number"]) -> list[list[Strand]]:
-    """Strands in groups of one covariance."""
-    groups: list[list[Strand]] = []
-    for strand in strands:
-        alike = (group for group in groups if strand.strays_like(group[0], variance))
-        found = next(alike, None)
-        if found is None:
-            groups.append([strand])
-        else:
-            found.append(strand)
-    return groups
 
 
 def _variances(

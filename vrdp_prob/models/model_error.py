@@ -114,6 +114,19 @@ class Strand:
         return moments and response and np.array_equal(variance[self.places], variance[other.places])
 
 
+def by_law(strands: Sequence[Strand], variance: Float[np.ndarray, "number"]) -> list[list[Strand]]:
+    """Strands in groups of one covariance."""
+    groups: list[list[Strand]] = []
+    for strand in strands:
+        alike = (group for group in groups if strand.strays_like(group[0], variance))
+        found = next(alike, None)
+        if found is None:
+            groups.append([strand])
+        else:
+            found.append(strand)
+    return groups
+
+
 @dataclass(frozen=True)
 class Strands:
     """All residuals of a video, strand by strand."""

@@ -241,7 +241,7 @@ class _Searcher:
         if trial.choices:
             return []
         left = [effect for effect in self.catalogue if effect.name not in trial.names]
-        reached = {one.causes[-1].name: gain(one, trial)[0] for one in reversed(found)}
+        reached = {one.causes[-1].name: one.brought(trial) for one in reversed(found)}
         best = next((one.fit for one in found if not _mends_several(one)), trial.fit)
         still_lost = lost_videos(best)
         lost = [one for one in lost_videos(trial.fit) if one in still_lost]

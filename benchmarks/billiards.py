@@ -23,16 +23,14 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 import numpy as np
 import torch
-from _extension import extended_model, fit_of
-from _page import table_row, write_between
+from _extension import extended_model, fit_of, forecast
+from _page import page_parser, publish, table_row
 from _resumable import Result, measured
 from jaxtyping import Float
 
 from vrdp_prob.datasets import load_all
 from vrdp_prob.evaluation.scores import calibration_error
-from vrdp_prob.files import write_atomically
 from vrdp_prob.inference import default_model, infer
-from vrdp_prob.inference.map_fit import fit_map
 from vrdp_prob.inference.several_videos.learned import learned_model, with_learned_walls
 from vrdp_prob.models.physics import PhysicsModel
 from vrdp_prob.models.simulator.events import RolloutEventKind
@@ -73,7 +71,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     compile_model(default_model())
     extended = extended_model(training, options.results / "finding")
     fits = {
-        name: fit_of(training, model, options.results / f"{name.replace(' ', '-')}.pickle")
+        name: fit_of(training, model, options.results, name)
         for name, model in ((BASE, default_model()), (EXTENDED, extended))
     }
     questions = {_video(one): tuple(one["questions"]) for one in asked}
@@ -92,22 +90,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
         processes=options.processes,
     )
     text = "\n".join(_table(results, len(training)))
-    print(text)
-    if options.docs:
-        write_between(options.docs / "billiards.md", text)
-    if options.json:
-        with write_atomically(options.json) as temporary:
-            temporary.write_text(json.dumps({"results": results}, indent=1) + "\n", encoding="utf-8")
+    publish(text, "billiards.md", {"results": results}, options)
     return 0
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--json", type=Path, help="file for the results")
-    parser.add_argument("--docs", type=Path, help="folder of the documentation, whose page is written anew")
+    parser = page_parser(__doc__, RESULTS)
     parser.add_argument("--train", type=int, default=62, help="how many of the training videos, from the first")
-    parser.add_argument("--results", type=Path, default=RESULTS, help="folder of the results, which are gone on with")
-    parser.add_argument("--processes", type=int, default=os.cpu_count() or 1)
     return parser
 
 
@@ -148,9 +137,7 @@ def _simulated(
 ) -> tuple[Float[np.ndarray, "time body 2"], dict[frozenset[str], float]]:
     """Positions of the best fit, and the posterior probability of each event, from the first frames alone."""
     seen = _up_to(SEEN, tracks)
-    fit = fit_map(seen, model, np.random.default_rng(0), model_error=False)
-    longer = replace(fit.likelihood, tracks=_up_to(ASKED, tracks))
-    best = longer.rollout(torch.from_numpy(fit.point[None])).trajectory[0, :, :, :2].numpy()
+    best = forecast(seen, _up_to(ASKED, tracks), model)
     posterior = infer(seen, sampler="laplace", model=model, seed=0, draws=DRAWS)
     drawn = simulate(posterior.worlds(DRAWS), torch.tensor(tracks.times[:ASKED]), model)
     events, names = drawn.events, [body.id for body in tracks.bodies]

@@ -10,7 +10,6 @@ that folder after a change of the code. `--docs` writes the tables into `clevrer
 """
 
 import argparse
-import json
 import os
 import sys
 from collections.abc import Sequence
@@ -22,16 +21,15 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 import numpy as np
 import torch
 from _answer_goals import GOALS, title
-from _extension import extended_model, fit_of
-from _page import table_row, write_between
+from _extension import extended_model, fit_of, forecast
+from _page import page_parser, publish, table_row
 from _resumable import Result, measured
+from _score_cells import gain, number, percent
 
 from vrdp_prob.datasets import load_all, read_questions
 from vrdp_prob.evaluation.judgement import Judgement, judge
-from vrdp_prob.evaluation.scores import Interval, Scores, bootstrap, brier_gain
-from vrdp_prob.files import write_atomically
+from vrdp_prob.evaluation.scores import Scores, bootstrap, brier_gain
 from vrdp_prob.inference import default_model, infer
-from vrdp_prob.inference.map_fit import fit_map
 from vrdp_prob.inference.several_videos.learned import learned_model
 from vrdp_prob.models.physics import PhysicsModel
 from vrdp_prob.models.simulator.rollout import compile_model
@@ -40,7 +38,7 @@ from vrdp_prob.scene import Tracks
 
 DATA = Path(__file__).parents[2] / "shared" / "data" / "clevrer_bullet"
 RESULTS = Path("out") / "clevrer"
-SCENES = range(60)
+SCENES = 60
 SEEN_SHARE = 0.6
 AHEAD = 1.0
 """Time in s after the last frame that is fitted, up to which the nearer error counts."""
@@ -67,15 +65,17 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if not DATA.is_dir():
         print(f"no data at {DATA}: nothing measured")
         return 0
-    training = load_all(DATA, videos=[f"video_{scene:05d}" for scene in SCENES[0::2][: options.train]])
+    names = [f"video_{scene:05d}" for scene in range(SCENES)]
+    training = load_all(DATA, videos=names[0::2][: options.train])
     compile_model(default_model())
     models = {PLAIN: default_model()}
-    for name, model in ((BASE, default_model()), (EXTENDED, extended_model(training, options.results / "finding"))):
-        compile_model(model)
-        models[name] = learned_model(fit_of(training, model, options.results / f"{name.replace(' ', '-')}.pickle"))
+    extended = extended_model(training, options.results / "finding")
+    compile_model(extended)
+    for name, model in ((BASE, default_model()), (EXTENDED, extended)):
+        models[name] = learned_model(fit_of(training, model, options.results, name))
     tasks = [
         Task(tracks, name, model)
-        for tracks in load_all(DATA, videos=[f"video_{scene:05d}" for scene in SCENES[1::2][: options.test]])
+        for tracks in load_all(DATA, videos=names[1::2][: options.test])
         for name, model in models.items()
     ]
     results = measured(
@@ -87,23 +87,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
         processes=options.processes,
     )
     text = "\n".join([*_errors(results, len(training)), "", *_answers(results)])
-    print(text)
-    if options.docs:
-        write_between(options.docs / "clevrer.md", text)
-    if options.json:
-        with write_atomically(options.json) as temporary:
-            temporary.write_text(json.dumps({"results": results}, indent=1) + "\n", encoding="utf-8")
+    publish(text, "clevrer.md", {"results": results}, options)
     return 0
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--json", type=Path, help="file for the results")
-    parser.add_argument("--docs", type=Path, help="folder of the documentation, whose page is written anew")
+    parser = page_parser(__doc__, RESULTS)
     parser.add_argument("--train", type=int, default=30, help="how many of the even scenes, from the first")
     parser.add_argument("--test", type=int, default=30, help="how many of the odd scenes, from the first")
-    parser.add_argument("--results", type=Path, default=RESULTS, help="folder of the results, which are gone on with")
-    parser.add_argument("--processes", type=int, default=os.cpu_count() or 1)
     return parser
 
 
@@ -127,12 +118,9 @@ def _forecast_errors(task: Task) -> dict[str, float]:
     times = task.tracks.times
     last = times[int(SEEN_SHARE * len(times)) - 1]
     seen = task.tracks.until(last)
-    fit = fit_map(seen, task.model, np.random.default_rng(0), model_error=False)
     known = [body.id for body in seen.bodies]
     longer = replace(seen, data=task.tracks.data.sel(body=known))
-    likelihood = replace(fit.likelihood, tracks=longer)
-    predicted = likelihood.rollout(torch.from_numpy(fit.point[None])).trajectory[0, :, :, :2].numpy()
-    squares = ((predicted - longer.positions) ** 2).mean(axis=-1)
+    squares = ((forecast(seen, longer, task.model) - longer.positions) ** 2).mean(axis=-1)
     parts = {"fitted": times <= last, "next": (times > last) & (times <= last + AHEAD), "later": times > last}
     return {name: float(np.nanmean(squares[part])) for name, part in parts.items()}
 
@@ -142,12 +130,11 @@ def _errors(results: Sequence[Result], training: int) -> list[str]:
     head = ("error, mm", "frames that are fitted", "the next second", "all that is left", "nearer than the base model")
     lines = [f"Learned on {training} scenes, tested on {len(_of(results, BASE))} others.", ""]
     lines += [table_row(*head), table_row(*["---"] * len(head))]
-    base = np.array([one["later"] for one in _of(results, BASE)])
     for name in (PLAIN, BASE, EXTENDED):
         mine = _of(results, name)
         middle = [1e3 * np.median(np.sqrt([one[part] for one in mine])) for part in ("fitted", "next", "later")]
-        later = np.array([one["later"] for one in mine])
-        nearer = f"{(later < base).sum()} of {len(base)}" if name != BASE else ""
+        pairs = zip(mine, _of(results, BASE), strict=True)
+        nearer = f"{sum(ours['later'] < base['later'] for ours, base in pairs)} of {len(mine)}" if name != BASE else ""
         lines.append(table_row(name, *(f"{value:.1f}" for value in middle), nearer))
     return [*lines, "", _ratio(results)]
 
@@ -177,23 +164,14 @@ def _answers(results: Sequence[Result]) -> list[str]:
         for name, made in rows.items():
             mine = [one for one in made if one.kind is kind]
             score = Scores.of(mine)
-            shares = [_percent(score.accuracy_per_question), _percent(score.accuracy_per_option)]
-            brier = "" if score.brier is None else f"{score.brier:.4f}"
-            lower = "" if name == BASE else _gain(*brier_gain(mine, base))
-            lines.append(table_row(f"{title(kind)} ({score.questions})", name, *shares, brier, lower))
+            shares = [percent(score.accuracy_per_question), percent(score.accuracy_per_option)]
+            lower = "" if name == BASE else gain(*brier_gain(mine, base))
+            lines.append(table_row(f"{title(kind)} ({score.questions})", name, *shares, number(score.brier), lower))
     return lines
 
 
 def _judgements(results: Sequence[Result]) -> list[Judgement]:
     return [Judgement.of_document(one) for result in results for one in result["judgements"]]
-
-
-def _gain(gain: float, interval: Interval | None) -> str:
-    return f"{gain:.4f}" + ("" if interval is None else f" ({interval.low:.4f} to {interval.high:.4f})")
-
-
-def _percent(value: float | None) -> str:
-    return "" if value is None else f"{100 * value:.1f} %"
 
 
 if __name__ == "__main__":

@@ -9,7 +9,6 @@ delete that folder after a change of the code. `--docs` writes the tables into `
 """
 
 import argparse
-import json
 import os
 import sys
 import time
@@ -21,14 +20,13 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 import torch
 from _injected import injected
-from _page import table_row, write_between
+from _page import page_parser, publish, table_row
 from _resumable import Result, measured
 
 from vrdp_prob.datasets import load_all
 from vrdp_prob.discovery.discover import discover
 from vrdp_prob.discovery.document import to_document, write_finding
 from vrdp_prob.discovery.finding import Finding
-from vrdp_prob.files import write_atomically
 from vrdp_prob.inference import default_model
 from vrdp_prob.models.simulator.rollout import compile_model
 
@@ -85,22 +83,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
         processes=options.processes,
     )
     text = "\n".join([*_findings(results, tasks), *_recovered(results, tasks)])
-    print(text)
-    if options.docs:
-        write_between(options.docs / "measured-data.md", text)
-    if options.json:
-        with write_atomically(options.json) as temporary:
-            temporary.write_text(json.dumps({"results": results}, indent=1) + "\n", encoding="utf-8")
+    publish(text, "measured-data.md", {"results": results}, options)
     return 0
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--json", type=Path, help="file for the results")
-    parser.add_argument("--docs", type=Path, help="folder of the documentation, whose page is written anew")
+    parser = page_parser(__doc__, RESULTS)
     parser.add_argument("--only", help=f"names, separated by commas; of {', '.join(task.name for task in TASKS)}")
-    parser.add_argument("--results", type=Path, default=RESULTS, help="folder of the results, which are gone on with")
-    parser.add_argument("--processes", type=int, default=os.cpu_count() or 1)
     return parser
 
 

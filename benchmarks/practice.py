@@ -13,7 +13,6 @@ printed: a half may be answered with the model that the other half prefers. `--d
 """
 
 import argparse
-import json
 import os
 import sys
 from collections.abc import Callable, Mapping, Sequence
@@ -25,9 +24,10 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 import numpy as np
 import torch
 from _answer_goals import GOALS, title
-from _page import table_row, write_between
+from _page import page_parser, publish, table_row
 from _released_worlds import ReleasedWorlds
 from _resumable import Result, measured
+from _score_cells import gain, number, percent
 from _true_posterior import TruePosterior
 from _wrong_answers import wrong_answers
 from scipy.special import logsumexp
@@ -102,25 +102,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
     best, others = (EXTENDED, (FULL, TRUE)) if EXTENDED in rows else (FULL, (TRUE,))
     wrong = wrong_answers(rows[best], {name: rows[name] for name in others}, DATA / "sensitivity.json")
     text = "\n".join([*_tables(rows), *preferred, "", *_fewer_table(_rows(list(fewer.values()))), "", *wrong])
-    print(text)
-    if options.docs:
-        write_between(options.docs / "practice.md", text)
-    if options.json:
-        with write_atomically(options.json) as temporary:
-            temporary.write_text(json.dumps({"checks": _checks(rows)}, indent=1) + "\n", encoding="utf-8")
+    publish(text, "practice.md", {"checks": _checks(rows)}, options)
     return 0
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--json", type=Path, help="file for the checks")
-    parser.add_argument("--docs", type=Path, help="folder of the documentation, whose page is written anew")
+    parser = page_parser(__doc__, RESULTS, document="checks")
     parser.add_argument("--scenes", type=int, default=60, help="how many of the scenes, from the first")
     parser.add_argument("--thinned", type=int, default=60, help="how many of them are seen with fewer frames, too")
     parser.add_argument("--model", type=Path, help="model file of all rows but one; the default model where not given")
     parser.add_argument("--extended", type=Path, help="model file of the row 'extended model'")
-    parser.add_argument("--results", type=Path, default=RESULTS, help="folder of the results, which are gone on with")
-    parser.add_argument("--processes", type=int, default=os.cpu_count() or 1)
     return parser
 
 
@@ -264,9 +255,7 @@ def _tables(rows: Mapping[str, Sequence[Judgement]]) -> list[str]:
     lines += ["", table_row("right per question, Brier", *map(title, GOALS)), table_row(*["---"] * (len(GOALS) + 1))]
     for name, made in rows.items():
         scores = [Scores.of([one for one in made if one.kind is kind]) for kind in GOALS]
-        lines.append(
-            table_row(name, *(f"{_percent(one.accuracy_per_question)}, {_number(one.brier)}" for one in scores))
-        )
+        lines.append(table_row(name, *(f"{percent(one.accuracy_per_question)}, {number(one.brier)}" for one in scores)))
     return lines
 
 
@@ -276,12 +265,9 @@ def _scores(rows: Mapping[str, Sequence[Judgement]], name: str, best_fit: str) -
     lines = [table_row(*head), table_row(*["---"] * len(head))]
     for kind in GOALS:
         ours, plain = ([one for one in rows[row] if one.kind is kind] for row in (name, best_fit))
-        score, (gain, interval) = Scores.of(ours), brier_gain(ours, plain)
+        score, lower = Scores.of(ours), gain(*brier_gain(ours, plain))
         shares = [_with_interval(score, f"accuracy_per_{unit}") for unit in ("question", "option")]
-        lower = f"{gain:.4f}" + ("" if interval is None else f" ({interval.low:.4f} to {interval.high:.4f})")
-        lines.append(
-            table_row(f"{title(kind)} ({score.questions})", *shares, _number(score.brier), lower, *_ece(score))
-        )
+        lines.append(table_row(f"{title(kind)} ({score.questions})", *shares, number(score.brier), lower, *_ece(score)))
     return lines
 
 
@@ -294,9 +280,9 @@ def _fewer_table(rows: Mapping[str, Sequence[Judgement]]) -> list[str]:
             score = Scores.of(made)
             doubts = [p for one in made for p in _forecasts(one)]
             doubt = np.mean([entropy(np.array([p, 1 - p])) for p in doubts])
-            shares = [_percent(score.accuracy_per_question), _percent(score.accuracy_per_option)]
+            shares = [percent(score.accuracy_per_question), percent(score.accuracy_per_option)]
             counts = str(score.questions), str(score.options)
-            cells = (f"{title(kind)}, {frames}", *counts, *shares, _number(score.brier), f"{doubt:.3f}")
+            cells = (f"{title(kind)}, {frames}", *counts, *shares, number(score.brier), f"{doubt:.3f}")
             lines.append(table_row(*cells, *_ece(score)))
     return lines
 
@@ -310,19 +296,11 @@ def _with_interval(score: Scores, name: str) -> str:
     value, interval = getattr(score, name), score.intervals.get(name)
     if value is None or interval is None:
         return ""
-    return f"{_percent(value)} ({_percent(interval.low)} to {_percent(interval.high)})"
+    return f"{percent(value)} ({percent(interval.low)} to {percent(interval.high)})"
 
 
 def _ece(score: Scores) -> tuple[str, str]:
-    return _number(score.ece), _number(score.ece_if_calibrated_q95)
-
-
-def _number(value: float | None) -> str:
-    return "" if value is None else f"{value:.4f}"
-
-
-def _percent(value: float | None) -> str:
-    return "" if value is None else f"{100 * value:.1f} %"
+    return number(score.ece), number(score.ece_if_calibrated_q95)
 
 
 def _checks(rows: Mapping[str, Sequence[Judgement]]) -> list[dict[str, object]]:

@@ -1,6 +1,7 @@
 """How the answers of the extended model differ from those of the model that was given, in words and rows."""
 
 from collections.abc import Sequence
+from dataclasses import asdict
 from typing import Any
 
 from vrdp_prob.discovery.finding import ComparedAnswer
@@ -38,10 +39,11 @@ def answers_sentence(answers: Sequence[ComparedAnswer]) -> str:
 def rows(answers: Sequence[ComparedAnswer]) -> dict[str, Any]:
     """The table of changed answers; what comes after the first few is folded away."""
     told = [_row(answer) for answer in changed(answers)]
+    leading, others = told[:LEADING], told[LEADING:]
     return {
-        "leading": told[:LEADING],
-        "others": told[LEADING:],
-        "others_words": f"{sentence(counted(len(told) - LEADING, 'more question'))}",
+        "leading": leading,
+        "others": others,
+        "others_words": sentence(counted(len(others), "more question")),
         "sentence": f"{sentence(answers_sentence(answers))}.",
     }
 
@@ -51,14 +53,7 @@ def _row(answer: ComparedAnswer) -> dict[str, Any]:
         "video": answer.video,
         "question": answer.question,
         "options": [
-            {
-                "words": option.words,
-                "before": chance(option.before),
-                "after": chance(option.after),
-                "chosen_before": option.chosen_before,
-                "chosen_after": option.chosen_after,
-                "right": option.right,
-            }
+            {**asdict(option), "before": chance(option.before), "after": chance(option.after)}
             for option in answer.options
         ],
     }

@@ -57,7 +57,7 @@ class LinearVideo:
 
     @property
     def _scale(self) -> Float[np.ndarray, "own"]:
-        return np.maximum(np.linalg.norm(self.own, axis=0), 1e-300)
+        return _lengths(self.own)
 
     @cached_property
     def _basis(self) -> Float[np.ndarray, "residual rank"]:
@@ -70,14 +70,13 @@ class LinearVideo:
     def log_volume(self) -> float:
         """Logarithm of the root of the determinant of the own unknowns' covariance where the shared ones are known."""
         values = self._decomposed[1]
-        return -float(np.log(np.maximum(values, RIDGE * values.max(initial=0.0)) * self._scale).sum())
+        return -float(np.log(_told(values) * self._scale).sum())
 
     @property
     def own_sd(self) -> Float[np.ndarray, "own"]:
         """Standard deviations of the own unknowns where the shared ones are known."""
         _, values, turn = self._decomposed
-        known = np.maximum(values, RIDGE * values.max(initial=0.0))
-        sd: np.ndarray = np.linalg.norm(turn.T / known, axis=1) / self._scale
+        sd: np.ndarray = np.linalg.norm(turn.T / _told(values), axis=1) / self._scale
         return sd
 
     @property
@@ -169,10 +168,19 @@ def log_evidence(own: Float[np.ndarray, "residual own"], residuals: Float[np.nda
     """
     # The triangle alone is decomposed further: it is some tens of rows instead of hundreds.
     triangle = np.asarray(np.linalg.qr(np.concatenate([own, residuals[:, None]], axis=1), mode="r"))
-    scale = np.maximum(np.linalg.norm(triangle[:, :-1], axis=0), 1e-300)
+    scale = _lengths(triangle[:, :-1])
     values = np.linalg.svd(triangle[:-1, :-1] / scale, compute_uv=False)
-    known = np.maximum(values, RIDGE * values.max(initial=0.0)) * scale
-    return -float(np.log(known).sum()) - float(triangle[-1, -1] ** 2) / 2
+    return -float(np.log(_told(values) * scale).sum()) - float(triangle[-1, -1] ** 2) / 2
+
+
+def _lengths(columns: Float[np.ndarray, "row column"]) -> Float[np.ndarray, "column"]:
+    """Lengths of columns, none of them 0."""
+    return np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
+
+
+def _told(values: Float[np.ndarray, "value"]) -> Float[np.ndarray, "value"]:
+    """Singular values, those that count as nothing as large as they can be for that."""
+    return np.maximum(values, RIDGE * values.max(initial=0.0))
 
 
 @dataclass(frozen=True)

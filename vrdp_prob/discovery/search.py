@@ -119,9 +119,7 @@ def search(
         steps = [searcher.first(chain[0])]
         while len(chain) <= MOST_CAUSES:
             step = steps[-1] = searcher.tried(chain[-1])
-            winner = next(iter(step.tried), None)
-            if winner is not None and gain(winner, chain[-1])[0] < needed:
-                winner = None
+            winner = next((one for one in step.tried[:1] if gain(one, chain[-1])[0] >= needed), None)
             if winner is not None:
                 without = winner.without(winner.causes[-1])
                 if gain(without, chain[-1])[0] > needed:
@@ -169,26 +167,24 @@ class _Searcher:
         return self._known[trial]
 
     def tried(self, trial: Trial) -> Step:
-        """The step with the causes tried that may be the best one.
-
-        Hidden things are tried only where nothing explains the videos better than that bodies change their velocity all
-        at once.
-        """
+        """The step with the causes tried that may be the best one."""
         found = self._refits(trial)
         pair = None
         if not self._settled(trial, found):
             pair = self._pair(trial, found)
             if pair is None or not self._settled(trial, [pair[1]]):
-                found = sorted([*found, *self._lost(trial, found)], key=_merit, reverse=True)
+                found = [*found, *self._lost(trial, found)]
         return replace(self.first(trial), tried=tuple(self._in_order(trial, found)), pair=pair)
 
     def _refits(self, trial: Trial) -> list[Trial]:
         """Refits with one more cause, the best first; those of a trial that is asked for again are not made again."""
         if trial not in self._refitted_before:
-            self._refitted_before[trial] = self._new_refits(trial, self.first(trial).scores)
+            self._refitted_before[trial] = self._new_refits(trial)
         return self._refitted_before[trial]
 
-    def _new_refits(self, trial: Trial, scores: Sequence[CauseScore]) -> list[Trial]:
+    def _new_refits(self, trial: Trial) -> list[Trial]:
+        """Hidden things are tried only where nothing explains the videos better than kicks do."""
+        scores = self.first(trial).scores
         likely = _shortlist(scores)
         close = [one for one in likely if one.size > CLOSE * likely[0].size]
         found = self._refitted(trial, close)

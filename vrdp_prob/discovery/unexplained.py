@@ -192,17 +192,21 @@ class _Search:
         """
         known = self._last.get(axis)
         if known is None or known[0] != one:
-            unit = self.video.noise.slope(2) / self.video.noise_sd
+            variance = np.full(self.video.positions, one.noise)
             found, stretch = [], 0.0
             for alike in self._alike[axis]:
-                variance = np.full(self.video.positions, one.noise)
-                root = np.linalg.cholesky(alike[0].covariance(one.size * unit, one.duration, variance))
+                root = np.linalg.cholesky(alike[0].covariance(one.size * self._unit, one.duration, variance))
                 side_by_side = np.concatenate([self._rows[strand.places] for strand in alike], axis=1)
                 independent = solve_triangular(root, side_by_side, lower=True, check_finite=False)
                 found += np.split(independent, len(alike), axis=1)
                 stretch -= len(alike) * float(np.log(np.diag(root)).sum())
             known = self._last[axis] = one, np.concatenate(found), stretch
         return known[1:]
+
+    @property
+    def _unit(self) -> float:
+        """A metre in units of the noise."""
+        return self.video.noise.slope(2) / self.video.noise_sd
 
     @cached_property
     def _rows(self) -> Float[np.ndarray, "residual column"]:
@@ -228,10 +232,9 @@ class _Search:
 
     def whitening(self, straying: tuple[Straying, ...]) -> Whitening:
         """What makes the residuals independent."""
-        video, unit = self.video, self.video.noise.slope(2) / self.video.noise_sd
         positions: Factors = ()
         for some, one in zip(self._strands, straying, strict=True):
-            positions += factors(some, one.size * unit, one.duration, np.full(video.positions, one.noise))
+            positions += factors(some, one.size * self._unit, one.duration, np.full(self.video.positions, one.noise))
         return Whitening(positions, self._angles)
 
     @cached_property

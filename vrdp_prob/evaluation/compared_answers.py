@@ -30,9 +30,9 @@ def with_answers(
 ) -> Finding:
     """A finding that also tells what both models answer to questions about its videos.
 
-    Each model answers from Laplace draws of each video alone, as `ask --model model.toml --sampler laplace` does. A
-    question that one of them cannot answer is left out and told of. Where no cause is named there is one model only,
-    and nothing is asked.
+    Each model answers from Laplace draws of each video alone, which are not handed on to emcee where they cannot be
+    trusted. A question that one of them cannot answer is left out and told of. Where no cause is named there is one
+    model only, and nothing is asked.
 
     Parameters
     ----------

@@ -1,6 +1,6 @@
 """First guesses of hidden things that stand in the way of bodies.
 
-They leave their mark where a body changes its velocity though nothing seen is near. A fit with kicks finds these
+They leave their mark where a body changes its velocity though it meets nothing seen. A fit with kicks finds these
 places; the change of the velocity is square to the surface that the body met.
 """
 
@@ -12,6 +12,7 @@ import numpy as np
 import torch
 from jaxtyping import Float
 
+from vrdp_prob.discovery.kicked_at_contact import kicked_at_contact
 from vrdp_prob.discovery.scores import CauseScore
 from vrdp_prob.inference.several_videos.fitting import SharedFit
 from vrdp_prob.models.effects.effect import Effect
@@ -61,12 +62,12 @@ class _Kick:
 
 
 def _kicks(fit: SharedFit) -> list[_Kick]:
-    """The kicks of a fit, the strongest first."""
+    """The kicks of a fit that come with no contact, the strongest first."""
     found = []
     for index, video in enumerate(fit.joint.videos):
         places, point = video.likelihood.coordinates.places, fit.joint.point(index)
         for field, body in places:
-            if field == "impulse_x" and body is not None:
+            if field == "impulse_x" and body is not None and not kicked_at_contact(fit.fits[index], [body]):
                 change = point[[places["impulse_x", body], places["impulse_y", body]]]
                 found.append(_Kick(index, body, float(point[places["impulse_time", None]]), change))
     return sorted(found, key=lambda one: -float(np.linalg.norm(one.change)))[:MOST_KICKS]

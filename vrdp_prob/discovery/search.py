@@ -10,7 +10,7 @@ from jaxtyping import Float
 from vrdp_prob.discovery.overdispersion import overdispersion
 from vrdp_prob.discovery.proposals import hidden_things
 from vrdp_prob.discovery.scores import CauseScore, happens_once, score_causes
-from vrdp_prob.discovery.single_videos import causes_of_lost_videos, lost_videos
+from vrdp_prob.discovery.single_videos import acts_in_contacts, causes_of_lost_videos, lost_videos
 from vrdp_prob.discovery.trials import Trial, gain, weights, with_own_population
 from vrdp_prob.inference.parallel import in_processes
 from vrdp_prob.inference.several_videos.fitting import SharedFit, fit_together
@@ -130,7 +130,8 @@ def search(
                         continue
                 if searcher.doubted(winner, chain[-1], searcher.first(winner).overdispersion):
                     winner = None
-            if winner is None and step.pair is not None:
+            if step.pair is not None and (winner is None or gain(step.pair[1], winner)[0] >= needed):
+                # Kicks, say, explain more than one cause does, and less than two.
                 winner, _ = step.pair
             if winner is None:
                 break
@@ -154,6 +155,7 @@ class _Searcher:
     advance: Advance
     _known: dict[Trial, Step] = field(default_factory=dict)
     _refitted_before: dict[Trial, list[Trial]] = field(default_factory=dict)
+    _searched: set[Trial] = field(default_factory=set)
 
     def first(self, trial: Trial) -> Step:
         """A step in which nothing was tried yet; a trial that is asked for again is not scored again."""
@@ -168,12 +170,13 @@ class _Searcher:
 
     def tried(self, trial: Trial) -> Step:
         """The step with the causes tried that may be the best one."""
-        found = self._refits(trial)
-        pair = None
+        found, pair = self._refits(trial), None
         if not self._settled(trial, found):
-            pair = self._pair(trial, found)
-            if pair is None or not self._settled(trial, [pair[1]]):
-                found = [*found, *self._lost(trial, found)]
+            first = self._provisional(trial, found)
+            if first is None:
+                found = self._with_lost(trial)
+            else:
+                pair = self._pair(trial, first)
         return replace(self.first(trial), tried=tuple(self._in_order(trial, found)), pair=pair)
 
     def _refits(self, trial: Trial) -> list[Trial]:
@@ -196,17 +199,27 @@ class _Searcher:
             found += self._hidden(trial, found, kicks)
         return sorted(found, key=_merit, reverse=True)
 
-    def _pair(self, trial: Trial, found: Sequence[Trial]) -> tuple[Trial, Trial] | None:
-        """The cause that brings most where all else is noise, and with a second one, if both together are established.
+    def _with_lost(self, trial: Trial) -> list[Trial]:
+        """The same with fits from the beginning, where the refits leave something."""
+        found = self._refits(trial)
+        if trial not in self._searched and not self._settled(trial, found):
+            self._searched.add(trial)
+            found = self._refitted_before[trial] = sorted([*found, *self._lost(trial, found)], key=_merit, reverse=True)
+        return found
+
+    def _provisional(self, trial: Trial, found: Sequence[Trial]) -> Trial | None:
+        """The lasting cause that brings most where all else is noise, if it brings enough."""
+        lasting = [one for one in found if not happens_once(one.causes[-1])]
+        first = max(lasting, key=lambda one: one.brought(trial) + one.log_prior, default=trial)
+        return None if first.brought(trial) < self.needed else first
+
+    def _pair(self, trial: Trial, first: Trial) -> tuple[Trial, Trial] | None:
+        """A cause and a second one beside it, if both together are established.
 
         What two causes leave when one is known may follow chance as well as what both leave: then neither stands out
         beside chance by itself.
         """
-        lasting = [one for one in found if not happens_once(one.causes[-1])]
-        first = max(lasting, key=lambda one: one.brought(trial) + one.log_prior, default=trial)
-        if first.brought(trial) < self.needed:
-            return None
-        second = next(iter(self._in_order(first, self._refits(first))), first)
+        second = next(iter(self._in_order(first, self._with_lost(first))), first)
         if second is first or gain(second, trial)[0] < 2 * self.needed or gain(second, first)[0] < self.needed:
             return None
         divisor = self.first(second).overdispersion
@@ -236,7 +249,12 @@ class _Searcher:
         """
         if trial.choices:
             return []
-        left = [effect for effect in self.catalogue if effect.name not in trial.names]
+        likely = {one.effect.name for one in _shortlist(self.first(trial).scores)}
+        left = [
+            effect
+            for effect in self.catalogue
+            if effect.name not in trial.names and (acts_in_contacts(effect) or effect.name in likely)
+        ]
         reached = {one.causes[-1].name: one.brought(trial) for one in reversed(found)}
         best = next((one.fit for one in found if not _mends_several(one)), trial.fit)
         still_lost = lost_videos(best)

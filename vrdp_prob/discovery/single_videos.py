@@ -25,6 +25,8 @@ VIDEOS, WITH_ALL, SECOND_LOOKS = 4, 2, 4
 which the others are."""
 NEARLY, MOST_TOLD = 0.6, 2
 """Share of the largest gain from which another cause is told of, too, and number of causes that are."""
+FAR_BEHIND = 0.3
+"""Share of the largest gain below which a cause is not tried in a further video."""
 EXPLAINED = 1.1
 """Residuals in units of the noise from which a cause explains a video; no further ones are tried then."""
 CONTACT_HOOKS = (
@@ -68,7 +70,7 @@ def causes_of_lost_videos(
     """
     # What acts in contacts comes first: it is what makes a search lose its way.
     effects = sorted(
-        (effect for effect in catalogue if _tells(effect)), key=lambda effect: not _acts_in_contacts(effect)
+        (effect for effect in catalogue if _tells(effect)), key=lambda effect: not acts_in_contacts(effect)
     )
 
     def searched(video: int) -> Callable[[PhysicsModel], MapFit]:
@@ -96,7 +98,10 @@ def causes_of_lost_videos(
         explained = len(found) < len(effects)
         effects = sorted((effect for effect, _ in found), key=lambda effect: -gains[effect.name])
         if explained or rank + 1 >= WITH_ALL:
-            effects = effects[:SECOND_LOOKS]
+            least = FAR_BEHIND * gains[effects[0].name]
+            effects = [effect for effect in effects[:SECOND_LOOKS] if gains[effect.name] >= least]
+        if len(effects) == 1:
+            break
     ranked = [(effect, gains[effect.name]) for effect in effects if effect.name in gains]
     return [pair for pair in ranked if pair[1] > max(needed, NEARLY * ranked[0][1])][:MOST_TOLD]
 
@@ -107,5 +112,6 @@ def _tells(effect: Effect) -> bool:
     return bool(effect.vanishes_at or effect.vanishes_like) and not happens_once(effect) and not of_materials
 
 
-def _acts_in_contacts(effect: Effect) -> bool:
+def acts_in_contacts(effect: Effect) -> bool:
+    """Whether an effect acts in contacts of bodies, or on what follows from them."""
     return any(effect.overrides(hook) for hook in CONTACT_HOOKS)

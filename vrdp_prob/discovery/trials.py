@@ -8,9 +8,9 @@ import numpy as np
 from jaxtyping import Float
 
 from vrdp_prob.discovery.finding import HeldOut
-from vrdp_prob.discovery.fitted_motion import REACH
 from vrdp_prob.discovery.forecast import held_out
 from vrdp_prob.discovery.held_out import Cavity, cavities
+from vrdp_prob.discovery.kicked_at_contact import kicked_at_contact
 from vrdp_prob.discovery.scores import CauseScore, happens_once
 from vrdp_prob.discovery.unexplained import Unexplained, unexplained
 from vrdp_prob.inference.several_videos.ascent import ImpossibleStartError
@@ -20,7 +20,6 @@ from vrdp_prob.inference.several_videos.second_look import MOST
 from vrdp_prob.models.effects.effect import Effect
 from vrdp_prob.models.parameters import Scope
 from vrdp_prob.models.physics import PhysicsModel
-from vrdp_prob.models.simulator.events import CONTACTS, RolloutEventKind
 
 EACH_PARAMETER = 1.0
 """Nats by which a cause is believed less for each of its parameters.
@@ -199,16 +198,12 @@ class Trial:
         return len(acting) > 1 and sum(stray) > PATCHED * len(stray)
 
     def _comes_with_contact(self, cause: Effect, video: int) -> bool:
-        """Whether a body meets something when a cause kicks it, so that the contact could as well be another one."""
+        """Whether a body meets something when a cause kicks it."""
         part = self.fit.fits[video]
         own = {one.name for one in cause.parameters if one.scope is Scope.BODY}
         entries = part.likelihood.coordinates.entries
         kicked = [entry.owner for entry in entries if entry.field in own and entry.owner is not None]
-        events, tracks = part.rollout.events, part.likelihood.tracks
-        kicks = events.of_kind(RolloutEventKind.KICK).time
-        meets = np.isin(events.kind, CONTACTS) & events.concerns(kicked)
-        reach = REACH * float(np.median(np.diff(tracks.times)))
-        return bool((np.abs(events.time[meets] - kicks[:, None]) < reach).any())
+        return kicked_at_contact(part, kicked)
 
     def mended(self, lost: Sequence[int], *, seed: int) -> "Trial":
         """The fit with some videos searched anew; itself where that finds nothing better."""

@@ -4,6 +4,8 @@ import numpy as np
 import pytest
 
 from tests.discovery.fitted import fitted
+from vrdp_prob.discovery import proposals
+from vrdp_prob.discovery.kicked_at_contact import kicked_at_contact
 from vrdp_prob.discovery.proposals import hidden_things
 from vrdp_prob.discovery.residual_model import ResidualModel
 from vrdp_prob.discovery.scores import score_causes
@@ -11,6 +13,7 @@ from vrdp_prob.discovery.trials import Trial
 from vrdp_prob.models.effects.external_impulse import ExternalImpulse
 from vrdp_prob.models.effects.hidden_obstacle import HiddenObstacle
 from vrdp_prob.models.effects.wall import Wall
+from vrdp_prob.models.simulator.events import EventTable, RolloutEventKind
 
 WAY, SEED = "hidden_obstacle", 1
 
@@ -44,6 +47,32 @@ def test_a_wall_is_guessed_square_to_the_kick(kicked: Trial) -> None:
     guesses = hidden_things(kicked.fit, [Wall()], 0.0)
     assert guesses
     assert all(0 < one.start["hidden_wall_restitution"] < 1 for one in guesses)
+
+
+@pytest.mark.parametrize(
+    ("contact", "partners", "comes_with_it"),
+    [(1.02, (0, 1), True), (1.02, (1, 2), False), (2.0, (0, 1), False)],
+    ids=["its own contact", "a contact of others", "later"],
+)
+def test_which_kicks_come_with_a_contact(contact: float, partners: tuple[int, int], comes_with_it: bool) -> None:
+    times = np.arange(0.0, 4.0, 0.04)
+    assert kicked_at_contact(_kicked_at_one_second(contact, partners), times, [0]) is comes_with_it
+
+
+def test_nothing_hidden_is_guessed_of_kicks_that_come_with_a_contact(
+    kicked: Trial, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(proposals, "kicked_at_contact", lambda *_given: True)
+    assert hidden_things(kicked.fit, [HiddenObstacle(), Wall()], 0.0) == []
+
+
+def _kicked_at_one_second(contact: float, partners: tuple[int, int]) -> EventTable:
+    """Body 0 is kicked after 1 s, and two bodies meet."""
+    kinds = np.array([RolloutEventKind.KICK, RolloutEventKind.COLLISION])
+    vectors, numbers = np.zeros((2, 2)), np.zeros(2)
+    first, second = np.array([0, partners[0]]), np.array([-1, partners[1]])
+    times = np.array([1.0, contact])
+    return EventTable(np.zeros(2, dtype=int), times, kinds, first, second, vectors, vectors, numbers, numbers)
 
 
 def test_nothing_is_guessed_of_other_causes(kicked: Trial) -> None:

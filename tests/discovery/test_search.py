@@ -18,8 +18,8 @@ def _refit(cause: str, gained: float, *, patches: bool = False) -> Mock:
     return refit
 
 
-def _searcher() -> search._Searcher:
-    return search._Searcher((), seed=0, needed=0.0, advance=lambda _count: None)
+def _searcher(needed: float = 0.0) -> search._Searcher:
+    return search._Searcher((), seed=0, needed=needed, advance=lambda _count: None)
 
 
 @pytest.mark.parametrize(("in_doubt", "order"), [(False, ["tilt", "drag", "kicks"]), (True, ["kicks", "tilt", "drag"])])
@@ -52,14 +52,40 @@ def test_kicks_alone_are_ordered_by_merit() -> None:
 def test_two_causes_are_found_of_which_neither_stands_out_beside_chance(
     both: float, in_doubt: bool, is_found: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    nothing, tilt, drag, kicks = (_refit(*one) for one in (("", 0.0), ("tilt", -1.0), ("drag", 0.5), ("kicks", 0.2)))
-    for one, brought in ((tilt, 60.0), (drag, 20.0), (kicks, 90.0)):
-        one.brought.return_value = brought
-    second = _refit("tilt+drag", both)
-    monkeypatch.setattr(search, "happens_once", lambda cause: cause == "kicks")
-    monkeypatch.setattr(search._Searcher, "_refits", lambda _self, trial: [second] if trial is tilt else [])
+    nothing, tilt, second = _refit("", 0.0), _refit("tilt", -1.0), _refit("tilt+drag", both)
+    monkeypatch.setattr(search._Searcher, "_with_lost", lambda _self, trial: [second] if trial is tilt else [])
     monkeypatch.setattr(search._Searcher, "_in_order", lambda _self, _trial, found: found)
     monkeypatch.setattr(search._Searcher, "first", Mock())
     monkeypatch.setattr(search._Searcher, "doubted", lambda *_given: in_doubt)
-    searcher = search._Searcher((), seed=0, needed=2.0, advance=lambda _count: None)
-    assert searcher._pair(nothing, [drag, kicks, tilt]) == ((tilt, second) if is_found else None)
+    assert _searcher(needed=2.0)._pair(nothing, tilt) == ((tilt, second) if is_found else None)
+
+
+@pytest.mark.parametrize(("least", "name"), [(2.0, "tilt"), (70.0, None)], ids=["enough", "too little"])
+def test_the_first_of_two_is_what_lasts_and_brings_most_where_all_else_is_noise(
+    least: float, name: str | None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    nothing, tilt, drag, kicks = (_refit(*one) for one in (("", 0.0), ("tilt", -1.0), ("drag", 0.5), ("kicks", 0.2)))
+    for one, brought in ((nothing, 0.0), (tilt, 60.0), (drag, 20.0), (kicks, 90.0)):
+        one.brought.return_value = brought
+    monkeypatch.setattr(search, "happens_once", lambda cause: cause == "kicks")
+    found = _searcher(needed=least)._provisional(nothing, [drag, kicks, tilt])
+    assert found is (tilt if name else None)
+
+
+def test_lost_videos_are_searched_once_and_only_where_refits_leave_something(monkeypatch: pytest.MonkeyPatch) -> None:
+    plain, leaving, lost = _refit("", 0.0), _refit("tilt", 1.0), _refit("tilt+friction", 50.0)
+    asked: list[Trial] = []
+
+    def searched(_self: object, trial: Trial, _found: object) -> list[Trial]:
+        asked.append(trial)
+        return [lost]
+
+    monkeypatch.setattr(search._Searcher, "_new_refits", lambda _self, trial: [_refit("drag", 5.0)])
+    monkeypatch.setattr(search._Searcher, "_settled", lambda _self, trial, _found: trial is plain)
+    monkeypatch.setattr(search._Searcher, "_lost", searched)
+    searcher = _searcher()
+    assert [one.causes for one in searcher._with_lost(plain)] == [("drag",)]
+    for _ in range(2):
+        assert [one.causes for one in searcher._with_lost(leaving)] == [("tilt", "friction"), ("drag",)]
+    assert searcher._refits(leaving) == searcher._with_lost(leaving)
+    assert asked == [leaving]

@@ -66,8 +66,9 @@ def _kicks(fit: SharedFit) -> list[_Kick]:
     found = []
     for index, video in enumerate(fit.joint.videos):
         places, point = video.likelihood.coordinates.places, fit.joint.point(index)
+        events, times = fit.fits[index].rollout.events, video.likelihood.tracks.times
         for field, body in places:
-            if field == "impulse_x" and body is not None and not kicked_at_contact(fit.fits[index], [body]):
+            if field == "impulse_x" and body is not None and not kicked_at_contact(events, times, [body]):
                 change = point[[places["impulse_x", body], places["impulse_y", body]]]
                 found.append(_Kick(index, body, float(point[places["impulse_time", None]]), change))
     return sorted(found, key=lambda one: -float(np.linalg.norm(one.change)))[:MOST_KICKS]

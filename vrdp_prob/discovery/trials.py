@@ -203,7 +203,7 @@ class Trial:
         own = {one.name for one in cause.parameters if one.scope is Scope.BODY}
         entries = part.likelihood.coordinates.entries
         kicked = [entry.owner for entry in entries if entry.field in own and entry.owner is not None]
-        return kicked_at_contact(part, kicked)
+        return kicked_at_contact(part.rollout.events, part.likelihood.tracks.times, kicked)
 
     def mended(self, lost: Sequence[int], *, seed: int) -> "Trial":
         """The fit with some videos searched anew; itself where that finds nothing better."""

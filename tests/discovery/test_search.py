@@ -72,6 +72,20 @@ def test_the_first_of_two_is_what_lasts_and_brings_most_where_all_else_is_noise(
     assert found is (tilt if name else None)
 
 
+@pytest.mark.parametrize(
+    ("kicked", "both", "taken"),
+    [(3.0, 8.0, "tilt"), (3.0, 3.1, "kicks"), (None, 8.0, "tilt"), (3.0, None, "kicks"), (None, None, None)],
+    ids=["two explain more", "two explain no more", "kicks are in doubt", "no two are established", "nothing"],
+)
+def test_an_established_pair_goes_before_kicks_that_explain_less(
+    kicked: float | None, both: float | None, taken: str | None
+) -> None:
+    winner = None if kicked is None else _refit("kicks", kicked)
+    pair = None if both is None else (_refit("tilt", 1.0), _refit("tilt+drag", both))
+    found = _searcher(needed=2.0).or_first_of(pair, winner)
+    assert (found and found.causes[0]) == taken
+
+
 def test_lost_videos_are_searched_once_and_only_where_refits_leave_something(monkeypatch: pytest.MonkeyPatch) -> None:
     plain, leaving, lost = _refit("", 0.0), _refit("tilt", 1.0), _refit("tilt+friction", 50.0)
     asked: list[Trial] = []

@@ -130,9 +130,7 @@ def search(
                         continue
                 if searcher.doubted(winner, chain[-1], searcher.first(winner).overdispersion):
                     winner = None
-            if step.pair is not None and (winner is None or gain(step.pair[1], winner)[0] >= needed):
-                # Kicks, say, explain more than one cause does, and less than two.
-                winner, _ = step.pair
+            winner = searcher.or_first_of(step.pair, winner)
             if winner is None:
                 break
             chain.append(winner)
@@ -224,6 +222,15 @@ class _Searcher:
             return None
         divisor = self.first(second).overdispersion
         return None if self.doubted(second, trial, divisor) or self.doubted(second, first, divisor) else (first, second)
+
+    def or_first_of(self, pair: tuple[Trial, Trial] | None, winner: Trial | None) -> Trial | None:
+        """The best single cause, or the first of an established pair that brings more.
+
+        Kicks explain more than either of two causes does, and less than both.
+        """
+        if pair is None or (winner is not None and gain(pair[1], winner)[0] < self.needed):
+            return winner
+        return pair[0]
 
     def _in_order(self, trial: Trial, found: Sequence[Trial]) -> list[Trial]:
         """Trials by merit; those that patch several videos last, unless the best other one is in doubt."""

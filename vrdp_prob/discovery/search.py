@@ -10,7 +10,7 @@ from jaxtyping import Float
 from vrdp_prob.discovery.overdispersion import overdispersion
 from vrdp_prob.discovery.proposals import hidden_things
 from vrdp_prob.discovery.scores import CauseScore, happens_once, score_causes
-from vrdp_prob.discovery.single_videos import acts_in_contacts, causes_of_lost_videos, lost_videos
+from vrdp_prob.discovery.single_videos import causes_of_lost_videos, lost_videos
 from vrdp_prob.discovery.trials import Trial, gain, weights, with_own_population
 from vrdp_prob.inference.parallel import in_processes
 from vrdp_prob.inference.several_videos.fitting import SharedFit, fit_together
@@ -178,7 +178,7 @@ class _Searcher:
         return replace(self.first(trial), tried=tuple(self._in_order(trial, found)), pair=pair)
 
     def _refits(self, trial: Trial) -> list[Trial]:
-        """Refits with one more cause, the best first; those of a trial that is asked for again are not made again."""
+        """Refits with one more cause, the best first; they are made the first time that they are asked for."""
         if trial not in self._refitted_before:
             self._refitted_before[trial] = self._new_refits(trial)
         return self._refitted_before[trial]
@@ -198,7 +198,7 @@ class _Searcher:
         return sorted(found, key=_merit, reverse=True)
 
     def _with_lost(self, trial: Trial) -> list[Trial]:
-        """The same with fits from the beginning, where the refits leave something."""
+        """The refits, and where they leave something fits from the beginning, which count among them from then on."""
         found = self._refits(trial)
         if trial not in self._searched and not self._settled(trial, found):
             self._searched.add(trial)
@@ -256,17 +256,13 @@ class _Searcher:
         """
         if trial.choices:
             return []
+        left = [effect for effect in self.catalogue if effect.name not in trial.names]
         likely = {one.effect.name for one in _shortlist(self.first(trial).scores)}
-        left = [
-            effect
-            for effect in self.catalogue
-            if effect.name not in trial.names and (acts_in_contacts(effect) or effect.name in likely)
-        ]
         reached = {one.causes[-1].name: one.brought(trial) for one in reversed(found)}
         best = next((one.fit for one in found if not _mends_several(one)), trial.fit)
         still_lost = lost_videos(best)
         lost = [one for one in lost_videos(trial.fit) if one in still_lost]
-        told = causes_of_lost_videos(trial.fit, lost, left, self.needed, seed=self.seed)
+        told = causes_of_lost_videos(trial.fit, lost, left, likely, self.needed, seed=self.seed)
         again = [effect for effect, promised in told if reached.get(effect.name, 0.0) < promised]
 
         def searched(effect: Effect) -> Trial:

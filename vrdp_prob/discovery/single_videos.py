@@ -4,7 +4,7 @@ Scores and refits begin at the fit without the cause. Where that has taken the w
 near it to be found, and a search from the beginning is the only way.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from functools import partial
 
 from vrdp_prob.discovery.scores import happens_once
@@ -50,7 +50,13 @@ def lost_videos(fit: SharedFit) -> list[int]:
 
 
 def causes_of_lost_videos(
-    fit: SharedFit, lost: Sequence[int], catalogue: Sequence[Effect], needed: float, *, seed: int
+    fit: SharedFit,
+    lost: Sequence[int],
+    catalogue: Sequence[Effect],
+    likely: Collection[str],
+    needed: float,
+    *,
+    seed: int,
 ) -> list[tuple[Effect, float]]:
     """Causes with which lost videos are explained much better, the best first, and what is gained (nats).
 
@@ -63,15 +69,19 @@ def causes_of_lost_videos(
     catalogue
         The causes. Those that happen once, vanish nowhere or belong to materials are left out: one video says too
         little of them.
+    likely
+        Names of causes that the fit calls for; others are searched with only if they act in contacts, which make a
+        search lose its way.
     needed
         Gain (nats) from which a cause is told of.
     seed
         Seed of the searches.
     """
-    # What acts in contacts comes first: it is what makes a search lose its way.
-    effects = sorted(
-        (effect for effect in catalogue if _tells(effect)), key=lambda effect: not acts_in_contacts(effect)
-    )
+    telling = [effect for effect in catalogue if _tells(effect)]
+    in_contacts = [effect for effect in telling if _acts_in_contacts(effect)]
+    effects = in_contacts + [effect for effect in telling if effect.name in likely and effect not in in_contacts]
+    if not effects:
+        return []
 
     def searched(video: int) -> Callable[[PhysicsModel], MapFit]:
         return partial(fit_alone, fit.fits[video].clues.tracks, seed=seed, plan=IN_DOUBT)
@@ -112,6 +122,5 @@ def _tells(effect: Effect) -> bool:
     return bool(effect.vanishes_at or effect.vanishes_like) and not happens_once(effect) and not of_materials
 
 
-def acts_in_contacts(effect: Effect) -> bool:
-    """Whether an effect acts in contacts of bodies, or on what follows from them."""
+def _acts_in_contacts(effect: Effect) -> bool:
     return any(effect.overrides(hook) for hook in CONTACT_HOOKS)

@@ -12,6 +12,7 @@ from vrdp_prob.inference.hypothesis import distances
 from vrdp_prob.inference.identifiability import uninformed
 from vrdp_prob.inference.information import Information
 from vrdp_prob.inference.mode import Mode
+from vrdp_prob.inference.passing import close_passes
 from vrdp_prob.inference.refinement import Refined, mode_at
 from vrdp_prob.inference.samples import evaluate
 from vrdp_prob.models.coordinates import Coordinates
@@ -42,13 +43,19 @@ def distinct_modes(likelihood: Likelihood, found: Sequence[Refined]) -> tuple[Mo
 def with_all_that_meet(
     likelihood: Likelihood, structure: Structure, points: Sequence[Float[np.ndarray, "dimension"]]
 ) -> tuple[Structure, Likelihood] | None:
-    """The density with the unknowns of bodies that meet others at the points and have none yet; None where none do."""
+    """The density with the unknowns of bodies that meet others, or just pass them, at the points and have none yet.
+
+    None where none do.
+    """
     met = structure_at(likelihood, points, structure.moving)
-    if met.colliding <= structure.colliding and met.bouncing <= structure.bouncing:
-        return None
     wider = replace(
-        structure, colliding=structure.colliding | met.colliding, bouncing=structure.bouncing | met.bouncing
+        structure,
+        colliding=structure.colliding | met.colliding,
+        bouncing=structure.bouncing | met.bouncing,
+        passing=structure.passing | met.passing,
     )
+    if wider == structure:
+        return None
     return wider, in_unknowns_of(likelihood, wider)
 
 
@@ -105,9 +112,10 @@ def _uninformed(likelihood: Likelihood, modes: Sequence[Mode]) -> frozenset[int]
 def structure_at(
     likelihood: Likelihood, points: Sequence[Float[np.ndarray, "dimension"]], moving: frozenset[int]
 ) -> Structure:
-    """Bodies that move, that meet another one, and that meet a wall at some of the points."""
+    """Bodies that move, that meet another one or a wall, and cubes that just pass one, at some of the points."""
     with torch.no_grad():
         rollout = likelihood.rollout(torch.from_numpy(np.array(points)))
     colliding = frozenset(body for pairs in collision_sequences(rollout) for pair in pairs for body in pair)
     bouncing = frozenset(body for world in range(len(points)) for body, _ in wall_contacts(rollout, world))
-    return Structure(moving, colliding, bouncing)
+    passing = close_passes(likelihood.tracks, rollout.trajectory.numpy())
+    return Structure(moving, colliding, bouncing, passing - colliding - bouncing)

@@ -57,6 +57,8 @@ class Structure:
         Bodies that meet others, so that the motion can say something about mass and restitution (and yaw of a cube).
     bouncing
         Bodies that meet walls, which say nothing about a mass, but about the rest.
+    passing
+        Cubes that come so near to something that their yaw decides whether they meet it.
     held
         Quantities (with their owner, None for the video's) that are not unknown though the model has them, and the
         value that each keeps; None for its default.
@@ -65,12 +67,18 @@ class Structure:
     moving: frozenset[int]
     colliding: frozenset[int]
     bouncing: frozenset[int] = frozenset()
+    passing: frozenset[int] = frozenset()
     held: Mapping[tuple[str, int | None], float | None] = field(default_factory=dict)
 
     @property
     def meeting(self) -> frozenset[int]:
         """Bodies that meet something."""
         return self.colliding | self.bouncing
+
+    @property
+    def turning(self) -> frozenset[int]:
+        """Bodies whose yaw the motion can say something about, if only that they passed."""
+        return self.meeting | self.passing
 
 
 def unknowns(
@@ -120,16 +128,16 @@ def _motion(tracks: Tracks, structure: Structure) -> Iterator[Coordinate]:
 
 
 def _turning(tracks: Tracks, model: PhysicsModel, structure: Structure) -> Iterator[Coordinate]:
-    """Yaw of cubes that meet something; spin of what is seen to turn, or whose spin matters to the motion."""
+    """Yaw of cubes that meet or just pass something; spin of what is seen to turn, or whose spin matters."""
     measured = set(Observations.of(tracks).angle_bodies)
     angles = tracks.angles
     rubs = any(effect.overrides("tangential_impulse") for effect in model.effects)
     bends = any(effect.spin_matters for effect in model.effects)
     for body, description in enumerate(tracks.bodies):
-        meets = body in structure.meeting
-        if meets and description.shape is Shape.CUBE:
+        turning_cube = description.shape is Shape.CUBE and body in structure.turning
+        if turning_cube:
             yield Coordinate("angle", body, Transform.IDENTITY, Prior(0.0, YAW_SD), scale=0.1)
-        spin_matters = bends or (meets and (rubs or description.shape is Shape.CUBE))
+        spin_matters = bends or turning_cube or (rubs and body in structure.meeting)
         if body in structure.moving and (spin_matters or body in measured):
             prior = Prior(0.0, _spin_sd(description))
             yield Coordinate("spin", body, Transform.IDENTITY, prior, scale=0.1)
@@ -161,7 +169,7 @@ def _matter(tracks: Tracks, model: PhysicsModel, structure: Structure) -> Iterat
 
 def _physics(tracks: Tracks, model: PhysicsModel, structure: Structure) -> Iterator[Coordinate]:
     """Parameters of the model that can have an effect on these bodies."""
-    turning = any(tracks.bodies[body].shape is Shape.CUBE for body in structure.meeting)
+    turning = any(tracks.bodies[body].shape is Shape.CUBE for body in structure.turning)
     bends = any(effect.spin_matters for effect in model.effects)
     spin_matters = turning or bends or bool(Observations.of(tracks).angle_bodies)
     walls = bool(tracks.walls) or any(effect.overrides("obstacles") for effect in model.effects)

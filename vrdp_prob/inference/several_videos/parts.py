@@ -73,7 +73,12 @@ def structure_of(coordinates: Coordinates) -> Structure:
     """Which bodies have which unknowns in a fit."""
     owners = {
         field: frozenset(e.owner for e in coordinates.entries if e.field == field and e.owner is not None)
-        for field in ("velocity_x", MASS.name, RESTITUTION.name)
+        for field in ("velocity_x", MASS.name, RESTITUTION.name, "angle")
     }
     # A weighed body that meets others counts among those that meet walls: it has the same unknowns.
-    return Structure(moving=owners["velocity_x"], colliding=owners[MASS.name], bouncing=owners[RESTITUTION.name])
+    return Structure(
+        moving=owners["velocity_x"],
+        colliding=owners[MASS.name],
+        bouncing=owners[RESTITUTION.name],
+        passing=owners["angle"] - owners[RESTITUTION.name],
+    )

@@ -116,10 +116,15 @@ def _named(result: Result) -> bool:
 
 def _pairs(results: Sequence[Result]) -> str:
     rows = [
-        (" + ".join(ways), str(Share(mine, hit)), _list(", ".join(named(one)) or answer(one) for one in mine))
+        (
+            " + ".join(ways),
+            ", ".join(f"{reached(one):.1f}" for one in mine),
+            str(Share(mine, hit)),
+            _list(", ".join(named(one)) or answer(one) for one in mine),
+        )
         for ways, mine in _by_ways(of(results, Kind.TWO)).items()
     ]
-    return _table(("hidden", "both named", "answers"), rows) if rows else ""
+    return _table(("hidden", "smaller of their sizes", "both named", "answers"), rows) if rows else ""
 
 
 def _outside(results: Sequence[Result]) -> str:

@@ -109,7 +109,12 @@ def one(task: Task) -> Result:
     except (UnendingMotionError, ValueError) as error:  # scenes in which this cause finds no room
         return {**facts, "not_drawn": str(error)}
     facts["hidden"] = [
-        {"name": cause.name, "strength": cause.strength, "effect_size": cause.effect_size}
+        {
+            "name": cause.name,
+            "strength": cause.strength,
+            "effect_size": cause.effect_size,
+            "trace": cause.trace,
+        }
         for cause in data.truth.causes
     ]
     with tempfile.TemporaryDirectory() as folder:

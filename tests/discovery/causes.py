@@ -36,6 +36,8 @@ class Cause:
         Strength at which it is gone or hardly there.
     catalogued
         Whether the catalogue has it.
+    placed
+        Whether it acts only where it is put, which is where bodies go.
     """
 
     name: str
@@ -44,6 +46,7 @@ class Cause:
     most: float
     least: float = 0.0
     catalogued: bool = True
+    placed: bool = False
 
 
 def governed(videos: Videos, **numbers: float) -> Videos:
@@ -207,16 +210,16 @@ CATALOGUE: dict[str, Cause] = {
     "bowl": Cause("bowl", bowl, "1/s^2", 2.0),
     "rotating_table": Cause("rotating_table", rotating_table, "rad/s", 1.0),
     "pair_force": Cause("pair_force", pair_force, "N m^2", 0.3),
-    "friction_patch": Cause("friction_patch", friction_patch, "1", 8.0),
+    "friction_patch": Cause("friction_patch", friction_patch, "1", 8.0, placed=True),
     "time_varying_friction": Cause("time_varying_friction", time_varying_friction, "1", 4.0),
     "mass_dependent_friction": Cause("mass_dependent_friction", mass_dependent_friction, "1", 3.0),
     "material_friction": Cause("material_friction", material_friction, "1", 6.0),
     "slip_to_roll": Cause("slip_to_roll", slip_to_roll, "1", 0.2, least=ROLLING),
     "contact_friction": Cause("contact_friction", contact_friction, "1", 1.0),
     "speed_dependent_restitution": Cause("speed_dependent_restitution", speed_dependent_restitution, "1", 1.0),
-    "hidden_obstacle": Cause("hidden_obstacle", hidden_obstacle, "m", 0.5),
-    "wall": Cause("wall", wall, "m", 1.0),
-    "external_impulse": Cause("external_impulse", external_impulse, "m/s", 2.0),
+    "hidden_obstacle": Cause("hidden_obstacle", hidden_obstacle, "m", 0.5, placed=True),
+    "wall": Cause("wall", wall, "m", 1.0, placed=True),
+    "external_impulse": Cause("external_impulse", external_impulse, "m/s", 2.0, placed=True),
     "clock_error": Cause("clock_error", lost_frames, "s", 0.5),
     "lens_distortion": Cause("lens_distortion", lens_distortion, "1/m^2", 0.08),
     "contact_radius_error": Cause("contact_radius_error", contact_radius_error, "1", 0.3),

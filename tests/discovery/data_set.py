@@ -12,12 +12,12 @@ import numpy as np
 from jaxtyping import Bool
 from scipy.optimize import brentq
 
-from tests.discovery.causes import Videos
+from tests.discovery.causes import Cause, Videos
 from tests.discovery.measurement import Measurement, measure
 from tests.discovery.other_effects import ALL
 from tests.discovery.refit import Freedom, Leftover, leftover
 from tests.discovery.scenes import Setting, draw_videos
-from tests.discovery.videos import UnendingMotionError
+from tests.discovery.videos import UnendingMotionError, recorded
 from vrdp_prob.datasets import write_folder
 from vrdp_prob.scene import Tracks
 
@@ -47,6 +47,9 @@ class HiddenCause:
         Its strength and the unit.
     left
         What this cause alone leaves after the refit.
+    trace
+        By how much it changes a track beside the other causes: the largest root mean square of those of all bodies, in
+        units of the noise.
     """
 
     name: str
@@ -55,6 +58,7 @@ class HiddenCause:
     strength: float
     unit: str
     left: Leftover
+    trace: float
 
     @property
     def effect_size(self) -> float:
@@ -119,8 +123,22 @@ class _Seeds:
     """Independent seeds of the parts of a data set, so that one does not change with another."""
 
     scenes: int
-    details: tuple[int, ...] = field(default_factory=tuple)
+    details: tuple[np.random.SeedSequence, ...] = field(default_factory=tuple)
     noise: int = 0
+
+
+@dataclass(frozen=True)
+class _Drawn:
+    """A cause with its directions, places and times."""
+
+    cause: Cause
+    strength: float
+    detail: int
+    left: Leftover
+
+    def hide(self, videos: Videos) -> Videos:
+        """The videos with the cause."""
+        return self.cause.hide(videos, self.strength, np.random.default_rng(self.detail))
 
 
 def draw(
@@ -146,19 +164,53 @@ def draw(
     setting, measurement = setting or Setting(), measurement or Measurement()
     seeds = _seeds(seed, len(wanted))
     plain = draw_videos(setting, np.random.default_rng(seeds.scenes))
-    videos, causes = plain, []
-    for wish, detail in zip(wanted, seeds.details, strict=True):
-        yardstick = Yardstick(wish.way, plain, detail, measurement)
-        strength = wish.strength if wish.effect_size is None else yardstick.strength_for(wish.effect_size)
-        assert strength is not None
-        cause = ALL[wish.way]
-        left = yardstick.left_by(strength)
-        videos = cause.hide(videos, strength, np.random.default_rng(detail))
-        causes.append(HiddenCause(cause.name, wish.way, cause.catalogued, strength, cause.unit, left))
+    drawn = [_drawn(wish, plain, one, measurement) for wish, one in zip(wanted, seeds.details, strict=True)]
+    videos = _hidden_in(plain, drawn)
+    causes = tuple(
+        HiddenCause(
+            one.cause.name,
+            wish.way,
+            one.cause.catalogued,
+            one.strength,
+            one.cause.unit,
+            one.left,
+            _trace(videos, _hidden_in(plain, _but(drawn, place)), measurement.noise),
+        )
+        for place, (wish, one) in enumerate(zip(wanted, drawn, strict=True))
+    )
     generator = np.random.default_rng(seeds.noise)
     measured = [measure(video, f"v{k + 1:02d}", measurement, generator) for k, video in enumerate(videos)]
-    truth = Truth(tuple(causes), videos, setting, measurement, seed, tuple(wrong for _, wrong in measured))
+    truth = Truth(causes, videos, setting, measurement, seed, tuple(wrong for _, wrong in measured))
     return DataSet([tracks for tracks, _ in measured], truth)
+
+
+def _drawn(wish: Wanted, plain: Videos, seeds: np.random.SeedSequence, measurement: Measurement) -> _Drawn:
+    """A cause with its directions, places and times, as strong as is wished."""
+    detail = _number(seeds)
+    yardstick = Yardstick(wish.way, plain, detail, measurement)
+    strength = wish.strength if wish.effect_size is None else yardstick.strength_for(wish.effect_size)
+    assert strength is not None
+    return _Drawn(ALL[wish.way], strength, detail, yardstick.left_by(strength))
+
+
+def _but(drawn: Sequence[_Drawn], place: int) -> list[_Drawn]:
+    return [*drawn[:place], *drawn[place + 1 :]]
+
+
+def _hidden_in(videos: Videos, causes: Sequence[_Drawn]) -> Videos:
+    """Videos with some causes; those that are put where bodies go come last, when bodies go there."""
+    for one in sorted(causes, key=lambda one: one.cause.placed):
+        videos = one.hide(videos)
+    return videos
+
+
+def _trace(videos: Videos, without: Videos, noise: float) -> float:
+    """Largest root mean square distance of the tracks of a body in two kinds of videos, in units of the noise."""
+    apart = [
+        recorded(one, one.motion.states[..., :2]) - recorded(other, other.motion.states[..., :2])
+        for one, other in zip(videos, without, strict=True)
+    ]
+    return max(float(np.sqrt((one**2).sum(axis=-1).mean(axis=0)).max()) for one in apart) / noise
 
 
 @dataclass(frozen=True)
@@ -222,5 +274,9 @@ class Yardstick:
 
 
 def _seeds(seed: int, causes: int) -> _Seeds:
-    numbers = [int(child.generate_state(1)[0]) for child in np.random.SeedSequence(seed).spawn(2 + causes)]
-    return _Seeds(scenes=numbers[0], details=tuple(numbers[2:]), noise=numbers[1])
+    scenes, noise, *details = np.random.SeedSequence(seed).spawn(2 + causes)
+    return _Seeds(_number(scenes), tuple(details), _number(noise))
+
+
+def _number(seeds: np.random.SeedSequence) -> int:
+    return int(seeds.generate_state(1)[0])

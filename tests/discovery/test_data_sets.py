@@ -135,6 +135,19 @@ def test_a_strength_is_found_for_an_effect_size(way: str) -> None:
     assert cause.effect_size == pytest.approx(3.0, rel=0.1)
 
 
+@pytest.mark.parametrize("place", ["wall", "hidden_obstacle", "friction_patch", "external_impulse"])
+def test_what_is_put_where_bodies_go_is_met_though_another_cause_stops_them_early(place: str) -> None:
+    wanted = [Wanted(place, effect_size=4.0), Wanted("linear_drag", effect_size=4.0)]
+    causes = draw(wanted, seed=1, setting=Setting(videos=6, bodies=3)).truth.causes
+    assert [one.way for one in causes] == [place, "linear_drag"]
+    assert all(one.trace > 1 for one in causes)
+
+
+def test_a_cause_that_no_body_feels_leaves_no_trace() -> None:
+    (cause,) = draw([Wanted("wall", strength=0.0)], seed=1, setting=SMALL).truth.causes
+    assert cause.trace == 0
+
+
 def test_small_effects_grow_in_proportion_to_their_strength() -> None:
     plain = draw_videos(SMALL, np.random.default_rng(7))
     yardstick = Yardstick("rotating_table", plain, 0, Measurement())

@@ -86,6 +86,27 @@ def test_an_established_pair_goes_before_kicks_that_explain_less(
     assert (found and found.causes[0]) == taken
 
 
+@pytest.mark.parametrize(
+    ("without", "goes_on_from", "taken"),
+    [(0.0, "", "tilt"), (5.0, "better course", "tilt"), (9.5, "better course", None)],
+    ids=["the cause brings it", "cause and course bring it", "the course brings it"],
+)
+def test_what_a_better_course_of_events_brings_is_no_merit_of_the_cause(
+    without: float, goes_on_from: str, taken: str | None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    nothing, winner, better = _refit("", 0.0), _refit("tilt", 10.0), _refit("better course", without)
+    winner.without.return_value = better
+
+    def doubted(_self: object, trial: Trial, lesser: Trial, _divisor: object) -> bool:
+        return bool((trial.log_density - lesser.log_density).sum() < 2.0)
+
+    monkeypatch.setattr(search._Searcher, "first", Mock())
+    monkeypatch.setattr(search._Searcher, "doubted", doubted)
+    base, found = _searcher(needed=2.0).chosen(nothing, search.Step((), (), (winner,), np.ones(3)))
+    assert base.causes[0] == goes_on_from
+    assert (found and found.causes[0]) == taken
+
+
 def test_lost_videos_are_searched_once_and_only_where_refits_leave_something(monkeypatch: pytest.MonkeyPatch) -> None:
     plain, leaving, lost = _refit("", 0.0), _refit("tilt", 1.0), _refit("tilt+friction", 50.0)
     asked: list[Trial] = []

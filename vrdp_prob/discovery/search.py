@@ -119,22 +119,16 @@ def search(
         steps = [searcher.first(chain[0])]
         while len(chain) <= MOST_CAUSES:
             step = steps[-1] = searcher.tried(chain[-1])
-            winner = next((one for one in step.tried[:1] if gain(one, chain[-1])[0] >= needed), None)
+            base, winner = searcher.chosen(chain[-1], step)
+            found_better_course = base is not chain[-1]
+            chain[-1] = base
             if winner is not None:
-                without = winner.without(winner.causes[-1])
-                if gain(without, chain[-1])[0] > needed:
-                    # The refit has found a better course of events, which is no merit of the cause.
-                    chain[-1] = without
-                    if gain(winner, without)[0] < needed:
-                        steps[-1] = searcher.first(without)
-                        continue
-                if searcher.doubted(winner, chain[-1], searcher.first(winner).overdispersion):
-                    winner = None
-            winner = searcher.or_first_of(step.pair, winner)
-            if winner is None:
+                chain.append(winner)
+                steps.append(searcher.first(winner))
+            elif found_better_course:
+                steps[-1] = searcher.first(base)
+            else:
                 break
-            chain.append(winner)
-            steps.append(searcher.first(winner))
         best = searcher.unpatched(chain[-1])
         if best is not chain[-1]:
             chain.append(best)
@@ -222,6 +216,21 @@ class _Searcher:
             return None
         divisor = self.first(second).overdispersion
         return None if self.doubted(second, trial, divisor) or self.doubted(second, first, divisor) else (first, second)
+
+    def chosen(self, trial: Trial, step: Step) -> tuple[Trial, Trial | None]:
+        """The model to go on from, and the same with the cause that a step has established; None where it has none.
+
+        Where the winner's refit has found a better course of events, which is no merit of the cause, the model with
+        that course is the one to go on from.
+        """
+        winner = next((one for one in step.tried[:1] if gain(one, trial)[0] >= self.needed), None)
+        if winner is not None:
+            without = winner.without(winner.causes[-1])
+            if gain(without, trial)[0] > self.needed:
+                trial = without
+            if self.doubted(winner, trial, self.first(winner).overdispersion):
+                winner = None
+        return trial, self.or_first_of(step.pair, winner)
 
     def or_first_of(self, pair: tuple[Trial, Trial] | None, winner: Trial | None) -> Trial | None:
         """The best single cause, or the first of an established pair that brings more.

@@ -7,7 +7,7 @@ import pytest
 
 from tests.discovery.fitted import fitted
 from vrdp_prob.discovery.forecast import held_out
-from vrdp_prob.discovery.held_out import cavities
+from vrdp_prob.discovery.held_out import all_but_each, cavities, left_out
 from vrdp_prob.discovery.residual_model import ResidualModel
 from vrdp_prob.discovery.scores import score_causes
 from vrdp_prob.discovery.trials import Trial, gain, gains, weights
@@ -21,6 +21,18 @@ def test_a_video_is_as_probable_as_the_evidence_with_it_over_that_without_it() -
     others = fit_together(data.tracks[1:], model=fit.model, model_error=False)
     left_out = next(iter(cavities(fit).values()))
     assert left_out.log_density == pytest.approx(fit.log_evidence - others.log_evidence, abs=1.5)
+
+
+def test_a_video_that_knows_a_number_best_does_not_drown_what_the_others_say() -> None:
+    prior, known, videos = np.eye(2), np.array([1.0, 0.3]), [1e17, 2.0, 3.0]
+    curvatures = [strength * np.outer(known, known) for strength in videos]
+    for without, left in zip(([2.0, 3.0], [1e17, 3.0], [1e17, 2.0]), all_but_each(prior, curvatures), strict=True):
+        np.testing.assert_allclose(left, prior + sum(without) * np.outer(known, known), rtol=1e-12)
+    others = all_but_each(prior, curvatures)[0]
+    cavity = left_out(0.0, np.zeros(2), np.sqrt(1e17) * known[None], others, np.zeros(2))
+    information = 1 + 5 * known @ known
+    assert cavity.log_density == pytest.approx(np.log(information / (1e17 * known @ known)) / 2, abs=0.01)
+    assert np.linalg.eigvalsh(cavity.covariance) == pytest.approx([1 / information, 1.0])
 
 
 def test_what_the_others_say_is_less_sharp_than_what_all_say() -> None:

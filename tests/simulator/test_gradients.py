@@ -5,7 +5,12 @@ from dataclasses import replace
 import pytest
 import torch
 
+from tests.simulator.differences import Scene
 from tests.simulator.scenes import CUBE, RADIUS, SPHERE, tensor, world
+from vrdp_prob.models.effects.pair_force import PairForce
+from vrdp_prob.models.effects.surface_tilt import SurfaceTilt
+from vrdp_prob.models.effects.wind import Wind
+from vrdp_prob.models.physics import PhysicsModel
 from vrdp_prob.models.simulator.rollout import simulate
 
 GRAVITY = 9.81
@@ -58,6 +63,49 @@ def test_stopping_distance() -> None:
     (result.trajectory.sum() + result.velocity[:, 1:].sum()).backward()
     assert friction.grad.item() == pytest.approx(-1 / (2 * 9.81 * 0.01), abs=1e-8)
     assert v.grad[0, 0, 0].item() == pytest.approx(1 / 0.981, abs=1e-8)
+
+
+@pytest.mark.parametrize("excess", [1.05, 2.0, 50.0])
+def test_a_disc_that_slides_off_from_rest_goes_the_way_it_is_pushed(excess: float) -> None:
+    friction, tilt, times = 0.004, _leaf([0.003, 0.004]), tensor([0.0, 1.0, 2.0])
+    model = PhysicsModel.base().with_effect(SurfaceTilt())
+    steep = excess * friction / 0.005 * tilt
+    scene = world([[0, 0]], [[0, 0]], parameters={"sliding_friction": friction})
+    slope = dict(zip(("tilt_x", "tilt_y"), steep[:, None], strict=True))
+    places = simulate(replace(scene, parameters={**scene.parameters, **slope}), times, model).trajectory[0, -1, 0, :2]
+    expected = GRAVITY * (steep - friction * steep / steep.norm()) * times[-1] ** 2 / 2
+    assert places.tolist() == pytest.approx(expected.tolist(), abs=1e-6)
+    for axis in range(2):
+        (ours,) = torch.autograd.grad(places[axis], tilt, retain_graph=True)
+        (theirs,) = torch.autograd.grad(expected[axis], tilt, retain_graph=True)
+        assert ours.tolist() == pytest.approx(theirs.tolist(), rel=1e-5)
+
+
+PUSHED = {
+    "wind": ({"wind_x": 1.5, "wind_y": 1.2, "air_drag": 0.02}, {"wind_x", "wind_y", "air_drag"}),
+    "tilt": ({"tilt_x": 0.006, "tilt_y": -0.003}, {"tilt_x", "tilt_y", "rolling_resistance"}),
+    "pair_force": ({"pair_strength": -0.1, "pair_softening": 0.2}, {"pair_strength", "position", "mass"}),
+}
+"""What pushes resting spheres, with parameters that change the way they go."""
+
+
+@pytest.mark.parametrize("name", list(PUSHED))
+def test_bodies_at_rest_that_are_pushed_have_the_derivatives_of_differences(name: str) -> None:
+    effect = {"wind": Wind(), "tilt": SurfaceTilt(), "pair_force": PairForce()}[name]
+    parameters, changed = PUSHED[name]
+    worlds = world(
+        [[0.0, 0.0], [0.9, 0.5], [-0.4, 0.8]],
+        [[0.0, 0.0]] * 3,
+        [SPHERE] * 3,
+        {"rolling_resistance": 0.004, "sliding_friction": 0.05, **parameters},
+    )
+    times = tensor([0.0, 0.04, 0.2, 0.5, 1.0])
+    scene = Scene(worlds, times, PhysicsModel.base().with_effect(effect), seed=3)
+    gone = scene.rollout(scene.inputs).trajectory[0, -1, :, :2] - worlds.position[0]
+    assert float(gone.abs().max()) > 0.01
+    (slope,) = scene.slopes(changed)
+    assert slope.finite
+    assert slope.error < 1e-4
 
 
 def _assert_same_derivatives(found: torch.Tensor, expected: torch.Tensor, *leaves: torch.Tensor) -> None:

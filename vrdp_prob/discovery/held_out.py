@@ -6,10 +6,13 @@ follows in closed form: nothing is fitted again. Source: the cavity distribution
 UAI 2001); leaving out whole groups: Roberts et al., Cross-validation strategies, Ecography 40 (2017).
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import accumulate
 
 import numpy as np
 from jaxtyping import Float
+from scipy.linalg import cho_solve, cholesky, solve_triangular, svdvals
 
 from vrdp_prob.inference.parallel import in_parallel
 from vrdp_prob.inference.prior_mass import log_prior_constant
@@ -17,8 +20,6 @@ from vrdp_prob.inference.several_videos.arrow import LOG_TWO_PI
 from vrdp_prob.inference.several_videos.ascent import STEEP
 from vrdp_prob.inference.several_videos.fitting import SharedFit
 from vrdp_prob.inference.several_videos.joint_fit import expand, expand_prior
-
-LEAST_CURVATURE = 1e-9
 
 
 @dataclass(frozen=True)
@@ -49,12 +50,17 @@ def cavities(fit: SharedFit) -> dict[str, Cavity]:
     # Where a video is at an edge between two courses of events its gradient says nothing of what lies beyond.
     inside = [-float(one.local_gradient @ one.local_step) / 2 < STEEP for one in expansions]
     gradients = [one.reduced_gradient * ok for one, ok in zip(expansions, inside, strict=True)]
-    total = _definite(prior.curvature + sum(one.reduced for one in expansions))
+    curvatures = [one.reduced for one in expansions]
+    total = prior.curvature + sum(curvatures)
     # The search ends a little off the maximum, which matters to what a single video says of a sharp number.
     rest = np.linalg.solve(total, -(prior.gradient + sum(gradients)))
     return {
-        video.name: left_out(_own(fit, index), total, gradients[index] + one.reduced @ rest, one.reduced, mean + rest)
-        for index, (video, one) in enumerate(zip(joint.videos, expansions, strict=True))
+        video.name: left_out(
+            _own(fit, index), gradients[index] + curvatures[index] @ rest, one.reduced_rows, others, mean + rest
+        )
+        for index, (video, one, others) in enumerate(
+            zip(joint.videos, expansions, all_but_each(prior.curvature, curvatures), strict=True)
+        )
     }
 
 
@@ -67,11 +73,24 @@ def _own(fit: SharedFit, index: int) -> float:
     return own + log_prior_constant(entries[place] for place in video.local_places)
 
 
+def all_but_each(
+    prior: Float[np.ndarray, "shared shared"], curvatures: Sequence[Float[np.ndarray, "shared shared"]]
+) -> list[Float[np.ndarray, "shared shared"]]:
+    """For each video what the prior and all other videos say of the shared unknowns, as a curvature.
+
+    It is no difference from the sum of all: where one video knows a number a million times better than the others, that
+    would be all rounding error.
+    """
+    before = accumulate(curvatures[:-1], initial=prior)
+    after = [*accumulate(reversed(curvatures[1:]), initial=np.zeros_like(prior))]
+    return [one + other for one, other in zip(before, reversed(after), strict=True)]
+
+
 def left_out(
     own: float,
-    total: Float[np.ndarray, "shared shared"],
     gradient: Float[np.ndarray, "shared"],
-    curvature: Float[np.ndarray, "shared shared"],
+    rows: Float[np.ndarray, "residual shared"],
+    others: Float[np.ndarray, "shared shared"],
     mean: Float[np.ndarray, "shared"],
 ) -> Cavity:
     """Leave out one video of a joint Gaussian.
@@ -80,25 +99,18 @@ def left_out(
     ----------
     own
         Log density (nats) of the video at the most probable shared unknowns, its own ones integrated out.
-    total, curvature
-        Curvature of the negative log density along the shared unknowns: of all videos with the prior, and of this one.
     gradient
         Gradient of the video's negative log density there.
+    rows
+        Derivatives of the video's residuals by the shared unknowns, whose products are its curvature.
+    others
+        Curvature of the negative log density of all other videos and of the prior.
     mean
         The most probable shared unknowns.
     """
-    others = _definite(total - curvature)
-    covariance = np.linalg.inv(others)
+    factor = cholesky(others, lower=True)
+    covariance = cho_solve((factor, True), np.eye(len(others)))
     shift = covariance @ gradient
-    volume = (np.linalg.slogdet(others)[1] - np.linalg.slogdet(total)[1]) / 2
+    # The determinant of a sum would be all rounding error where the video knows some number far better than the others.
+    volume = -float(np.log1p(svdvals(solve_triangular(factor, rows.T, lower=True)) ** 2).sum()) / 2
     return Cavity(mean + shift, covariance, float(own + volume - gradient @ shift / 2))
-
-
-def _definite(matrix: Float[np.ndarray, "shared shared"]) -> Float[np.ndarray, "shared shared"]:
-    """A curvature without directions of negative curvature, which differences leave behind."""
-    if not len(matrix):
-        return matrix
-    size = np.sqrt(np.maximum(np.diag(matrix), 1e-300))
-    values, vectors = np.linalg.eigh(matrix / np.outer(size, size))
-    result: np.ndarray = (vectors * np.maximum(values, LEAST_CURVATURE)) @ vectors.T * np.outer(size, size)
-    return result

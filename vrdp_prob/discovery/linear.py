@@ -268,7 +268,12 @@ class LinearFit:
     @cached_property
     def curvature(self) -> Float[np.ndarray, "shared shared"]:
         """Information about the shared unknowns, the own ones of all videos following."""
-        return self.prior + sum(video.reduced_shared.T @ video.reduced_shared for video in self.videos)
+        return self.prior + sum(self.curvatures)
+
+    @property
+    def curvatures(self) -> list[Float[np.ndarray, "shared shared"]]:
+        """What each video says of them, its own unknowns following."""
+        return [video.reduced_shared.T @ video.reduced_shared for video in self.videos]
 
     @cached_property
     def _root(self) -> Float[np.ndarray, "shared known"]:

@@ -20,7 +20,7 @@ from scipy.linalg import solve_triangular
 from scipy.optimize import minimize
 from scipy.stats import chi2
 
-from vrdp_prob.discovery.held_out import left_out
+from vrdp_prob.discovery.held_out import all_but_each, left_out
 from vrdp_prob.discovery.linear import LinearFit, LinearVideo, log_evidence
 from vrdp_prob.discovery.residual_model import ResidualModel, VideoResiduals
 from vrdp_prob.inference.parallel import in_processes
@@ -303,13 +303,12 @@ def _log_densities(linear: LinearFit, stretched: Sequence[float]) -> Float[np.nd
     stretched
         Logarithm of the factor by which those of each video were stretched.
     """
-    total = linear.curvature
     found = []
-    for video, left, log_factor in zip(linear.videos, linear.left, stretched, strict=True):
-        shared = video.reduced_shared
-        own = video.log_volume + log_factor - float(left @ left) / 2
-        cavity = left_out(own, total, shared.T @ left, shared.T @ shared, np.zeros(len(total)))
-        found.append(cavity.log_density)
+    for video, left, log_factor, others in zip(
+        linear.videos, linear.left, stretched, all_but_each(linear.prior, linear.curvatures), strict=True
+    ):
+        own, rows = video.log_volume + log_factor - float(left @ left) / 2, video.reduced_shared
+        found.append(left_out(own, rows.T @ left, rows, others, np.zeros(rows.shape[1])).log_density)
     return np.array(found)
 
 

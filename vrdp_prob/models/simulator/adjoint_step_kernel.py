@@ -4,9 +4,12 @@
 # mypy: disable-error-code="no-untyped-def"
 # ruff: noqa: PLR0917
 
-from vrdp_prob.models.simulator.adjoint_kernel import clear, load_state
+import math
+
+from vrdp_prob.models.simulator.adjoint_kernel import clear, fold_state, load_state
 from vrdp_prob.models.simulator.apart_kernel import load_block_apart
-from vrdp_prob.models.simulator.cluster_kernel import constrain_vjp, is_alone, mobility, presses
+from vrdp_prob.models.simulator.cluster_kernel import cluster_of, constrain_vjp, is_alone, mobility, presses
+from vrdp_prob.models.simulator.ending_kernel import LAUNCH, set_push_at
 from vrdp_prob.models.simulator.laws_kernel import (
     COUPLED,
     STATE_SIZE,
@@ -16,7 +19,13 @@ from vrdp_prob.models.simulator.laws_kernel import (
     pair_force_vjp,
     stage_state,
 )
-from vrdp_prob.models.simulator.motion_kernel import cluster_derivatives, is_still, match_velocities, pair_force_of
+from vrdp_prob.models.simulator.motion_kernel import (
+    cluster_derivatives,
+    is_still,
+    match_velocities,
+    pair_force_of,
+    take_states,
+)
 from vrdp_prob.models.simulator.tableau import NODES
 from vrdp_prob.models.simulator.tape_kernel import BLOCK_PIECES, BLOCK_TOUCHES, FIRST
 from vrdp_prob.models.simulator.world_kernel import (
@@ -24,11 +33,17 @@ from vrdp_prob.models.simulator.world_kernel import (
     LENGTH,
     MOVING,
     ORIGIN,
+    PUSH,
     RESTING,
+    SLIDING,
+    SPARE,
     SPIN_SENSE,
     STAGES,
     WORK,
 )
+
+ROUNDING = 1e-12
+"""Relative error with which a body has the speed of a launch."""
 
 
 @compiled
@@ -129,6 +144,8 @@ def reverse_pieces(world, adjoint, tape, block):
     if moving:
         reverse_step(world, adjoint, cluster, world.clock[cluster, ORIGIN], world.clock[cluster, LENGTH])
         reverse_match(world, adjoint, tape, block, cluster)
+        if not presses(world, cluster):
+            reverse_launches(world, adjoint, cluster, world.clock[cluster, ORIGIN])
     for place in range(world.members[cluster, 0]):
         reverse_beginning(world, adjoint, world.members[cluster, 1 + place], moving)
 
@@ -148,6 +165,60 @@ def reverse_match(world, adjoint, tape, block, cluster):
         for c in range(STATE_SIZE):
             adjoint.state[body, c] += adjoint.before[body, c]
     clear(adjoint.before)
+
+
+@compiled
+def reverse_launches(world, adjoint, cluster, t):
+    """Bodies at rest were launched the way they were pushed, which changes with all that pushes them.
+
+    A body keeps that direction as it gathers speed. With a launch that counted as given, friction would turn it towards
+    another push within a time as short as the launch is slow, and a step over that many times would blow it up.
+    """
+    launches = False
+    for place in range(world.members[cluster, 0]):
+        body = world.members[cluster, 1 + place]
+        bar, of_push = adjoint.state[body], adjoint.stages[0, body]
+        for c in range(STATE_SIZE):
+            of_push[c] = 0.0
+        if is_launched(world, body):
+            launches = True
+            fold_state(world, body, bar)
+            set_of_push(world, body, t, bar, of_push)
+            bar[3], bar[4] = 0.0, 0.0
+    if not launches:
+        return
+    take_states(world, cluster, 0.0)
+    if world.model[COUPLED]:
+        pair_forces_vjp(world, adjoint, cluster, t, adjoint.stages[0])
+    for place in range(world.members[cluster, 0]):
+        body = world.members[cluster, 1 + place]
+        reverse_stages(world, adjoint, body, t, 0.0, 0, -1)
+        if is_launched(world, body):
+            bar = adjoint.state[body]
+            bar[3], bar[4], bar[6], bar[7] = 0.0, 0.0, 0.0, 0.0
+
+
+@compiled
+def is_launched(world, body):
+    """Whether a piece begins with a body that was at rest."""
+    y = world.polynomial[body, 0]
+    speed = math.hypot(y[3], y[4])
+    return world.phase[body, MOVING] == SLIDING and abs(speed - LAUNCH) < ROUNDING * LAUNCH
+
+
+@compiled
+def set_of_push(world, body, t, bar, of_push):
+    """Adjoint of the acceleration of a body that was launched along its push, from that of its velocity."""
+    y, at_rest = world.polynomial[body, 0], world.stages[SPARE, body]
+    for c in range(STATE_SIZE):
+        at_rest[c] = y[c]
+    at_rest[3], at_rest[4], at_rest[6], at_rest[7] = 0.0, 0.0, 0.0, 0.0
+    take_states(world, cluster_of(world, body), 0.0)
+    set_push_at(world, body, t, at_rest)
+    x, y = world.stages[PUSH, body, 0], world.stages[PUSH, body, 1]
+    square = x * x + y * y
+    across = LAUNCH * (y * bar[3] - x * bar[4]) / (square * math.sqrt(square))
+    of_push[3], of_push[4] = y * across, -x * across
 
 
 @compiled

@@ -54,6 +54,11 @@ GRIP = 1e-3
 While a body creeps, friction turns it towards the push within its speed over its deceleration. A start takes some
 `1 / excess` steps of that length, and just above the limit they find no end.
 """
+STIFFEST = 2.0
+"""Longest step of a body that is pushed to move faster, in units of the time in which friction alone would stop it.
+
+Friction turns it towards the push in that time, which its derivatives tell but not its motion, where that is straight.
+"""
 SMALLEST_SHARE = 1e-16
 """Relative change of a root at which its search ends."""
 CROSSING_LOOKS = 32
@@ -183,13 +188,17 @@ def set_references(world, body):
 
 @compiled
 def first_step(world, body, h, most):
-    """Limit a step to a multiple of the time in which friction stops the body."""
+    """Limit a step to a multiple of the time in which friction stops the body, or would if nothing pushed it."""
     phase = world.phase[body]
     x, y = rate_of_reference(world, body)
     braking = -(x * phase[REFERENCE_X] + y * phase[REFERENCE_Y])
     square = phase[REFERENCE_X] ** 2 + phase[REFERENCE_Y] ** 2
     if phase[MOVING] != RESTING and braking > 0.0 and h * braking > most * square:
         h = most * square / braking
+    if phase[MOVING] == SLIDING and braking < 0.0:
+        friction, speed = world.stages[PUSH, body, 2], math.sqrt(square)
+        if h * friction > STIFFEST * speed:
+            h = STIFFEST * speed / friction
     return h
 
 

@@ -123,7 +123,7 @@ class _Seeds:
     """Independent seeds of the parts of a data set, so that one does not change with another."""
 
     scenes: int
-    details: tuple[np.random.SeedSequence, ...] = field(default_factory=tuple)
+    details: tuple[int, ...] = field(default_factory=tuple)
     noise: int = 0
 
 
@@ -174,9 +174,9 @@ def draw(
             one.strength,
             one.cause.unit,
             one.left,
-            _trace(videos, _hidden_in(plain, _but(drawn, place)), measurement.noise),
+            _trace(videos, _hidden_in(plain, [other for other in drawn if other is not one]), measurement.noise),
         )
-        for place, (wish, one) in enumerate(zip(wanted, drawn, strict=True))
+        for wish, one in zip(wanted, drawn, strict=True)
     )
     generator = np.random.default_rng(seeds.noise)
     measured = [measure(video, f"v{k + 1:02d}", measurement, generator) for k, video in enumerate(videos)]
@@ -184,17 +184,12 @@ def draw(
     return DataSet([tracks for tracks, _ in measured], truth)
 
 
-def _drawn(wish: Wanted, plain: Videos, seeds: np.random.SeedSequence, measurement: Measurement) -> _Drawn:
+def _drawn(wish: Wanted, plain: Videos, detail: int, measurement: Measurement) -> _Drawn:
     """A cause with its directions, places and times, as strong as is wished."""
-    detail = _number(seeds)
     yardstick = Yardstick(wish.way, plain, detail, measurement)
     strength = wish.strength if wish.effect_size is None else yardstick.strength_for(wish.effect_size)
     assert strength is not None
     return _Drawn(ALL[wish.way], strength, detail, yardstick.left_by(strength))
-
-
-def _but(drawn: Sequence[_Drawn], place: int) -> list[_Drawn]:
-    return [*drawn[:place], *drawn[place + 1 :]]
 
 
 def _hidden_in(videos: Videos, causes: Sequence[_Drawn]) -> Videos:
@@ -274,9 +269,5 @@ class Yardstick:
 
 
 def _seeds(seed: int, causes: int) -> _Seeds:
-    scenes, noise, *details = np.random.SeedSequence(seed).spawn(2 + causes)
-    return _Seeds(_number(scenes), tuple(details), _number(noise))
-
-
-def _number(seeds: np.random.SeedSequence) -> int:
-    return int(seeds.generate_state(1)[0])
+    numbers = [int(child.generate_state(1)[0]) for child in np.random.SeedSequence(seed).spawn(2 + causes)]
+    return _Seeds(scenes=numbers[0], details=tuple(numbers[2:]), noise=numbers[1])

@@ -270,7 +270,7 @@ class LinearFit:
         """Information about the shared unknowns, the own ones of all videos following."""
         return self.prior + sum(self.curvatures)
 
-    @property
+    @cached_property
     def curvatures(self) -> list[Float[np.ndarray, "shared shared"]]:
         """What each video says of them, its own unknowns following."""
         return [video.reduced_shared.T @ video.reduced_shared for video in self.videos]

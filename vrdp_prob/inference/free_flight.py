@@ -9,7 +9,7 @@ from itertools import combinations
 import numpy as np
 from jaxtyping import Float
 
-from vrdp_prob.scene import Body, Shape, Tracks
+from vrdp_prob.scene import Body, Tracks
 
 SPAN = 0.4
 """Length in s of the stretch of track on each side of a contact."""
@@ -132,8 +132,7 @@ def contact_distances(first: Body, second: Body) -> tuple[float, float] | None:
     """Smallest and largest distance (m) of the centres at which two bodies can touch; None without both radii."""
     if first.radius is None or second.radius is None:
         return None
-    reach = [body.radius * (np.sqrt(2) if body.shape is Shape.CUBE else 1.0) for body in (first, second) if body.radius]
-    return first.radius + second.radius, float(sum(reach))
+    return first.radius + second.radius, first.radius * first.shape.reach + second.radius * second.shape.reach
 
 
 def approaches(tracks: Tracks, noise: float) -> tuple[Approach, ...]:

@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Float
 
 from vrdp_prob.inference.free_flight import contact_distances
-from vrdp_prob.scene import Body, Shape, Tracks, Wall
+from vrdp_prob.scene import Shape, Tracks, Wall
 
 
 def close_passes(tracks: Tracks, trajectory: Float[np.ndarray, "point time body number"]) -> frozenset[int]:
@@ -26,20 +26,24 @@ def close_passes(tracks: Tracks, trajectory: Float[np.ndarray, "point time body 
         Positions x, y (m) in every frame of some worlds, and whatever else.
     """
     found: set[int] = set()
-    cubes = {index for index, body in enumerate(tracks.bodies) if body.shape is Shape.CUBE and body.radius is not None}
+    cubes = {
+        index: body.radius * body.shape.reach
+        for index, body in enumerate(tracks.bodies)
+        if body.shape is Shape.CUBE and body.radius is not None
+    }
     positions, present = trajectory[..., :2], np.arange(len(tracks.times))[:, None] >= tracks.seen.argmax(axis=0)
     for pair in combinations(range(len(tracks.bodies)), 2):
         limits = contact_distances(*(tracks.bodies[body] for body in pair))
-        if cubes.intersection(pair) and limits is not None:
+        if cubes.keys() & pair and limits is not None:
             together = present[:, pair].all(axis=1)
             apart = positions[:, together, pair[0]] - positions[:, together, pair[1]]
             if _nearest(apart) < limits[1]:
-                found.update(cubes.intersection(pair))
+                found.update(cubes.keys() & pair)
     for wall in tracks.walls:
         found.update(
             body
-            for body in cubes - found
-            if _nearest(_from_wall(positions[:, present[:, body], body], wall)) < _reach(tracks.bodies[body])
+            for body, reach in cubes.items()
+            if body not in found and _nearest(_from_wall(positions[:, present[:, body], body], wall)) < reach
         )
     return frozenset(found)
 
@@ -59,8 +63,3 @@ def _from_wall(positions: Float[np.ndarray, "point time 2"], wall: Wall) -> Floa
     start, along = np.array([wall.x1, wall.y1]), np.array([wall.x2 - wall.x1, wall.y2 - wall.y1])
     share = np.clip((positions - start) @ along / (along @ along), 0, 1)
     return positions - (start + share[..., None] * along)
-
-
-def _reach(cube: Body) -> float:
-    """Distance (m) of a cube's corners from its centre."""
-    return np.sqrt(2) * (cube.radius or 0.0)

@@ -71,7 +71,7 @@ class Counterfactual:
         self._worlds = intervention.worlds
         self._mass = worlds.mass.detach().numpy()
         radius = worlds.radius.detach().numpy()[0]
-        self._reach = radius * np.where([shape.is_disc for shape in worlds.shapes], 1.0, np.sqrt(2))
+        self._reach = radius * np.array([shape.reach for shape in worlds.shapes])
         count = len(seen.tracks.bodies)
         self._first = np.array([float(s.track.times[0]) for s in seen.seen.smoothers])
         self._last = np.array([float(s.track.times[-1]) for s in seen.seen.smoothers])

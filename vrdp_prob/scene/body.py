@@ -37,6 +37,11 @@ class Shape(StrEnum):
         """Whether the outline in the plane is a disc."""
         return self is not Shape.CUBE
 
+    @property
+    def reach(self) -> float:
+        """Distance of the outermost point of the outline from its centre, in radii."""
+        return 1.0 if self.is_disc else math.sqrt(2)
+
 
 @dataclass(frozen=True)
 class Body:

@@ -8,8 +8,8 @@ import math
 
 from vrdp_prob.models.simulator.adjoint_kernel import clear, fold_state, load_state
 from vrdp_prob.models.simulator.apart_kernel import load_block_apart
-from vrdp_prob.models.simulator.cluster_kernel import cluster_of, constrain_vjp, is_alone, mobility, presses
-from vrdp_prob.models.simulator.ending_kernel import LAUNCH, set_push_at
+from vrdp_prob.models.simulator.cluster_kernel import constrain_vjp, is_alone, mobility, presses
+from vrdp_prob.models.simulator.ending_kernel import LAUNCH, rest_at_once, set_push_at
 from vrdp_prob.models.simulator.laws_kernel import (
     COUPLED,
     STATE_SIZE,
@@ -176,26 +176,24 @@ def reverse_launches(world, adjoint, cluster, t):
     """
     launches = False
     for place in range(world.members[cluster, 0]):
-        body = world.members[cluster, 1 + place]
-        bar, of_push = adjoint.state[body], adjoint.stages[0, body]
-        for c in range(STATE_SIZE):
-            of_push[c] = 0.0
-        if is_launched(world, body):
-            launches = True
-            fold_state(world, body, bar)
-            set_of_push(world, body, t, bar, of_push)
-            bar[3], bar[4] = 0.0, 0.0
+        launches = launches or is_launched(world, world.members[cluster, 1 + place])
     if not launches:
         return
     take_states(world, cluster, 0.0)
+    for place in range(world.members[cluster, 0]):
+        body = world.members[cluster, 1 + place]
+        for c in range(STATE_SIZE):
+            adjoint.stages[0, body, c] = 0.0
+        if is_launched(world, body):
+            fold_state(world, body, adjoint.state[body])
+            set_of_push(world, body, t, adjoint.state[body], adjoint.stages[0, body])
     if world.model[COUPLED]:
         pair_forces_vjp(world, adjoint, cluster, t, adjoint.stages[0])
     for place in range(world.members[cluster, 0]):
         body = world.members[cluster, 1 + place]
         reverse_stages(world, adjoint, body, t, 0.0, 0, -1)
         if is_launched(world, body):
-            bar = adjoint.state[body]
-            bar[3], bar[4], bar[6], bar[7] = 0.0, 0.0, 0.0, 0.0
+            rest_at_once(adjoint.state[body])
 
 
 @compiled
@@ -208,12 +206,14 @@ def is_launched(world, body):
 
 @compiled
 def set_of_push(world, body, t, bar, of_push):
-    """Adjoint of the acceleration of a body that was launched along its push, from that of its velocity."""
+    """Adjoint of the acceleration of a body that was launched along its push, from that of its velocity.
+
+    The states of other bodies are those in the work row.
+    """
     y, at_rest = world.polynomial[body, 0], world.stages[SPARE, body]
     for c in range(STATE_SIZE):
         at_rest[c] = y[c]
-    at_rest[3], at_rest[4], at_rest[6], at_rest[7] = 0.0, 0.0, 0.0, 0.0
-    take_states(world, cluster_of(world, body), 0.0)
+    rest_at_once(at_rest)
     set_push_at(world, body, t, at_rest)
     x, y = world.stages[PUSH, body, 0], world.stages[PUSH, body, 1]
     square = x * x + y * y

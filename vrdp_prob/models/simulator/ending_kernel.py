@@ -157,6 +157,12 @@ def launch(y, push, speed):
 
 
 @compiled
+def rest_at_once(y):
+    """Take the velocity from a state."""
+    y[3], y[4], y[6], y[7] = 0.0, 0.0, 0.0, 0.0
+
+
+@compiled
 def set_push_at(world, body, t, y):
     """Note what pushes a body in state `y` without contacts (2 numbers, m/s^2), what friction holds, and the brake.
 

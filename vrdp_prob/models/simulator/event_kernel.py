@@ -36,7 +36,7 @@ from vrdp_prob.models.simulator.detection_kernel import (
     PAIR_KIND,
     SLACK,
 )
-from vrdp_prob.models.simulator.ending_kernel import LINGERING, set_sides, settle
+from vrdp_prob.models.simulator.ending_kernel import LINGERING, rest_at_once, set_sides, settle
 from vrdp_prob.models.simulator.laws_kernel import (
     AFTER_CONTACT,
     BOUNDARIES,
@@ -190,12 +190,6 @@ def stop(world, cluster, body, t, moves):
             if world.phase[member, MOVING] == SLIDING and math.hypot(other[3], other[4]) <= 2.0 * LINGERING:
                 rest_at_once(other)
     settle(world, body, t, y)
-
-
-@compiled
-def rest_at_once(y):
-    """Take the velocity from a state."""
-    y[3], y[4], y[6], y[7] = 0.0, 0.0, 0.0, 0.0
 
 
 @compiled

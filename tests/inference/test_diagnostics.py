@@ -115,13 +115,17 @@ def test_tails_of_weighted_draws_are_those_of_what_they_stand_for() -> None:
     assert weighted_statistics(draws[:, None], weights).ess_tail == pytest.approx(min(expected), rel=0.1)
 
 
-def test_a_few_transitions_that_end_at_a_cliff_do_no_harm() -> None:
+def test_a_few_divergences_do_no_harm_nor_do_many_ends_where_a_contact_comes_or_goes() -> None:
     draws = np.random.default_rng(4).standard_normal((4, 500, 1))
     few, many = (assess("nuts", Samples(draws, np.zeros((4, 500)), divergences=count)) for count in (20, 21))
     assert few.converged
     assert not many.converged
     assert "21 divergences" in many.sentence
     assert assess("nuts", Samples(draws, np.zeros((4, 500)), divergences=21, transitions=4000)).converged
+    at_cliffs = assess("nuts", Samples(draws, np.zeros((4, 500)), divergences=3, cliffs=300))
+    assert at_cliffs.converged
+    assert "3 divergences" in at_cliffs.sentence
+    assert "300 more where a contact comes or goes" in at_cliffs.sentence
 
 
 def test_draws_that_chains_agree_on_are_not_trusted_where_there_are_doubts() -> None:

@@ -3,6 +3,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 import torch
+from scipy.stats import truncnorm
 
 from tests.inference.densities import Needle, TwoModes
 from vrdp_prob.inference.curved_gaussian import CurvedGaussian
@@ -102,3 +103,49 @@ def test_a_density_that_cannot_be_sent_is_sampled_here() -> None:
 
     samples = sample_nuts(within, start, generator=np.random.default_rng(3), **options)
     assert samples.points.shape == (RESULTS, CHAINS // RESULTS * CHUNK, 2)
+
+
+WALL = 0.5
+
+
+class Walled:
+    """A standard normal density in two dimensions that falls off at once behind x = 0.5, where another course begins."""
+
+    def __call__(self, points: torch.Tensor) -> torch.Tensor:
+        return -(points**2).sum(dim=1) / 2 - 1e6 * (points[:, 0] - WALL).clamp(min=0.0)
+
+    @staticmethod
+    def courses(points: torch.Tensor) -> list[bool]:
+        return [bool(x > WALL) for x in points[:, 0]]
+
+
+@pytest.mark.parametrize("told_apart", [True, False])
+def test_trajectories_that_end_behind_a_change_of_course_are_told_from_other_divergences(*, told_apart: bool) -> None:
+    start = Mixture.of(CurvedGaussian.straight(Gaussian(np.zeros(2), np.eye(2))))
+    courses = Walled.courses if told_apart else None
+    options = {"draws": 1600, "processes": 1, "most_gradients": 20_000}
+    samples = sample_nuts(Walled(), start, generator=np.random.default_rng(2), courses=courses, **options)
+    assert samples.divergences is not None
+    assert samples.cliffs is not None
+    few, many = sorted((samples.divergences, samples.cliffs))
+    assert few == 0
+    assert many > 20
+    assert (samples.cliffs == many) == told_apart
+    if told_apart:
+        convergence = assess("nuts", samples)
+        assert convergence.converged, convergence.sentence
+        x = samples.points[..., 0].ravel()
+        truth = truncnorm(-np.inf, WALL)
+        error = truth.std() / np.sqrt(min(convergence.ess_bulk or 0.0, x.size))
+        assert abs(x.mean() - truth.mean()) < 4 * error
+
+
+def test_steps_are_halved_where_too_many_transitions_diverge_at_first() -> None:
+    start = Mixture.of(CurvedGaussian.straight(Gaussian(np.zeros(2), np.eye(2))))
+    options = {"draws": 400, "processes": 1, "most_gradients": 20_000}
+    found = [
+        sample_nuts(Walled(), start, generator=np.random.default_rng(2), courses=courses, **options)
+        for courses in (Walled.courses, None)
+    ]
+    assert found[0].transitions > 0
+    assert found[1].gradients / found[1].transitions > 2 * found[0].gradients / found[0].transitions

@@ -11,6 +11,7 @@ from vrdp_prob.discovery.describe import describe
 from vrdp_prob.discovery.estimates import cause_sentence, estimates, surprise, upper_bounds
 from vrdp_prob.discovery.figures import residual_figures
 from vrdp_prob.discovery.finding import Check, Finding, FoundCause, Gain, UpperBound, Verdict
+from vrdp_prob.discovery.mimics import Unlisted, without_mimics
 from vrdp_prob.discovery.search import Search, search
 from vrdp_prob.discovery.trials import Trial, gain, gains, weights
 from vrdp_prob.inference import default_model
@@ -21,6 +22,7 @@ from vrdp_prob.models.model_file import known_effects
 from vrdp_prob.models.physics import PhysicsModel
 from vrdp_prob.models.simulator.rollout import compile_model
 from vrdp_prob.progress import ProgressDisplay
+from vrdp_prob.report.wording import listed
 from vrdp_prob.scene import Tracks
 
 EXPLAINED = 0.5
@@ -76,8 +78,13 @@ def discover(
         found = search(fit, _catalogue(physics, catalogue), seed=seed, progress=progress)
         checks = run_checks(found.base.fit, seed=seed)
         after = run_checks(found.best.fit, seed=seed) if found.best.causes else checks
+        unlisted: Unlisted | None = None
+        if found.best.causes and _leaves_something(after):
+            found, unlisted = without_mimics(found, seed=seed)
+            if unlisted is not None and unlisted.mimics:
+                after = run_checks(found.best.fit, seed=seed) if found.best.causes else checks
     causes = _causes(found, seed)
-    verdict = _verdict(found, after)
+    verdict = Verdict.UNKNOWN if unlisted is not None else _verdict(found, after)
     return Finding(
         verdict=verdict,
         causes=tuple(causes),
@@ -88,7 +95,7 @@ def discover(
         extended=found.best.fit.model,
         videos=tuple(tracks.video for tracks in videos),
         description=describe(found.best.fit, seed=seed) if verdict is Verdict.UNKNOWN else None,
-        notes=tuple(_notes(found)),
+        notes=tuple(_notes(found, unlisted)),
         figures=residual_figures(found.base.fit, found.best.fit if found.best.causes else None),
     )
 
@@ -99,8 +106,13 @@ def _catalogue(model: PhysicsModel, catalogue: Sequence[Effect] | None) -> list[
     return [effect for effect in known if effect.name not in present]
 
 
+def _leaves_something(checks: Sequence[Check]) -> bool:
+    """Whether some check finds what is not noise."""
+    return min((check.p_value for check in checks), default=1.0) * len(checks) < LEFT_LEVEL
+
+
 def _verdict(found: Search, after: Sequence[Check]) -> Verdict:
-    left = min((check.p_value for check in after), default=1.0) * len(after) < LEFT_LEVEL
+    left = _leaves_something(after)
     if not found.best.causes:
         return Verdict.UNKNOWN if left else Verdict.NONE
     if _strange(found):
@@ -185,8 +197,10 @@ def _bounds(found: Search) -> list[UpperBound]:
     ]
 
 
-def _notes(found: Search) -> list[str]:
+def _notes(found: Search, unlisted: Unlisted | None) -> list[str]:
     notes = []
+    if unlisted is not None:
+        notes.append(_unlisted_note(unlisted))
     if not found.best.fit.joint.converged:
         notes.append(
             "The joint fit ended before it had converged: some video is at the edge between two courses of events."
@@ -215,3 +229,12 @@ def _notes(found: Search) -> list[str]:
             "are that much wider."
         )
     return notes
+
+
+def _unlisted_note(unlisted: Unlisted) -> str:
+    than = listed(f"'{name}'" for name in unlisted.mimics)
+    rest = f"; {than} only followed it, and {'are' if len(unlisted.mimics) > 1 else 'is'} not named" if than else ""
+    return (
+        "Friction, drag and pushes that depend on place, direction, speed and time in some way that the catalogue does "
+        f"not hold predict left-out videos better by {unlisted.gain:.0f} ± {unlisted.error:.0f} nats{rest}."
+    )

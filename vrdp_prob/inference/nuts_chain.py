@@ -4,7 +4,7 @@ Source: Hoffman and Gelman, The No-U-Turn Sampler, JMLR 15 (2014); Bingham et al
 """
 
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -29,6 +29,9 @@ TRIES = 4
 OUT_OF_SUPPORT = 1e10
 """Potential where a world has no support; finite, because Pyro compares energies."""
 
+Courses = Callable[[Float[Tensor, "point dimension"]], Sequence[object]]
+"""The course of events at each of some points: equal where the density is smooth from one point to another."""
+
 
 @dataclass(frozen=True)
 class Task:
@@ -52,6 +55,8 @@ class Task:
         Proposals that reach what trajectories do not, tried before every transition; None for none.
     rate_steps
         Steps that trade rates of slowing down, tried before every transition; None for none.
+    courses
+        Tells divergences at a contact that comes or goes from others; None to count all alike.
     """
 
     density: LogDensity
@@ -62,28 +67,43 @@ class Task:
     seeds: tuple[int, ...]
     jumps: Mixture | None = None
     rate_steps: RateSteps | None = None
+    courses: Courses | None = None
 
 
 @dataclass(frozen=True)
 class Piece:
-    """What a task gave: the places after every transition in whitened coordinates, and what they cost together."""
+    """What a task gave, and what it cost.
+
+    Parameters
+    ----------
+    whitened
+        The places after every transition in whitened coordinates.
+    step_sizes
+        Length of a leapfrog step of each chain.
+    divergences
+        Transitions that ended where the energy flew away within the course of events that they had begun in.
+    cliffs
+        Transitions that ended where it did so behind a change of that course.
+    gradients, work
+        Gradients of all chains, and what their simulations had to do.
+    """
 
     whitened: Float[np.ndarray, "chain draw dimension"]
     step_sizes: Float[np.ndarray, "chain"]
     divergences: int
+    cliffs: int
     gradients: int
     work: int
 
     def arrays(self) -> dict[str, np.ndarray]:
         """The same as arrays."""
-        costs = np.array([self.divergences, self.gradients, self.work])
-        return {"whitened": self.whitened, "step_sizes": self.step_sizes, "costs": costs}
+        counts = np.array([self.divergences, self.cliffs, self.gradients, self.work])
+        return {"whitened": self.whitened, "step_sizes": self.step_sizes, "counts": counts}
 
     @classmethod
     def of_arrays(cls, arrays: dict[str, np.ndarray]) -> "Piece":
         """What `arrays` was made of."""
-        divergences, gradients, work = (int(cost) for cost in arrays["costs"])
-        return cls(arrays["whitened"], arrays["step_sizes"], divergences, gradients, work)
+        return cls(arrays["whitened"], arrays["step_sizes"], *(int(count) for count in arrays["counts"]))
 
 
 class _Answered(torch.autograd.Function):
@@ -121,7 +141,21 @@ def make(task: Task) -> Piece:
         warnings.simplefilter("ignore")
         made = in_lockstep(functions, task.seeds, density_and_gradient)
     whitened, found, diverged = zip(*made, strict=True)
-    return Piece(np.stack(whitened), np.array(found), sum(diverged), gradients, meter.rows)
+    ends = [end for chain in diverged for end in chain]
+    cliffs = _changes_of_course(task, ends)
+    return Piece(np.stack(whitened), np.array(found), len(ends) - cliffs, cliffs, gradients, meter.rows)
+
+
+_Leap = tuple[Float[np.ndarray, "dimension"], Float[np.ndarray, "dimension"]]
+"""Where a divergent transition began and where it ended, in whitened coordinates."""
+
+
+def _changes_of_course(task: Task, diverged: Sequence[_Leap]) -> int:
+    """How many divergent transitions ended in another course of events than they began in."""
+    if task.courses is None or not diverged:
+        return 0
+    begins, ends = (torch.from_numpy(task.cloud.points(np.stack(places))) for places in zip(*diverged, strict=True))
+    return sum(one != other for one, other in zip(task.courses(begins), task.courses(ends), strict=True))
 
 
 _Walk = Callable[[Float[np.ndarray, "dimension"], float, Ask], tuple[Float[np.ndarray, "dimension"], float]]
@@ -210,13 +244,16 @@ def _run(
     transitions: int,
     walks: tuple[_Walk, ...],
     ask: Ask,
-) -> tuple[Float[np.ndarray, "draw dimension"], float, int]:
-    """Places, step size and number of divergences of one chain."""
+) -> tuple[Float[np.ndarray, "draw dimension"], float, list[_Leap]]:
+    """Places and step size of one chain, and where its divergent transitions began and ended."""
     finding = step_size is None
+    last = place
 
     def potential(parameters: dict[str, Tensor]) -> Tensor:
+        nonlocal last
         there = parameters["whitened"]
-        value, gradient = ask(there.detach().numpy().copy())
+        last = there.detach().numpy().copy()
+        value, gradient = ask(last)
         # torch's stubs leave `apply` untyped
         answered: Tensor = _Answered.apply(there, value, torch.from_numpy(gradient))  # type: ignore[no-untyped-call]
         return -answered if np.isfinite(value) else OUT_OF_SUPPORT + 0.0 * there.sum()
@@ -233,7 +270,8 @@ def _run(
     parameters = {"whitened": torch.from_numpy(place.copy())}
     kernel.initial_params = parameters
     kernel.setup(warmup_steps=transitions if finding else 0)
-    places = []
+    places: list[Float[np.ndarray, "dimension"]] = []
+    diverged: list[_Leap] = []
     for _ in range(transitions):
         before = walked = parameters["whitened"].detach().numpy()
         value = ask(before)[0] if walks else 0.0
@@ -244,5 +282,7 @@ def _run(
             kernel.clear_cache()
         parameters = kernel.sample(parameters)
         places.append(parameters["whitened"].detach().numpy().copy())
-    diverged = 0 if finding else len(kernel.diagnostics()["divergences"])
+        # a transition ends with the leap that diverges
+        if not finding and len(kernel.diagnostics()["divergences"]) > len(diverged):
+            diverged.append((walked, last))
     return np.array(places), float(kernel.step_size), diverged

@@ -17,10 +17,11 @@ from vrdp_prob.inference.diagnostics import Reported, drift, joined, ordered, se
 from vrdp_prob.inference.importance import Weighted, smoothed_weights
 from vrdp_prob.inference.mixture import Jumps, Mixture
 from vrdp_prob.inference.mode_weights import doubts, weights_from_chains, weights_from_importance
-from vrdp_prob.inference.nuts_chain import Piece, Task
+from vrdp_prob.inference.nuts_chain import Courses, Piece, Task
 from vrdp_prob.inference.nuts_worker import Workers, workers
 from vrdp_prob.inference.rate_steps import RateSteps
 from vrdp_prob.inference.samples import (
+    DIVERGENT_GOAL,
     ESS_GOAL,
     PARETO_K_GOAL,
     R_HAT_GOAL,
@@ -44,6 +45,14 @@ WARM_UP = 30
 """Transitions that only adapt the step size: the mass matrix is the whitening, which other draws have shaped."""
 CHUNK = 25
 """Transitions per chain after which the draws are judged and kept on disk."""
+SHORTENINGS = 2
+"""How often steps are halved and chains begin anew where more than..."""
+TRIAL_GOAL = DIVERGENT_GOAL / 2
+"""...this share of the transitions diverges, since few transitions tell it badly..."""
+TRIAL_CHUNKS = 2
+"""...in up to so many chunks..."""
+TRIAL_SHARE = 0.5
+"""...while less than this share of the budgets is used up."""
 MOST_GRADIENTS = 150_000
 """Gradients of all chains after which sampling stops; a minute on two cores of 2020."""
 WORK_LIMIT = 40_000_000
@@ -75,6 +84,7 @@ def sample_nuts(
     processes: int | None = None,
     jumps: Jumps | None = None,
     rate_steps: RateSteps | None = None,
+    courses: Courses | None = None,
 ) -> Samples:
     """Draw with several NUTS chains in every mode.
 
@@ -105,11 +115,13 @@ def sample_nuts(
         coordinates of the heaviest cloud, and go to and fro between the modes by themselves.
     rate_steps
         Steps that trade rates of slowing down, if there are any.
+    courses
+        Tells divergences where a contact comes or goes from those within one course of events; None counts all alike.
 
     Returns
     -------
     Four chains, each of several one after another, from all modes in proportion to the modes' weights, with the number
-    of divergences. The R-hat that goes with them compares earlier with later draws.
+    of divergences of both kinds. The R-hat that goes with them compares earlier with later draws.
     """
     with metered() as meter:
         form, places = _kept_start(density, start, generator, checkpoint)
@@ -129,6 +141,7 @@ def sample_nuts(
             seed,
             far,
             rate_steps,
+            courses,
         )
         for mode in inhabited
         for number in range(GROUPS)
@@ -137,9 +150,11 @@ def sample_nuts(
     stage = (progress or SilentProgress()).stage("Sampling (NUTS), at most", total=most_gradients)
     with stage as advance, workers(count) as pool:
         run = _Run(density, form.mixture, groups, checkpoint, pool, advance)
-        run.further(warm_up, adapt=True)
+        run.further(warm_up)
         while True:
-            run.further(CHUNK, adapt=False)
+            run.further(CHUNK)
+            if max(run.gradients / most_gradients, run.work / work_limit) < TRIAL_SHARE and run.with_shorter_steps():
+                continue
             drawn = _in_proportion(run, inhabited, modes, np.random.default_rng(seed))
             enough = drawn.by_chain[..., 0].size >= draws and not drawn.missed
             if enough and settled(
@@ -161,6 +176,7 @@ def sample_nuts(
         np.stack([evaluate(density, chain) for chain in drawn.by_chain]),
         r_hat=drift(drawn.by_time, reported),
         divergences=run.divergences,
+        cliffs=run.cliffs,
         transitions=run.transitions,
         evaluations=form.evaluations + weighed.evaluations + run.gradients,
         gradients=form.gradients + run.gradients,
@@ -182,25 +198,44 @@ class _Group:
     seed: int
     jumps: Mixture | None = None
     rate_steps: RateSteps | None = None
+    courses: Courses | None = None
     pieces: list[Piece] = field(default_factory=list)
+    step_size: float | None = None
+    warm_up_pieces: int = 0
 
     @property
     def name(self) -> str:
         """Name of the piece that comes next."""
         return f"mode_{self.mode}_group_{self.number}_piece_{len(self.pieces)}"
 
-    def task(self, density: LogDensity, transitions: int, *, adapt: bool) -> Task:
-        """The piece that comes next; a step length is shared, since a chain alone finds it in few transitions badly."""
+    def task(self, density: LogDensity, transitions: int) -> Task:
+        """The piece that comes next; the first one finds the length of a step."""
         places = self.pieces[-1].whitened[:, -1] if self.pieces else self.cloud.whitened(self.places)
         own = np.random.SeedSequence([self.seed, self.mode, self.number, len(self.pieces)])
         seeds = tuple(int(one) for one in own.generate_state(len(places)))
-        sizes = None if adapt else np.full(len(places), np.median(self.pieces[-1].step_sizes))
-        return Task(density, self.cloud, places, sizes, transitions, seeds, self.jumps, self.rate_steps)
+        sizes = None if self.step_size is None else np.full(len(places), self.step_size)
+        return Task(density, self.cloud, places, sizes, transitions, seeds, self.jumps, self.rate_steps, self.courses)
+
+    def add(self, piece: Piece) -> None:
+        """Take a piece that was made; chains share a step length, since one alone finds it in few transitions badly."""
+        self.pieces.append(piece)
+        if self.step_size is None:
+            self.step_size, self.warm_up_pieces = float(np.median(piece.step_sizes)), 1
+
+    def shorten_steps(self) -> None:
+        """Halve the length of a step; what there is counts as warm-up."""
+        assert self.step_size is not None
+        self.step_size, self.warm_up_pieces = self.step_size / 2, len(self.pieces)
+
+    @property
+    def counted(self) -> list[Piece]:
+        """The pieces after the warm-up."""
+        return self.pieces[self.warm_up_pieces :]
 
     @property
     def points(self) -> Float[np.ndarray, "chain draw dimension"]:
-        """All draws after adaptation."""
-        return self.cloud.points(np.concatenate([piece.whitened for piece in self.pieces[1:]], axis=1))
+        """All draws after the warm-up."""
+        return self.cloud.points(np.concatenate([piece.whitened for piece in self.counted], axis=1))
 
 
 @dataclass
@@ -213,8 +248,9 @@ class _Run:
     checkpoint: Checkpoint | None
     pool: Workers
     advance: Advance
+    shortened: int = 0
 
-    def further(self, transitions: int, *, adapt: bool) -> None:
+    def further(self, transitions: int) -> None:
         """One more piece of every group: those that were kept, and the others made now, a few at a time."""
         wanting = []
         for group in self.groups:
@@ -222,15 +258,25 @@ class _Run:
             if found is None:
                 wanting.append(group)
             else:
-                group.pieces.append(Piece.of_arrays(found))
+                group.add(Piece.of_arrays(found))
         for begin in range(0, len(wanting), GROUPS):
             several = wanting[begin : begin + GROUPS]
-            made = self.pool.make([group.task(self.density, transitions, adapt=adapt) for group in several])
+            made = self.pool.make([group.task(self.density, transitions) for group in several])
             for group, piece in zip(several, made, strict=True):
                 if self.checkpoint is not None:
                     self.checkpoint.keep(group.name, piece.arrays())
-                group.pieces.append(piece)
+                group.add(piece)
                 self.advance(piece.gradients)
+
+    def with_shorter_steps(self) -> bool:
+        """Whether so many transitions diverged at first that all chains begin anew with shorter steps."""
+        many = self.divergences > TRIAL_GOAL * self.transitions
+        if not many or self.shortened == SHORTENINGS or len(self.groups[0].counted) > TRIAL_CHUNKS:
+            return False
+        for group in self.groups:
+            group.shorten_steps()
+        self.shortened += 1
+        return True
 
     def points(self, mode: int) -> Float[np.ndarray, "chain draw dimension"]:
         """All draws of the chains of a mode."""
@@ -248,13 +294,22 @@ class _Run:
 
     @property
     def transitions(self) -> int:
-        """Transitions of all chains after adaptation."""
-        return sum(piece.whitened[..., 0].size for group in self.groups for piece in group.pieces[1:])
+        """Transitions of all chains after the warm-up."""
+        return sum(piece.whitened[..., 0].size for piece in self._counted)
 
     @property
     def divergences(self) -> int:
-        """Divergent transitions of all chains after adaptation."""
-        return sum(piece.divergences for group in self.groups for piece in group.pieces[1:])
+        """Transitions after the warm-up that diverged within a course of events."""
+        return sum(piece.divergences for piece in self._counted)
+
+    @property
+    def cliffs(self) -> int:
+        """Transitions after the warm-up that ended where a contact comes or goes."""
+        return sum(piece.cliffs for piece in self._counted)
+
+    @property
+    def _counted(self) -> list[Piece]:
+        return [piece for group in self.groups for piece in group.counted]
 
 
 @dataclass(frozen=True)

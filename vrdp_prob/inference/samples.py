@@ -17,8 +17,7 @@ ESS_GOAL = 400.0
 PARETO_K_GOAL = 0.7
 """Above it importance weights have no usable variance (Vehtari et al., Pareto smoothed importance sampling, 2024)."""
 DIVERGENT_GOAL = 0.01
-"""Share of NUTS transitions that may end at a cliff: where a contact comes or goes the log density falls by thousands
-within no distance, so what is behind has no mass. More of them mean a neck that is not explored."""
+"""Share of NUTS transitions that may diverge within a course of events; more mean a neck that is not explored."""
 
 
 LogDensity = Callable[[Float[Tensor, "point dimension"]], Float[Tensor, "point"]]
@@ -95,6 +94,9 @@ class Samples:
         More about each draw, by name.
     divergences
         Number of divergent transitions (NUTS), else None.
+    cliffs
+        Number of further transitions that ended where a contact comes or goes (NUTS), else None. The log density falls
+        by thousands there within no distance, so what is behind has no mass, and nothing is left out.
     transitions
         Number of transitions that they are among; as many as there are draws where 0.
     pareto_k
@@ -124,6 +126,7 @@ class Samples:
     log_density: Float[np.ndarray, "chain draw"]
     statistics: Mapping[str, Float[np.ndarray, "chain draw"]] = field(default_factory=dict)
     divergences: int | None = None
+    cliffs: int | None = None
     transitions: int = 0
     pareto_k: float | None = None
     known: Statistics | None = None
@@ -165,7 +168,7 @@ class Convergence:
     ess_bulk
         Smallest bulk effective sample size over the reported quantities.
     divergences
-        Divergent transitions (NUTS), else None.
+        Divergent transitions (NUTS) but for those at `cliffs`, else None.
     pareto_k
         k-hat of the importance weights (laplace), else None.
     collision_order_changes
@@ -182,6 +185,8 @@ class Convergence:
         Effective sample size that every reported quantity needs.
     transitions
         Transitions that the divergences are among; 0 where they are not counted.
+    cliffs
+        Transitions that ended where a contact comes or goes, behind which there is no mass (NUTS), else None.
     """
 
     sampler: str
@@ -197,6 +202,7 @@ class Convergence:
     notes: tuple[str, ...] = ()
     ess_goal: float = ESS_GOAL
     transitions: int = 0
+    cliffs: int | None = None
 
     @classmethod
     def of_document(cls, document: Mapping[str, Any]) -> "Convergence":
@@ -216,6 +222,8 @@ class Convergence:
         if self.divergences is not None:
             among = f" in {self.transitions} transitions" if self.transitions else ""
             facts.append(f"{self.divergences} divergences{among} (goal 1 % or less)")
+        if self.cliffs:
+            facts.append(f"{self.cliffs} more where a contact comes or goes (which is no fault)")
         if self.pareto_k is not None:
             facts.append(f"Pareto k {self.pareto_k:.2f} (goal {PARETO_K_GOAL:g} or less)")
         verdict = "has converged" if self.converged else "has not converged, so take its intervals with care"
@@ -252,6 +260,7 @@ def assess(
         r_hat=None if weighted else r_hat,
         ess_bulk=found.ess_bulk,
         divergences=samples.divergences,
+        cliffs=samples.cliffs,
         pareto_k=samples.pareto_k,
         collision_order_changes=order_changes,
         ess_tail=found.ess_tail,

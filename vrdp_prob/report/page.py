@@ -303,6 +303,9 @@ def _diagnostics(content: ReportContent) -> list[tuple[str, str, str]]:
                 "steps at which the sampler lost its way; below 1 % of all is good",
             )
         )
+    if convergence.cliffs:
+        meaning = "steps that ended where a contact comes or goes, behind which nothing is probable; no fault"
+        rows.append(("Ended at a contact", str(convergence.cliffs), meaning))
     if convergence.pareto_k is not None and math.isfinite(convergence.pareto_k):
         meaning = "tail of the importance weights; below 0.7 is good"
         rows.append(("Pareto k", f"{convergence.pareto_k:.2f}", meaning))

@@ -1,0 +1,105 @@
+"""Causes that only follow what something outside the catalogue does.
+
+Kicks, patches and jumps of the clock can be put where a law that the catalogue does not hold leaves most, and predict
+left-out videos better than nothing does. What such a law does elsewhere remains then, and shows in the checks. So where
+something remains, causes are compared with a law of no particular cause (`unlisted_law`), beside them and in the place
+of each.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from vrdp_prob.discovery.scores import score_causes
+from vrdp_prob.discovery.search import FALSE_ALARM, Search
+from vrdp_prob.discovery.trials import Trial, gain, weights
+from vrdp_prob.discovery.unlisted_law import UnlistedLaw
+from vrdp_prob.models.effects.effect import Effect
+
+BELIEVED = 0.5
+"""Probability below which a cause is taken to follow something outside the catalogue."""
+UNLISTED = float(np.log(FALSE_ALARM))
+"""Log prior odds of such a thing."""
+
+
+@dataclass(frozen=True)
+class Unlisted:
+    """What a law of no particular cause explains of some videos.
+
+    Parameters
+    ----------
+    mimics
+        Names of the causes that it explains away, in the order in which they were found.
+    gain, error
+        Gain (nats) in the predictive density of left-out videos over what the causes of the catalogue explain, and its
+        standard error.
+    """
+
+    mimics: tuple[str, ...]
+    gain: float
+    error: float
+
+
+def without_mimics(found: Search, *, seed: int) -> tuple[Search, Unlisted | None]:
+    """A search without the causes that a law of no particular cause explains away, and what that law explains.
+
+    Parameters
+    ----------
+    found
+        A search whose best model leaves something.
+    seed
+        Seed of all randomness.
+
+    Returns
+    -------
+    The search with the best model of the other causes, and None where that law explains hardly more than the causes.
+    """
+    best = found.best
+    beside = _with_law(best, seed)
+    if beside is None or _merit(beside, best, found) < found.needed:
+        return found, None
+    alone = _with_law(found.base, seed)
+    if alone is not None and _merit(alone, best, found) > 0:
+        return _without(found, best.causes), Unlisted(best.names, *gain(alone, best, found.overdispersion))
+    mimics = [
+        cause
+        for cause, lesser in zip(best.causes, found.lesser, strict=True)
+        if _believed(found, beside, lesser, _with_law(lesser, seed), seed) < BELIEVED
+    ]
+    explained = Unlisted(tuple(one.name for one in mimics), *gain(beside, best, found.overdispersion))
+    return (_without(found, mimics) if mimics else found), explained
+
+
+def _with_law(trial: Trial, seed: int) -> Trial | None:
+    """A model with the law beside its causes; None where no refit can begin."""
+    (score,) = score_causes(trial.fit, trial.unexplained.plain, [UnlistedLaw()], seed=seed)
+    refitted = trial.with_cause(score)
+    return None if refitted is None else refitted.continued()
+
+
+def _merit(trial: Trial, other: Trial, found: Search) -> float:
+    """By how much (nats) a model with the law is more probable than one without."""
+    return gain(trial, other, found.overdispersion)[0] + trial.log_prior - other.log_prior + UNLISTED
+
+
+def _believed(found: Search, beside: Trial, lesser: Trial, instead: Trial | None, seed: int) -> float:
+    """Probability of a cause, with the law beside it or not, against models without it."""
+    trials = [found.best, beside, lesser, *(() if instead is None else (instead,))]
+    laws = [0.0, UNLISTED, found.needed, found.needed + UNLISTED]
+    log_prior = [one.log_prior + law for one, law in zip(trials, laws, strict=False)]
+    shares = weights(trials, log_prior, np.random.default_rng(seed), overdispersion=found.overdispersion)
+    return float(shares[:2].sum())
+
+
+def _without(found: Search, mimics: Sequence[Effect]) -> Search:
+    """The search with a best model that lacks some causes."""
+    left = [k for k, cause in enumerate(found.best.causes) if cause not in mimics]
+    if not left:
+        return replace(found, best=found.base, lesser=(), rivals=())
+    best = found.best
+    for cause in mimics:
+        best = best.without(cause)
+    best = best.continued()
+    lesser = tuple(best.without(cause).continued() for cause in best.causes)
+    return replace(found, best=best, lesser=lesser, rivals=tuple(() for _ in lesser))

@@ -1,0 +1,96 @@
+"""A law of motion of no particular cause, which stands for all that the catalogue does not hold.
+
+Where causes of the catalogue leave something that is not noise, they may stand for part of it. So they are compared
+with a law that has a term for each way in which the motion between contacts can depend on place, velocity and time, to
+low order. It costs a parameter per term, so a cause that says the same with one or two of them is more probable.
+"""
+
+from collections.abc import Mapping
+from typing import ClassVar
+
+from vrdp_prob.models.effects.effect import BodyView, Effect
+from vrdp_prob.models.parameters import Parameter, Prior, Transform
+from vrdp_prob.models.simulator.formula import Scalar
+from vrdp_prob.models.simulator.mathematics import exp, maximum
+
+SLOW = 0.3
+"""Speed in m/s below which friction may be another one."""
+STANDSTILL = 1e-3
+"""Speed in m/s below which a velocity has no direction."""
+
+
+def _term(name: str, unit: str, description: str, sd: float) -> Parameter:
+    return Parameter(name, unit, description, Transform.IDENTITY, Prior(0.0, sd), 0.0)
+
+
+_FRICTION = (
+    _term("friction_along_x", "1/m", "relative change of the friction per length along x", 0.5),
+    _term("friction_along_y", "1/m", "relative change of the friction per length along y", 0.5),
+    _term("friction_in_time", "1/s", "relative change of the friction per time", 0.2),
+    _term("friction_of_slow", "1", "relative change of the friction of slow bodies", 2.0),
+    _term("grain_x", "1", "relative change of the friction of bodies that move along x, and less of it along y", 0.5),
+    _term(
+        "grain_xy", "1", "relative change of the friction of bodies that move along x = y, and less along x = -y", 0.5
+    ),
+)
+_DRAG = (
+    _term("drag_first", "1/s", "deceleration per speed", 0.3),
+    _term("drag_third", "s/m^2", "deceleration per third power of the speed", 0.3),
+)
+_TURN = (
+    _term("turn", "1/s", "acceleration to the left of the velocity, per speed", 0.3),
+    _term("turn_along_x", "1/(m s)", "the same, per length along x", 0.3),
+    _term("turn_along_y", "1/(m s)", "the same, per length along y", 0.3),
+)
+_PUSH = tuple(
+    _term(f"push_{axis}{of}", unit, f"acceleration along {axis}{words}", sd)
+    for axis in "xy"
+    for of, unit, words, sd in (
+        ("", "m/s^2", "", 0.2),
+        ("_by_x", "1/s^2", " per length along x", 0.2),
+        ("_by_y", "1/s^2", " per length along y", 0.2),
+        ("_by_time", "m/s^3", " per time", 0.1),
+    )
+)
+
+
+class UnlistedLaw(Effect):
+    """Friction, drag and pushes that depend on place, direction, speed and time to low order."""
+
+    name: ClassVar = "unlisted_law"
+    sentence: ClassVar = "Bodies follow a law that the catalogue does not hold."
+    law: ClassVar = (
+        "mu (1 + a . x + b t + c exp(-(v / 0.3)^2) + d cos 2 phi + e sin 2 phi), "
+        "a = -(f + g v^2) v + (h + i . x) z x v + k + M x + m t"
+    )
+    source: ClassVar = "first terms of the expansion of any smooth law"
+    parameters: ClassVar = (*_FRICTION, *_DRAG, *_TURN, *_PUSH)
+    vanishes_at: ClassVar = {one.name: 0.0 for one in (*_FRICTION, *_DRAG, *_TURN, *_PUSH)}
+
+    def friction_factor(self, time: Scalar, body: BodyView, parameters: Mapping[str, Scalar]) -> Scalar:
+        """Factor of the friction, by place, time, speed and direction."""
+        squares = body.vx * body.vx + body.vy * body.vy
+        among = squares + STANDSTILL**2
+        change = (
+            parameters["friction_along_x"] * body.x
+            + parameters["friction_along_y"] * body.y
+            + parameters["friction_in_time"] * time
+            + parameters["friction_of_slow"] * exp(-squares / SLOW**2)
+            + parameters["grain_x"] * (body.vx * body.vx - body.vy * body.vy) / among
+            + parameters["grain_xy"] * 2 * body.vx * body.vy / among
+        )
+        return maximum(0.0, 1 + change)
+
+    def acceleration(self, time: Scalar, body: BodyView, parameters: Mapping[str, Scalar]) -> tuple[Scalar, Scalar]:
+        """Acceleration in m/s^2: drag, turns and pushes."""
+        squares = body.vx * body.vx + body.vy * body.vy
+        drag = parameters["drag_first"] + parameters["drag_third"] * squares
+        turn = parameters["turn"] + parameters["turn_along_x"] * body.x + parameters["turn_along_y"] * body.y
+        push_x, push_y = (
+            parameters[f"push_{axis}"]
+            + parameters[f"push_{axis}_by_x"] * body.x
+            + parameters[f"push_{axis}_by_y"] * body.y
+            + parameters[f"push_{axis}_by_time"] * time
+            for axis in "xy"
+        )
+        return push_x - drag * body.vx - turn * body.vy, push_y - drag * body.vy + turn * body.vx

@@ -79,7 +79,7 @@ def discover(
         checks = run_checks(found.base.fit, seed=seed)
         after = run_checks(found.best.fit, seed=seed) if found.best.causes else checks
         unlisted: Unlisted | None = None
-        if found.best.causes and _leaves_something(after):
+        if found.best.causes and any(check.significant for check in after):
             found, unlisted = without_mimics(found, seed=seed)
             if unlisted is not None and unlisted.mimics:
                 after = run_checks(found.best.fit, seed=seed) if found.best.causes else checks
@@ -235,6 +235,7 @@ def _unlisted_note(unlisted: Unlisted) -> str:
     than = listed(f"'{name}'" for name in unlisted.mimics)
     rest = f"; {than} only followed it, and {'are' if len(unlisted.mimics) > 1 else 'is'} not named" if than else ""
     return (
-        "Friction, drag and pushes that depend on place, direction, speed and time in some way that the catalogue does "
-        f"not hold predict left-out videos better by {unlisted.gain:.0f} ± {unlisted.error:.0f} nats{rest}."
+        "Friction, drag, pushes and restitution that depend on place, direction, speed and time in some way that the "
+        f"catalogue does not hold predict left-out videos better by {unlisted.gain:.0f} ± {unlisted.error:.0f} nats"
+        f"{rest}."
     )

@@ -1,8 +1,9 @@
 """A law of motion of no particular cause, which stands for all that the catalogue does not hold.
 
 Where causes of the catalogue leave something that is not noise, they may stand for part of it. So they are compared
-with a law that has a term for each way in which the motion between contacts can depend on place, velocity and time, to
-low order. It costs a parameter per term, so a cause that says the same with one or two of them is more probable.
+with a law that has a term for each way in which the motion between contacts can depend on place, velocity and time, and
+restitution on the speed, to low order. It costs a parameter per term, so a cause that says the same with one or two of
+them is more probable.
 """
 
 from collections.abc import Mapping
@@ -11,10 +12,10 @@ from typing import ClassVar
 from vrdp_prob.models.effects.effect import BodyView, Effect
 from vrdp_prob.models.parameters import Parameter, Prior, Transform
 from vrdp_prob.models.simulator.formula import Scalar
-from vrdp_prob.models.simulator.mathematics import exp, maximum
+from vrdp_prob.models.simulator.mathematics import exp, maximum, minimum
 
 SLOW = 0.3
-"""Speed in m/s below which friction may be another one."""
+"""Speed in m/s below which friction and restitution may be others."""
 STANDSTILL = 1e-3
 """Speed in m/s below which a velocity has no direction."""
 
@@ -52,20 +53,25 @@ _PUSH = tuple(
         ("_by_time", "m/s^3", " per time", 0.1),
     )
 )
+_CONTACTS = (
+    _term("restitution_of_slow", "1", "logarithm of the factor of the restitution of slow contacts", 1.0),
+    _term("restitution_by_speed", "s/m", "fall of the logarithm of the restitution per closing speed", 0.3),
+)
 
 
 class UnlistedLaw(Effect):
-    """Friction, drag and pushes that depend on place, direction, speed and time to low order."""
+    """Friction, drag, pushes and restitution that depend on place, direction, speed and time to low order."""
 
     name: ClassVar = "unlisted_law"
     sentence: ClassVar = "Bodies follow a law that the catalogue does not hold."
     law: ClassVar = (
         "mu (1 + a . x + b t + c exp(-(v / 0.3)^2) + d cos 2 phi + e sin 2 phi), "
-        "a = -(f + g v^2) v + (h + i . x) z x v + k + M x + m t"
+        "a = -(f + g v^2) v + (h + i . x) z x v + k + M x + m t, "
+        "e = r1 r2 exp(n exp(-(v_n / 0.3)^2) - o v_n), at most 1"
     )
     source: ClassVar = "first terms of the expansion of any smooth law"
-    parameters: ClassVar = (*_FRICTION, *_DRAG, *_TURN, *_PUSH)
-    vanishes_at: ClassVar = {one.name: 0.0 for one in (*_FRICTION, *_DRAG, *_TURN, *_PUSH)}
+    parameters: ClassVar = (*_FRICTION, *_DRAG, *_TURN, *_PUSH, *_CONTACTS)
+    vanishes_at: ClassVar = {one.name: 0.0 for one in (*_FRICTION, *_DRAG, *_TURN, *_PUSH, *_CONTACTS)}
 
     def friction_factor(self, time: Scalar, body: BodyView, parameters: Mapping[str, Scalar]) -> Scalar:
         """Factor of the friction, by place, time, speed and direction."""
@@ -94,3 +100,16 @@ class UnlistedLaw(Effect):
             for axis in "xy"
         )
         return push_x - drag * body.vx - turn * body.vy, push_y - drag * body.vy + turn * body.vx
+
+    def restitution(
+        self,
+        closing_speed: Scalar,
+        restitution: Scalar,
+        first: BodyView,
+        second: BodyView,
+        parameters: Mapping[str, Scalar],
+    ) -> Scalar:
+        """Coefficient of a contact, by its closing speed."""
+        slow = exp(-closing_speed * closing_speed / SLOW**2)
+        change = parameters["restitution_of_slow"] * slow - parameters["restitution_by_speed"] * closing_speed
+        return minimum(1.0, restitution * exp(change))

@@ -1,0 +1,103 @@
+"""Causes that only follow what something outside the catalogue does are told from those that act."""
+
+import numpy as np
+import pytest
+
+from tests.discovery.fitted import fitted
+from tests.discovery.scenes import Setting
+from vrdp_prob.discovery.mimics import without_mimics
+from vrdp_prob.discovery.scores import score_causes
+from vrdp_prob.discovery.search import Search
+from vrdp_prob.discovery.trials import Trial
+from vrdp_prob.discovery.unlisted_law import UnlistedLaw
+from vrdp_prob.inference import default_model
+from vrdp_prob.models.effects.effect import BodyView, Effect
+from vrdp_prob.models.effects.friction_patch import FrictionPatch
+from vrdp_prob.models.effects.surface_tilt import SurfaceTilt
+from vrdp_prob.models.model_file import known_effects
+
+SETTING = Setting(videos=4, bodies=3)
+
+
+def search_that_found(cause: Effect, way: str, seed: int) -> Search:
+    """What a search would be that has found a cause in videos where something else, or the same, is hidden."""
+    _, fit = fitted(way, 6.0, seed=seed, setting=SETTING)
+    base = Trial((), fit)
+    (score,) = score_causes(fit, base.unexplained.plain, [cause], seed=0)
+    refitted = base.with_cause(score)
+    assert refitted is not None
+    return Search(base, refitted.continued(), (), (base,), ((),), 6.0, np.ones(SETTING.videos))
+
+
+def test_a_patch_that_follows_the_grain_of_a_table_is_not_named() -> None:
+    found, unlisted = without_mimics(search_that_found(FrictionPatch(), "grain", seed=7), seed=0)
+    assert unlisted is not None
+    assert unlisted.mimics == ("friction_patch",)
+    assert unlisted.gain > 3 * unlisted.error > 0
+    assert found.best is found.base
+    assert found.lesser == found.rivals == ()
+
+
+def test_a_tilt_that_acts_stays_and_leaves_nothing_to_a_law_outside_the_catalogue() -> None:
+    before = search_that_found(SurfaceTilt(), "surface_tilt", seed=7)
+    found, unlisted = without_mimics(before, seed=0)
+    assert found is before
+    assert unlisted is None
+
+
+@pytest.mark.parametrize(
+    ("term", "closing_speed", "expected"),
+    [
+        ("restitution_of_slow", 1e-3, 0.5 * np.exp(-0.4)),
+        ("restitution_of_slow", 2.0, 0.5),
+        ("restitution_by_speed", 2.0, 0.5 * np.exp(0.8)),
+        ("restitution_by_speed", 9.0, 1.0),
+    ],
+)
+def test_restitution_depends_on_the_closing_speed(term: str, closing_speed: float, expected: float) -> None:
+    parameters = {one.name: 0.0 for one in UnlistedLaw.parameters} | {term: -0.4}
+    found = UnlistedLaw().restitution(closing_speed, 0.5, body(), body(), parameters)
+    assert found == pytest.approx(expected, abs=1e-4)
+
+
+def body(**values: float) -> BodyView:
+    names = ("x", "y", "angle", "vx", "vy", "spin", "speed", "mass", "inverse_mass", "inverse_inertia")
+    numbers = {**dict.fromkeys((*names, "restitution", "radius", "is_sphere"), 0.0), **values}
+    return BodyView(**numbers)
+
+
+def test_the_law_vanishes_without_its_terms_and_is_in_no_catalogue() -> None:
+    nothing = {one.name: 0.0 for one in UnlistedLaw.parameters}
+    moving = body(x=0.3, y=-0.7, vx=1.0, vy=2.0)
+    assert UnlistedLaw().friction_factor(1.5, moving, nothing) == 1.0
+    assert UnlistedLaw().acceleration(1.5, moving, nothing) == (0.0, 0.0)
+    assert UnlistedLaw().restitution(1.0, 0.5, moving, moving, nothing) == 0.5
+    assert UnlistedLaw.name not in known_effects()
+    default_model().with_effect(UnlistedLaw())
+
+
+@pytest.mark.parametrize(
+    ("term", "where", "factor", "acceleration"),
+    [
+        ("friction_along_x", {"x": 0.5, "vx": 1.0}, 1.1, (0.0, 0.0)),
+        ("friction_in_time", {"vx": 1.0}, 1.6, (0.0, 0.0)),
+        ("grain_x", {"vx": 1.0}, 1.2, (0.0, 0.0)),
+        ("grain_x", {"vy": 1.0}, 0.8, (0.0, 0.0)),
+        ("grain_xy", {"vx": 1.0, "vy": 1.0}, 1.2, (0.0, 0.0)),
+        ("friction_of_slow", {"vx": 1e-3}, 1.2, (0.0, 0.0)),
+        ("friction_of_slow", {"vx": 3.0}, 1.0, (0.0, 0.0)),
+        ("drag_first", {"vx": 2.0}, 1.0, (-0.4, 0.0)),
+        ("drag_third", {"vx": 2.0}, 1.0, (-1.6, 0.0)),
+        ("turn", {"vx": 2.0}, 1.0, (0.0, 0.4)),
+        ("turn_along_y", {"vx": 2.0, "y": 0.5}, 1.0, (0.0, 0.2)),
+        ("push_x", {}, 1.0, (0.2, 0.0)),
+        ("push_y_by_x", {"x": 2.0}, 1.0, (0.0, 0.4)),
+        ("push_x_by_time", {}, 1.0, (0.6, 0.0)),
+    ],
+)
+def test_each_term_does_what_it_says(
+    term: str, where: dict[str, float], factor: float, acceleration: tuple[float, float]
+) -> None:
+    parameters = {one.name: 0.0 for one in UnlistedLaw.parameters} | {term: 0.2}
+    assert UnlistedLaw().friction_factor(3.0, body(**where), parameters) == pytest.approx(factor, abs=1e-4)
+    assert UnlistedLaw().acceleration(3.0, body(**where), parameters) == pytest.approx(acceleration)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tests.discovery.fitted import fitted
+from tests.discovery.fitted import SMALL, fitted
 from tests.discovery.scenes import Setting
 from vrdp_prob.discovery.mimics import without_mimics
 from vrdp_prob.discovery.scores import score_causes
@@ -16,30 +16,30 @@ from vrdp_prob.models.effects.friction_patch import FrictionPatch
 from vrdp_prob.models.effects.surface_tilt import SurfaceTilt
 from vrdp_prob.models.model_file import known_effects
 
-SETTING = Setting(videos=4, bodies=3)
+LONGER = Setting(videos=6, bodies=2)
 
 
-def search_that_found(cause: Effect, way: str, seed: int) -> Search:
+def search_that_found(cause: Effect, way: str, effect_size: float, setting: Setting) -> Search:
     """What a search would be that has found a cause in videos where something else, or the same, is hidden."""
-    _, fit = fitted(way, 6.0, seed=seed, setting=SETTING)
+    _, fit = fitted(way, effect_size, seed=2, setting=setting)
     base = Trial((), fit)
     (score,) = score_causes(fit, base.unexplained.plain, [cause], seed=0)
     refitted = base.with_cause(score)
     assert refitted is not None
-    return Search(base, refitted.continued(), (), (base,), ((),), 6.0, np.ones(SETTING.videos))
+    return Search(base, refitted.continued(), (), (base,), ((),), 6.0, np.ones(setting.videos))
 
 
 def test_a_patch_that_follows_the_grain_of_a_table_is_not_named() -> None:
-    found, unlisted = without_mimics(search_that_found(FrictionPatch(), "grain", seed=7), seed=0)
+    found, unlisted = without_mimics(search_that_found(FrictionPatch(), "grain", 8.0, LONGER), seed=0)
     assert unlisted is not None
     assert unlisted.mimics == ("friction_patch",)
-    assert unlisted.gain > 3 * unlisted.error > 0
+    assert unlisted.gain > 50
     assert found.best is found.base
     assert found.lesser == found.rivals == ()
 
 
 def test_a_tilt_that_acts_stays_and_leaves_nothing_to_a_law_outside_the_catalogue() -> None:
-    before = search_that_found(SurfaceTilt(), "surface_tilt", seed=7)
+    before = search_that_found(SurfaceTilt(), "surface_tilt", 5.0, SMALL)
     found, unlisted = without_mimics(before, seed=0)
     assert found is before
     assert unlisted is None
@@ -50,7 +50,7 @@ def test_a_tilt_that_acts_stays_and_leaves_nothing_to_a_law_outside_the_catalogu
     [
         ("restitution_of_slow", 1e-3, 0.5 * np.exp(-0.4)),
         ("restitution_of_slow", 2.0, 0.5),
-        ("restitution_by_speed", 2.0, 0.5 * np.exp(0.8)),
+        ("restitution_by_speed", 1.0, 0.5 * np.exp(0.4)),
         ("restitution_by_speed", 9.0, 1.0),
     ],
 )

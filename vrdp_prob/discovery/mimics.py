@@ -72,9 +72,9 @@ def without_mimics(found: Search, *, seed: int) -> tuple[Search, Unlisted | None
 
 
 def _with_law(trial: Trial, seed: int) -> Trial | None:
-    """A model with the law beside its causes; None where no refit can begin."""
-    (score,) = score_causes(trial.fit, trial.unexplained.plain, [UnlistedLaw()], seed=seed)
-    refitted = trial.with_cause(score)
+    """A model with the law beside its causes; None where the videos say nothing of it or no refit can begin."""
+    scores = score_causes(trial.fit, trial.unexplained.plain, [UnlistedLaw()], seed=seed)
+    refitted = trial.with_cause(scores[0]) if scores else None
     return None if refitted is None else refitted.continued()
 
 
@@ -85,9 +85,11 @@ def _merit(trial: Trial, other: Trial, found: Search) -> float:
 
 def _believed(found: Search, beside: Trial, lesser: Trial, instead: Trial | None, seed: int) -> float:
     """Probability of a cause, with the law beside it or not, against models without it."""
-    trials = [found.best, beside, lesser, *(() if instead is None else (instead,))]
-    laws = [0.0, UNLISTED, found.needed, found.needed + UNLISTED]
-    log_prior = [one.log_prior + law for one, law in zip(trials, laws, strict=False)]
+    compared = [(found.best, 0.0), (beside, UNLISTED), (lesser, found.needed)]
+    if instead is not None:
+        compared.append((instead, found.needed + UNLISTED))
+    trials = [trial for trial, _ in compared]
+    log_prior = [trial.log_prior + odds for trial, odds in compared]
     shares = weights(trials, log_prior, np.random.default_rng(seed), overdispersion=found.overdispersion)
     return float(shares[:2].sum())
 

@@ -233,7 +233,7 @@ def _notes(found: Search, unlisted: Unlisted | None) -> list[str]:
 
 def _unlisted_note(unlisted: Unlisted) -> str:
     than = listed(f"'{name}'" for name in unlisted.mimics)
-    rest = f"; {than} only followed it, and {'are' if len(unlisted.mimics) > 1 else 'is'} not named" if than else ""
+    rest = f"; {than} may only follow it, and {'are' if len(unlisted.mimics) > 1 else 'is'} not named" if than else ""
     return (
         "Friction, drag, pushes and restitution that depend on place, direction, speed and time in some way that the "
         f"catalogue does not hold predict left-out videos better by {unlisted.gain:.0f} ± {unlisted.error:.0f} nats"

@@ -7,6 +7,8 @@ import pytest
 
 from vrdp_prob.discovery import search
 from vrdp_prob.discovery.trials import Trial
+from vrdp_prob.inference.several_videos.ascent import ImpossibleStartError
+from vrdp_prob.models.effects.surface_tilt import SurfaceTilt
 
 
 def _refit(cause: str, gained: float, *, patches: bool = False) -> Mock:
@@ -124,3 +126,16 @@ def test_lost_videos_are_searched_once_and_only_where_refits_leave_something(mon
         assert [one.causes for one in searcher._with_lost(leaving)] == [("tilt", "friction"), ("drag",)]
     assert searcher._refits(leaving) == searcher._with_lost(leaving)
     assert asked == [leaving]
+
+
+def test_a_cause_with_which_no_joint_world_can_begin_is_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
+    def impossible(*_given: object, **_named: object) -> None:
+        raise ImpossibleStartError
+
+    monkeypatch.setattr(search, "fit_together", impossible)
+    monkeypatch.setattr(search, "lost_videos", lambda _fit: [0])
+    monkeypatch.setattr(search, "causes_of_lost_videos", lambda *_given, **_named: [(SurfaceTilt(), 50.0)])
+    monkeypatch.setattr(search._Searcher, "first", lambda _self, _trial: Mock(scores=()))
+    trial = _refit("", 0.0)
+    trial.choices, trial.names, trial.fit = {}, (), Mock(fits=[])
+    assert _searcher()._lost(trial, []) == []

@@ -13,6 +13,7 @@ from vrdp_prob.discovery.scores import CauseScore, happens_once, score_causes
 from vrdp_prob.discovery.single_videos import causes_of_lost_videos, lost_videos
 from vrdp_prob.discovery.trials import Trial, gain, weights, with_own_population
 from vrdp_prob.inference.parallel import in_processes
+from vrdp_prob.inference.several_videos.ascent import ImpossibleStartError
 from vrdp_prob.inference.several_videos.fitting import SharedFit, fit_together
 from vrdp_prob.inference.several_videos.second_look import doubtful
 from vrdp_prob.models.effects.effect import Effect
@@ -274,14 +275,17 @@ class _Searcher:
         told = causes_of_lost_videos(trial.fit, lost, left, likely, self.needed, seed=self.seed)
         again = [effect for effect, promised in told if reached.get(effect.name, 0.0) < promised]
 
-        def searched(effect: Effect) -> Trial:
+        def searched(effect: Effect) -> Trial | None:
             model = trial.fit.model.with_effect(effect)
             tracks = [part.clues.tracks for part in trial.fit.fits]
-            fit = fit_together(tracks, model=model, shared=trial.fit.shared, seed=self.seed, model_error=False)
             self.advance(1)
-            return Trial((*trial.causes, effect), with_own_population(fit), trial.choices)
+            try:
+                fit = fit_together(tracks, model=model, shared=trial.fit.shared, seed=self.seed, model_error=False)
+                return Trial((*trial.causes, effect), with_own_population(fit), trial.choices)
+            except ImpossibleStartError:  # what single videos say of the cause fits no world of all of them
+                return None
 
-        return [searched(effect) for effect in again]
+        return [one for one in map(searched, again) if one is not None]
 
     def _hidden(self, trial: Trial, found: Sequence[Trial], kicks: CauseScore) -> list[Trial]:
         """Fits with something unseen in the place of kicks."""

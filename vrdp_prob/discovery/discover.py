@@ -77,12 +77,12 @@ def discover(
         fit = fit_together(videos, model=physics, seed=seed, model_error=False, progress=progress)
         found = search(fit, _catalogue(physics, catalogue), seed=seed, progress=progress)
         checks = run_checks(found.base.fit, seed=seed)
-        after = run_checks(found.best.fit, seed=seed) if found.best.causes else checks
+        after = _checks_after(found, checks, seed)
         unlisted: Unlisted | None = None
         if found.best.causes and any(check.significant for check in after):
-            found, unlisted = without_mimics(found, seed=seed)
+            found, unlisted = without_mimics(found, seed=seed, progress=progress)
             if unlisted is not None and unlisted.mimics:
-                after = run_checks(found.best.fit, seed=seed) if found.best.causes else checks
+                after = _checks_after(found, checks, seed)
     causes = _causes(found, seed)
     verdict = Verdict.UNKNOWN if unlisted is not None else _verdict(found, after)
     return Finding(
@@ -106,13 +106,13 @@ def _catalogue(model: PhysicsModel, catalogue: Sequence[Effect] | None) -> list[
     return [effect for effect in known if effect.name not in present]
 
 
-def _leaves_something(checks: Sequence[Check]) -> bool:
-    """Whether some check finds what is not noise."""
-    return min((check.p_value for check in checks), default=1.0) * len(checks) < LEFT_LEVEL
+def _checks_after(found: Search, checks: tuple[Check, ...], seed: int) -> tuple[Check, ...]:
+    """The checks of the best model; those of the base model where it has no causes."""
+    return run_checks(found.best.fit, seed=seed) if found.best.causes else checks
 
 
 def _verdict(found: Search, after: Sequence[Check]) -> Verdict:
-    left = _leaves_something(after)
+    left = min((check.p_value for check in after), default=1.0) * len(after) < LEFT_LEVEL
     if not found.best.causes:
         return Verdict.UNKNOWN if left else Verdict.NONE
     if _strange(found):

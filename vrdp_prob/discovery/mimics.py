@@ -8,6 +8,7 @@ of each.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -15,7 +16,9 @@ from vrdp_prob.discovery.scores import score_causes
 from vrdp_prob.discovery.search import FALSE_ALARM, Search
 from vrdp_prob.discovery.trials import Trial, gain, weights
 from vrdp_prob.discovery.unlisted_law import UnlistedLaw
+from vrdp_prob.inference.parallel import in_processes
 from vrdp_prob.models.effects.effect import Effect
+from vrdp_prob.progress import ProgressDisplay, SilentProgress
 
 BELIEVED = 0.5
 """Probability below which a cause is taken to follow something outside the catalogue."""
@@ -41,7 +44,9 @@ class Unlisted:
     error: float
 
 
-def without_mimics(found: Search, *, seed: int) -> tuple[Search, Unlisted | None]:
+def without_mimics(
+    found: Search, *, seed: int, progress: ProgressDisplay | None = None
+) -> tuple[Search, Unlisted | None]:
     """A search without the causes that a law of no particular cause explains away, and what that law explains.
 
     Parameters
@@ -50,22 +55,30 @@ def without_mimics(found: Search, *, seed: int) -> tuple[Search, Unlisted | None
         A search whose best model leaves something.
     seed
         Seed of all randomness.
+    progress
+        Told how far the work is.
 
     Returns
     -------
     The search with the best model of the other causes, and None where that law explains hardly more than the causes.
     """
     best = found.best
-    beside = _with_law(best, seed)
-    if beside is None or _merit(beside, best, found) < found.needed:
-        return found, None
-    alone = _with_law(found.base, seed)
-    if alone is not None and _merit(alone, best, found) > 0:
-        return _without(found, best.causes), Unlisted(best.names, *gain(alone, best, found.overdispersion))
+    with (progress or SilentProgress()).stage("Looking outside the catalogue", total=None) as advance:
+        beside = _with_law(best, seed)
+        advance(1)
+        if beside is None or _merit(beside, best, found) < found.needed:
+            return found, None
+        alone = _with_law(found.base, seed)
+        advance(1)
+        if alone is not None and _merit(alone, best, found) > 0:
+            return _without(found, best.causes), Unlisted(best.names, *gain(alone, best, found.overdispersion))
+        others = [lesser for lesser in found.lesser if lesser is not found.base]
+        refitted = in_processes(partial(_with_law, seed=seed), others, advance=advance)
+    instead = {found.base: alone, **dict(zip(others, refitted, strict=True))}
     mimics = [
         cause
         for cause, lesser in zip(best.causes, found.lesser, strict=True)
-        if _believed(found, beside, lesser, _with_law(lesser, seed), seed) < BELIEVED
+        if _believed(found, beside, lesser, instead[lesser], seed) < BELIEVED
     ]
     explained = Unlisted(tuple(one.name for one in mimics), *gain(beside, best, found.overdispersion))
     return (_without(found, mimics) if mimics else found), explained

@@ -278,12 +278,13 @@ class _Searcher:
         def searched(effect: Effect) -> Trial | None:
             model = trial.fit.model.with_effect(effect)
             tracks = [part.clues.tracks for part in trial.fit.fits]
-            self.advance(1)
             try:
                 fit = fit_together(tracks, model=model, shared=trial.fit.shared, seed=self.seed, model_error=False)
                 return Trial((*trial.causes, effect), with_own_population(fit), trial.choices)
             except ImpossibleStartError:  # what single videos say of the cause fits no world of all of them
                 return None
+            finally:
+                self.advance(1)
 
         return [one for one in map(searched, again) if one is not None]
 

@@ -13,7 +13,7 @@ import torch
 from jaxtyping import Bool, Float
 
 from vrdp_prob.inference.descent import Descent
-from vrdp_prob.inference.events import Pairs, courses
+from vrdp_prob.inference.events import Pairs, courses_at
 from vrdp_prob.inference.free_flight import SeenContact
 from vrdp_prob.inference.hypothesis import QUARTER, Hypothesis, different, least_turn, owned, yaw_places
 from vrdp_prob.inference.least_squares import Minimum, robust_cost
@@ -85,8 +85,7 @@ def alternatives(
     yaws = [place for place in yaw_places(likelihood, encounter.bodies) if active[place]]
     drawn = _drawn(likelihood, hypothesis, encounter, np.flatnonzero(local), generator)
     drawn = drawn[np.argsort(robust_cost(likelihood.residuals(drawn, frame_count), threshold))]
-    with torch.no_grad():
-        found = courses(likelihood.rollout(torch.from_numpy(np.stack([hypothesis.point, *drawn])), frame_count))
+    found = courses_at(likelihood, torch.from_numpy(np.stack([hypothesis.point, *drawn])), frame_count)
     chosen = _spread(drawn, yaws, found[1:]) if encounter.puzzling else _other_courses(found)
     if not chosen:
         return []

@@ -1,5 +1,10 @@
 """Which pairs meet in a rollout, and in which order."""
 
+import torch
+from jaxtyping import Float
+from torch import Tensor
+
+from vrdp_prob.models.likelihood import Likelihood
 from vrdp_prob.models.simulator.events import RolloutEventKind
 from vrdp_prob.models.simulator.rollout import Rollout
 
@@ -31,6 +36,14 @@ def courses(rollout: Rollout) -> list[Pairs]:
         tuple(pair for place, pair in enumerate(contacts) if contacts[max(place - 2, 0) : place] != [pair] * 2)
         for contacts in _contacts(rollout)
     ]
+
+
+def courses_at(
+    likelihood: Likelihood, points: Float[Tensor, "point dimension"], frame_count: int | None = None
+) -> list[Pairs]:
+    """The courses of the worlds of some points, over the (first) frames of the video."""
+    with torch.no_grad():
+        return courses(likelihood.rollout(points, frame_count))
 
 
 def _contacts(rollout: Rollout) -> list[list[tuple[int, int]]]:

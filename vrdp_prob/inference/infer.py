@@ -7,9 +7,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import torch
-from jaxtyping import Float
-from torch import Tensor
 
 from vrdp_prob.errors import InputError
 from vrdp_prob.inference.assembly import posterior_from
@@ -17,7 +14,7 @@ from vrdp_prob.inference.checkpoint import Checkpoint, fingerprint
 from vrdp_prob.inference.contact_ridges import contact_ridges
 from vrdp_prob.inference.diagnostics import Reported
 from vrdp_prob.inference.emcee_sampler import sample_emcee
-from vrdp_prob.inference.events import Pairs, courses
+from vrdp_prob.inference.events import courses_at
 from vrdp_prob.inference.laplace import sample_laplace
 from vrdp_prob.inference.map_fit import MapFit, fit_map
 from vrdp_prob.inference.mode_weights import UNSURE
@@ -30,7 +27,6 @@ from vrdp_prob.inference.samples import Samples, assess
 from vrdp_prob.inference.straightening import Rates
 from vrdp_prob.inference.yaw_tiles import yaw_jumps, yaws_left_out
 from vrdp_prob.models.effects.body_friction import BodyFriction
-from vrdp_prob.models.likelihood import Likelihood
 from vrdp_prob.models.noise import NoiseFamily
 from vrdp_prob.models.physics import PhysicsModel
 from vrdp_prob.progress import ProgressDisplay
@@ -173,15 +169,9 @@ def sampled(fit: MapFit, sampler: str, *, generator: np.random.Generator, **opti
         "rate_steps": RateSteps.of(fit.modes[0], rates),
     }
     if sampler == "nuts":
-        options = {"courses": partial(_courses_at, likelihood), **options}
+        options = {"courses": partial(courses_at, likelihood), **options}
     samples = SAMPLERS[sampler](likelihood.log_density, start, generator=generator, **ways, **options)
     return replace(samples, doubts=(*samples.doubts, *_unexplored(fit)))
-
-
-def _courses_at(likelihood: Likelihood, points: Float[Tensor, "point dimension"]) -> list[Pairs]:
-    """For every point the contacts of its world, in order."""
-    with torch.no_grad():
-        return courses(likelihood.rollout(points))
 
 
 def _unexplored(fit: MapFit) -> Iterator[str]:

@@ -217,6 +217,8 @@ def fit_together(
     ------
     InputError
         If there is no video, two have one name, a name is none that videos can share, or a video shows no motion.
+    ImpossibleStartError
+        If some video has no world at what the videos' own fits agree on.
     """
     check_videos(videos)
     if shared is not None:

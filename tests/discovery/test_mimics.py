@@ -5,11 +5,13 @@ import pytest
 
 from tests.discovery.fitted import SMALL, fitted
 from tests.discovery.scenes import Setting
-from vrdp_prob.discovery.mimics import without_mimics
+from vrdp_prob.discovery.body_checks import REBOUND
+from vrdp_prob.discovery.finding import Check
+from vrdp_prob.discovery.mimics import laws_of, without_mimics
 from vrdp_prob.discovery.scores import score_causes
 from vrdp_prob.discovery.search import Search
 from vrdp_prob.discovery.trials import Trial
-from vrdp_prob.discovery.unlisted_law import UnlistedLaw
+from vrdp_prob.discovery.unlisted_law import UnlistedMotion, UnlistedRebound
 from vrdp_prob.inference import default_model
 from vrdp_prob.models.effects.effect import BodyView, Effect
 from vrdp_prob.models.effects.friction_patch import FrictionPatch
@@ -30,7 +32,8 @@ def search_that_found(cause: Effect, way: str, effect_size: float, setting: Sett
 
 
 def test_a_patch_that_follows_the_grain_of_a_table_is_not_named() -> None:
-    found, unlisted = without_mimics(search_that_found(FrictionPatch(), "grain", 8.0, LONGER), seed=0)
+    before = search_that_found(FrictionPatch(), "grain", 8.0, LONGER)
+    found, unlisted = without_mimics(before, [UnlistedMotion()], seed=0)
     assert unlisted is not None
     assert unlisted.mimics == ("friction_patch",)
     assert unlisted.gain > 50
@@ -40,24 +43,42 @@ def test_a_patch_that_follows_the_grain_of_a_table_is_not_named() -> None:
 
 def test_a_tilt_that_acts_stays_and_leaves_nothing_to_a_law_outside_the_catalogue() -> None:
     before = search_that_found(SurfaceTilt(), "surface_tilt", 5.0, SMALL)
-    found, unlisted = without_mimics(before, seed=0)
+    found, unlisted = without_mimics(before, [UnlistedMotion()], seed=0)
     assert found is before
     assert unlisted is None
+
+
+def test_what_remains_decides_which_law_is_asked() -> None:
+    motion = Check("push against place", 1.0, 1e-6, True, "")
+    rebound = Check(REBOUND, 1.0, 1e-6, True, "")
+    by_chance = Check("outliers", 1.0, 0.2, False, "")
+    asked = {
+        (motion, by_chance): (UnlistedMotion,),
+        (rebound, by_chance): (UnlistedRebound,),
+        (rebound, motion): (UnlistedMotion, UnlistedRebound),
+        (by_chance,): (),
+    }
+    assert {left: tuple(type(law) for law in laws_of(left)) for left in asked} == asked
 
 
 @pytest.mark.parametrize(
     ("term", "closing_speed", "expected"),
     [
         ("restitution_of_slow", 1e-3, 0.5 * np.exp(-0.4)),
+        ("restitution_of_slow", 0.6, 0.5 * np.exp(-0.4 * np.exp(-1))),
         ("restitution_of_slow", 2.0, 0.5),
         ("restitution_by_speed", 1.0, 0.5 * np.exp(0.4)),
         ("restitution_by_speed", 9.0, 1.0),
     ],
 )
 def test_restitution_depends_on_the_closing_speed(term: str, closing_speed: float, expected: float) -> None:
-    parameters = {one.name: 0.0 for one in UnlistedLaw.parameters} | {term: -0.4}
-    found = UnlistedLaw().restitution(closing_speed, 0.5, body(), body(), parameters)
+    parameters = absent(UnlistedRebound()) | {"slow_contact": 0.6, term: -0.4}
+    found = UnlistedRebound().restitution(closing_speed, 0.5, body(), body(), parameters)
     assert found == pytest.approx(expected, abs=1e-4)
+
+
+def absent(law: Effect) -> dict[str, float]:
+    return {one.name: law.vanishes_at.get(one.name, one.default) for one in law.parameters}
 
 
 def body(**values: float) -> BodyView:
@@ -66,14 +87,14 @@ def body(**values: float) -> BodyView:
     return BodyView(**numbers)
 
 
-def test_the_law_vanishes_without_its_terms_and_is_in_no_catalogue() -> None:
-    nothing = {one.name: 0.0 for one in UnlistedLaw.parameters}
+def test_laws_vanish_without_their_terms_and_are_in_no_catalogue() -> None:
     moving = body(x=0.3, y=-0.7, vx=1.0, vy=2.0)
-    assert UnlistedLaw().friction_factor(1.5, moving, nothing) == 1.0
-    assert UnlistedLaw().acceleration(1.5, moving, nothing) == (0.0, 0.0)
-    assert UnlistedLaw().restitution(1.0, 0.5, moving, moving, nothing) == 0.5
-    assert UnlistedLaw.name not in known_effects()
-    default_model().with_effect(UnlistedLaw())
+    motion, rebound = UnlistedMotion(), UnlistedRebound()
+    assert motion.friction_factor(1.5, moving, absent(motion)) == 1.0
+    assert motion.acceleration(1.5, moving, absent(motion)) == (0.0, 0.0)
+    assert rebound.restitution(1.0, 0.5, moving, moving, absent(rebound)) == 0.5
+    assert {motion.name, rebound.name}.isdisjoint(known_effects())
+    default_model().with_effect(motion).with_effect(rebound)
 
 
 @pytest.mark.parametrize(
@@ -98,6 +119,6 @@ def test_the_law_vanishes_without_its_terms_and_is_in_no_catalogue() -> None:
 def test_each_term_does_what_it_says(
     term: str, where: dict[str, float], factor: float, acceleration: tuple[float, float]
 ) -> None:
-    parameters = {one.name: 0.0 for one in UnlistedLaw.parameters} | {term: 0.2}
-    assert UnlistedLaw().friction_factor(3.0, body(**where), parameters) == pytest.approx(factor, abs=1e-4)
-    assert UnlistedLaw().acceleration(3.0, body(**where), parameters) == pytest.approx(acceleration)
+    parameters = absent(UnlistedMotion()) | {term: 0.2}
+    assert UnlistedMotion().friction_factor(3.0, body(**where), parameters) == pytest.approx(factor, abs=1e-4)
+    assert UnlistedMotion().acceleration(3.0, body(**where), parameters) == pytest.approx(acceleration)

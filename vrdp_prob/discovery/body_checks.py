@@ -22,6 +22,7 @@ from vrdp_prob.inference.several_videos.fitting import SharedFit
 from vrdp_prob.models.parameters import RESTITUTION
 from vrdp_prob.scene import Body, Shape
 
+REBOUND = "restitution against approach speed"
 LARGEST_SD = 0.3
 """Values that are known no better (standard deviation of the logarithm) tell nothing."""
 SLOWEST = 1e-3
@@ -101,6 +102,11 @@ class Rebounds:
         return cls((rows @ own.values)[known], covariance[np.ix_(known, known)], np.array(speeds)[known], rows[known])
 
 
+def friction_against(what: str) -> str:
+    """Name of the check of what bodies rub by."""
+    return f"friction of the bodies against {what}"
+
+
 def body_checks(fit: SharedFit, model: ResidualModel) -> Iterator[Check]:
     """All checks of fitted values of single bodies."""
     yield from _restitution_check(Rebounds.of(fit, [FittedContacts.of(video.motion) for video in model.videos]))
@@ -123,7 +129,7 @@ def _restitution_check(rebounds: Rebounds) -> Iterator[Check]:
         if found.p_value < SEEN
         else f"Nothing seen; a power of {number(NORMAL_95 * sd)} of the approach speed would have shown."
     )
-    yield Check("restitution against approach speed", slope, found.p_value, False, sentence)
+    yield Check(REBOUND, slope, found.p_value, False, sentence)
 
 
 def _friction_checks(fit: SharedFit, model: ResidualModel) -> Iterator[Check]:
@@ -161,7 +167,7 @@ def _friction_check(name: str, found: Dependence | None, words: str) -> Iterator
         if found.p_value < SEEN
         else f"Nothing seen; {number(100 * NORMAL_95 * float(found.sd.max()))} % would have shown."
     )
-    yield Check(f"friction of the bodies against {name}", float(found.slope[0]), found.p_value, False, sentence)
+    yield Check(friction_against(name), float(found.slope[0]), found.p_value, False, sentence)
 
 
 def _indicator(bodies: Sequence[Body], material: str) -> Float[np.ndarray, "number"]:

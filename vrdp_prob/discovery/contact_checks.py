@@ -23,6 +23,7 @@ from vrdp_prob.discovery.residual_model import ResidualModel, joined
 from vrdp_prob.discovery.words import number, opposite
 
 RUBBING = "tangential against normal impulse"
+DISTANCE = "centre distance at contact"
 FEWEST_FRAMES = 4
 """Frames of a body before and after a kick without which it does not show."""
 
@@ -193,7 +194,7 @@ def _distance_check(score: Score, contacts: Sequence[FittedContacts]) -> Iterato
         f"Bodies touch {number(abs(size))} m {opposite(size, 'nearer', 'farther apart')} than the sum of their radii, "
         f"{number(100 * abs(share))} % of it."
     )
-    yield _check("centre distance at contact", size, score.p_value, found, f"{number(NORMAL_95 * sd)} m")
+    yield _check(DISTANCE, size, score.p_value, found, f"{number(NORMAL_95 * sd)} m")
 
 
 def _momentum_check(score: Score, contacts: int) -> Iterator[Check]:

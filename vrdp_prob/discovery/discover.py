@@ -1,5 +1,6 @@
 """The search for what a model lacks."""
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -8,10 +9,12 @@ from jaxtyping import Float
 from vrdp_prob.discovery.checking import check_video_count
 from vrdp_prob.discovery.checks import run_checks
 from vrdp_prob.discovery.describe import describe
-from vrdp_prob.discovery.estimates import cause_sentence, estimates, surprise, upper_bounds
+from vrdp_prob.discovery.doubts import doubts
+from vrdp_prob.discovery.estimates import cause_sentence, estimates, upper_bounds
 from vrdp_prob.discovery.figures import residual_figures
 from vrdp_prob.discovery.finding import Check, Finding, FoundCause, Gain, UpperBound, Verdict
-from vrdp_prob.discovery.mimics import Unlisted, without_mimics
+from vrdp_prob.discovery.free_flight import NORMAL_95
+from vrdp_prob.discovery.mimics import Unlisted, laws_of, without_mimics
 from vrdp_prob.discovery.search import Search, search
 from vrdp_prob.discovery.trials import Trial, gain, gains, weights
 from vrdp_prob.inference import default_model
@@ -32,8 +35,6 @@ LEFT_LEVEL = 0.005
 """Probability, over all checks, with which a model that explains everything is taken to leave something."""
 TELLING = 2.0
 """Overdispersion of a video that is told of."""
-SURPRISING = 0.01
-"""Probability below which parameters of a cause are so far from what was expected that it stands for something else."""
 LEAST_SHARE = 0.01
 """Probability from which a cause is told of that could take the place of a named one."""
 
@@ -79,11 +80,12 @@ def discover(
         checks = run_checks(found.base.fit, seed=seed)
         after = _checks_after(found, checks, seed)
         unlisted: Unlisted | None = None
-        if found.best.causes and any(check.significant for check in after):
-            found, unlisted = without_mimics(found, seed=seed, progress=progress)
+        laws = laws_of(after)
+        if found.best.causes and laws:
+            found, unlisted = without_mimics(found, laws, seed=seed, progress=progress)
             if unlisted is not None and unlisted.mimics:
                 after = _checks_after(found, checks, seed)
-    causes = _causes(found, seed)
+    causes = _causes(found, after, seed)
     verdict = Verdict.UNKNOWN if unlisted is not None else _verdict(found, after)
     return Finding(
         verdict=verdict,
@@ -95,7 +97,7 @@ def discover(
         extended=found.best.fit.model,
         videos=tuple(tracks.video for tracks in videos),
         description=describe(found.best.fit, seed=seed) if verdict is Verdict.UNKNOWN else None,
-        notes=tuple(_notes(found, unlisted)),
+        notes=tuple(_notes(found, after, unlisted)),
         figures=residual_figures(found.base.fit, found.best.fit if found.best.causes else None),
     )
 
@@ -115,15 +117,10 @@ def _verdict(found: Search, after: Sequence[Check]) -> Verdict:
     left = min((check.p_value for check in after), default=1.0) * len(after) < LEFT_LEVEL
     if not found.best.causes:
         return Verdict.UNKNOWN if left else Verdict.NONE
-    if _strange(found):
+    if any(True for cause in found.best.causes for _ in doubts(found.best, cause, after)):
         return Verdict.UNKNOWN
     before, now = _excess(found.base), _excess(found.best)
     return Verdict.UNKNOWN if left and now > (1 - EXPLAINED) * before else Verdict.NAMED
-
-
-def _strange(found: Search) -> list[str]:
-    """Causes of the best model whose parameters are far from what was expected of them."""
-    return [one.name for one in found.best.causes if surprise(found.best.fit, one) < SURPRISING]
 
 
 def _excess(trial: Trial) -> float:
@@ -131,11 +128,10 @@ def _excess(trial: Trial) -> float:
     return max(float(np.mean([part.misfit.chi_square for part in trial.fit.fits])) - 1.0, 0.0)
 
 
-def _causes(found: Search, seed: int) -> list[FoundCause]:
+def _causes(found: Search, after: Sequence[Check], seed: int) -> list[FoundCause]:
     """The causes of the best model, and those that could take the place of one."""
     named: list[FoundCause] = []
     others: list[FoundCause] = []
-    strange = _strange(found)
     for number, (lesser, rivals) in enumerate(zip(found.lesser, found.rivals, strict=True)):
         best_of = {one.causes[-1].name: one for one in reversed(rivals)}
         trials = [found.best, lesser, *best_of.values()]
@@ -144,11 +140,13 @@ def _causes(found: Search, seed: int) -> list[FoundCause]:
         log_prior.insert(1, 0.0)
         shares = weights(trials, log_prior, np.random.default_rng(seed), overdispersion=found.overdispersion)
         cause = found.best.causes[number]
-        expected = cause.name not in strange
-        named.append(_cause(found.best, cause, lesser, found.overdispersion, float(shares[0]), named=expected))
+        doubted = list(doubts(found.best, cause, after))
+        probability = float(shares[0]) * math.prod(one.credible for one in doubted)
+        named.append(_cause(found.best, cause, lesser, found.overdispersion, probability, named=not doubted))
         for rival, share in zip(best_of.values(), shares[2:], strict=True):
             if share >= LEAST_SHARE:
-                others.append(_cause(rival, rival.causes[-1], lesser, found.overdispersion, float(share), named=False))
+                probability = float(share) * math.prod(one.credible for one in doubts(rival, rival.causes[-1]))
+                others.append(_cause(rival, rival.causes[-1], lesser, found.overdispersion, probability, named=False))
     named.sort(key=lambda one: (not one.named, -one.probability))
     return named + sorted(others, key=lambda one: -one.probability)
 
@@ -163,10 +161,9 @@ def _cause(
     named: bool,
 ) -> FoundCause:
     values = estimates(trial.fit, effect, unexplained=trial.unexplained, overdispersion=overdispersion)
-    credible = min(1.0, surprise(trial.fit, effect) / SURPRISING)
     return FoundCause(
         name=effect.name,
-        probability=min(max(credible * probability, 0.0), 1.0),
+        probability=min(max(probability, 0.0), 1.0),
         sentence=cause_sentence(effect, values),
         parameters=values,
         gain=_gain(lesser, trial, overdispersion),
@@ -197,7 +194,7 @@ def _bounds(found: Search) -> list[UpperBound]:
     ]
 
 
-def _notes(found: Search, unlisted: Unlisted | None) -> list[str]:
+def _notes(found: Search, after: Sequence[Check], unlisted: Unlisted | None) -> list[str]:
     notes = []
     if unlisted is not None:
         notes.append(_unlisted_note(unlisted))
@@ -205,11 +202,7 @@ def _notes(found: Search, unlisted: Unlisted | None) -> list[str]:
         notes.append(
             "The joint fit ended before it had converged: some video is at the edge between two courses of events."
         )
-    notes += [
-        f"The parameters of '{name}' are far from what was expected of this cause: it may stand for something that it "
-        "has as its limit, and its probability counts that."
-        for name in _strange(found)
-    ]
+    notes += [one.sentence for cause in found.best.causes for one in doubts(found.best, cause, after)]
     largest = found.best.unexplained.accelerated
     if largest:
         sizes = [f"{one.size:.2g}" for one in sorted(largest, key=lambda one: one.size)]
@@ -234,8 +227,6 @@ def _notes(found: Search, unlisted: Unlisted | None) -> list[str]:
 def _unlisted_note(unlisted: Unlisted) -> str:
     than = listed(f"'{name}'" for name in unlisted.mimics)
     rest = f"; {than} may only follow it, and {'are' if len(unlisted.mimics) > 1 else 'is'} not named" if than else ""
-    return (
-        "Friction, drag, pushes and restitution that depend on place, direction, speed and time in some way that the "
-        f"catalogue does not hold predict left-out videos better by {unlisted.gain:.0f} ± {unlisted.error:.0f} nats"
-        f"{rest}."
-    )
+    laws = " ".join(law.sentence for law in unlisted.laws)
+    better = "better" if unlisted.gain > NORMAL_95 * unlisted.error else "at least as well, as far as they can tell,"
+    return f"{laws} That predicts left-out videos {better} ({unlisted.gain:.0f} ± {unlisted.error:.0f} nats){rest}."

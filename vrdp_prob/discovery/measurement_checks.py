@@ -17,6 +17,7 @@ from vrdp_prob.models.roughness import CUBIC_NOISE_GAIN, NORMAL_MAD
 
 MEMORY, SIZE = GENERAL = ("memory of the residuals", "size of the residuals")
 """Checks that say that something is wrong, and not what."""
+DISTORTION = "distortion of positions"
 GROSS = 1e-4
 """A position is grossly off if noise puts it as far from those before and after less often."""
 FEWEST = 30
@@ -141,7 +142,7 @@ def _lens_check(flight: FreeFlight) -> Iterator[Check]:
         else f"Nothing seen; {number(NORMAL_95 * float(lens.of([0], [1, 2]).sd[0]) * far**3)} m at {number(far)} m "
         "from the middle would have shown."
     )
-    yield Check("distortion of positions", edge, lens.p_value, False, sentence)
+    yield Check(DISTORTION, edge, lens.p_value, False, sentence)
 
 
 def _bent(motion: FittedMotion, middle: Float[np.ndarray, "2"]) -> Float[np.ndarray, "time body 2 3"]:

@@ -3,7 +3,7 @@
 Kicks, patches and jumps of the clock can be put where a law that the catalogue does not hold leaves most, and predict
 left-out videos better than nothing does. What such a law does elsewhere remains then, and shows in the checks. So where
 something remains, causes are compared with a law of no particular cause (`unlisted_law`), beside them and in the place
-of each.
+of each: of the motion, of the rebound, or of both, by what remains.
 """
 
 from collections.abc import Sequence
@@ -12,10 +12,12 @@ from functools import partial
 
 import numpy as np
 
+from vrdp_prob.discovery.body_checks import REBOUND
+from vrdp_prob.discovery.finding import Check
 from vrdp_prob.discovery.scores import score_causes
 from vrdp_prob.discovery.search import FALSE_ALARM, Search
 from vrdp_prob.discovery.trials import Trial, gain, weights
-from vrdp_prob.discovery.unlisted_law import UnlistedLaw
+from vrdp_prob.discovery.unlisted_law import UnlistedMotion, UnlistedRebound
 from vrdp_prob.inference.parallel import in_processes
 from vrdp_prob.models.effects.effect import Effect
 from vrdp_prob.progress import ProgressDisplay, SilentProgress
@@ -32,6 +34,8 @@ class Unlisted:
 
     Parameters
     ----------
+    laws
+        The parts of it that were asked.
     mimics
         Names of the causes that it explains away, in the order in which they were found.
     gain, error
@@ -39,13 +43,21 @@ class Unlisted:
         standard error.
     """
 
+    laws: tuple[Effect, ...]
     mimics: tuple[str, ...]
     gain: float
     error: float
 
 
+def laws_of(left: Sequence[Check]) -> tuple[Effect, ...]:
+    """Laws of no particular cause for what checks say is left."""
+    failing = {check.name for check in left if check.significant}
+    motion = (UnlistedMotion(),) if failing - {REBOUND} else ()
+    return (*motion, UnlistedRebound()) if REBOUND in failing else motion
+
+
 def without_mimics(
-    found: Search, *, seed: int, progress: ProgressDisplay | None = None
+    found: Search, laws: Sequence[Effect], *, seed: int, progress: ProgressDisplay | None = None
 ) -> tuple[Search, Unlisted | None]:
     """A search without the causes that a law of no particular cause explains away, and what that law explains.
 
@@ -53,6 +65,8 @@ def without_mimics(
     ----------
     found
         A search whose best model leaves something.
+    laws
+        What it is asked whether they explain it, at least one.
     seed
         Seed of all randomness.
     progress
@@ -63,32 +77,37 @@ def without_mimics(
     The search with the best model of the other causes, and None where that law explains hardly more than the causes.
     """
     best = found.best
+    with_laws = partial(_with_laws, laws=tuple(laws), seed=seed)
     with (progress or SilentProgress()).stage("Looking outside the catalogue", total=None) as advance:
-        beside = _with_law(best, seed)
+        beside = with_laws(best)
         advance(1)
         if beside is None or _merit(beside, best, found) < found.needed:
             return found, None
-        alone = _with_law(found.base, seed)
+        alone = with_laws(found.base)
         advance(1)
         if alone is not None and _merit(alone, best, found) > 0:
-            return _without(found, best.causes), Unlisted(best.names, *gain(alone, best, found.overdispersion))
+            gained = gain(alone, best, found.overdispersion)
+            return _without(found, best.causes), Unlisted(tuple(laws), best.names, *gained)
         others = [lesser for lesser in found.lesser if lesser is not found.base]
-        refitted = in_processes(partial(_with_law, seed=seed), others, advance=advance)
+        refitted = in_processes(with_laws, others, advance=advance)
     instead = {found.base: alone, **dict(zip(others, refitted, strict=True))}
     mimics = [
         cause
         for cause, lesser in zip(best.causes, found.lesser, strict=True)
         if _believed(found, beside, lesser, instead[lesser], seed) < BELIEVED
     ]
-    explained = Unlisted(tuple(one.name for one in mimics), *gain(beside, best, found.overdispersion))
+    names = tuple(one.name for one in mimics)
+    explained = Unlisted(tuple(laws), names, *gain(beside, best, found.overdispersion))
     return (_without(found, mimics) if mimics else found), explained
 
 
-def _with_law(trial: Trial, seed: int) -> Trial | None:
-    """A model with the law beside its causes; None where the videos say nothing of it or no refit can begin."""
-    scores = score_causes(trial.fit, trial.unexplained.plain, [UnlistedLaw()], seed=seed)
-    refitted = trial.with_cause(scores[0]) if scores else None
-    return None if refitted is None else refitted.continued()
+def _with_laws(trial: Trial, laws: Sequence[Effect], seed: int) -> Trial | None:
+    """A model with laws beside its causes; None where the videos say nothing of any or no refit can begin."""
+    found = trial
+    for law in laws:
+        scores = score_causes(found.fit, found.unexplained.plain, [law], seed=seed)
+        found = (found.with_cause(scores[0]) if scores else None) or found
+    return None if found is trial else found.continued()
 
 
 def _merit(trial: Trial, other: Trial, found: Search) -> float:

@@ -1,21 +1,25 @@
-"""A law of motion of no particular cause, which stands for all that the catalogue does not hold.
+"""Laws of no particular cause, which stand for all that the catalogue does not hold.
 
 Where causes of the catalogue leave something that is not noise, they may stand for part of it. So they are compared
-with a law that has a term for each way in which the motion between contacts can depend on place, velocity and time, and
-restitution on the speed, to low order. It costs a parameter per term, so a cause that says the same with one or two of
-them is more probable.
+with laws that have a term for each way in which the motion between contacts can depend on place, velocity and time, and
+the rebound from contacts on their speed, to low order. Such a law costs a parameter per term, so a cause that says the
+same with one or two of them is more probable.
 """
 
-from collections.abc import Mapping
+import math
+from collections.abc import Mapping, Sequence
 from typing import ClassVar
 
 from vrdp_prob.models.effects.effect import BodyView, Effect
 from vrdp_prob.models.parameters import Parameter, Prior, Transform
 from vrdp_prob.models.simulator.formula import Scalar
 from vrdp_prob.models.simulator.mathematics import exp, maximum, minimum
+from vrdp_prob.scene import Tracks
 
 SLOW = 0.3
-"""Speed in m/s below which friction and restitution may be others."""
+"""Speed in m/s below which friction may be another."""
+SLOW_CONTACTS = (0.15, 0.3, 0.6)
+"""Closing speeds in m/s below which restitution may be another, where a search begins."""
 STANDSTILL = 1e-3
 """Speed in m/s below which a velocity has no direction."""
 
@@ -53,25 +57,36 @@ _PUSH = tuple(
         ("_by_time", "m/s^3", " per time", 0.1),
     )
 )
-_CONTACTS = (
-    _term("restitution_of_slow", "1", "logarithm of the factor of the restitution of slow contacts", 1.0),
+_MOTION = (*_FRICTION, *_DRAG, *_TURN, *_PUSH)
+_REBOUND = (
+    _term("restitution_of_slow", "1", "logarithm of the factor of the restitution of slow contacts", 2.0),
     _term("restitution_by_speed", "s/m", "fall of the logarithm of the restitution per closing speed", 0.3),
+    Parameter(
+        "slow_contact",
+        "m/s",
+        "closing speed below which contacts are slow",
+        Transform.LOG,
+        Prior(math.log(SLOW), 0.7),
+        SLOW,
+    ),
 )
 
 
-class UnlistedLaw(Effect):
-    """Friction, drag, pushes and restitution that depend on place, direction, speed and time to low order."""
+class UnlistedMotion(Effect):
+    """Friction, drag and pushes that depend on place, direction, speed and time to low order."""
 
-    name: ClassVar = "unlisted_law"
-    sentence: ClassVar = "Bodies follow a law that the catalogue does not hold."
+    name: ClassVar = "unlisted_motion"
+    sentence: ClassVar = (
+        "Friction, drag and pushes depend on place, direction, speed and time in some way that the catalogue does not "
+        "hold."
+    )
     law: ClassVar = (
         "mu (1 + a . x + b t + c exp(-(v / 0.3)^2) + d cos 2 phi + e sin 2 phi), "
-        "a = -(f + g v^2) v + (h + i . x) z x v + k + M x + m t, "
-        "e = r1 r2 exp(n exp(-(v_n / 0.3)^2) - o v_n), at most 1"
+        "a = -(f + g v^2) v + (h + i . x) z x v + k + M x + m t"
     )
     source: ClassVar = "first terms of the expansion of any smooth law"
-    parameters: ClassVar = (*_FRICTION, *_DRAG, *_TURN, *_PUSH, *_CONTACTS)
-    vanishes_at: ClassVar = {one.name: 0.0 for one in (*_FRICTION, *_DRAG, *_TURN, *_PUSH, *_CONTACTS)}
+    parameters: ClassVar = _MOTION
+    vanishes_at: ClassVar = {one.name: 0.0 for one in _MOTION}
 
     def friction_factor(self, time: Scalar, body: BodyView, parameters: Mapping[str, Scalar]) -> Scalar:
         """Factor of the friction, by place, time, speed and direction."""
@@ -101,6 +116,21 @@ class UnlistedLaw(Effect):
         )
         return push_x - drag * body.vx - turn * body.vy, push_y - drag * body.vy + turn * body.vx
 
+
+class UnlistedRebound(Effect):
+    """Restitution that depends on the closing speed to low order, and otherwise below some speed."""
+
+    name: ClassVar = "unlisted_rebound"
+    sentence: ClassVar = "Restitution depends on the closing speed in some way that the catalogue does not hold."
+    law: ClassVar = "e = r1 r2 exp(n exp(-(v_n / slow_contact)^4) - o v_n), at most 1"
+    source: ClassVar = "first term of the expansion of any smooth law, and a threshold"
+    parameters: ClassVar = _REBOUND
+    vanishes_at: ClassVar = {"restitution_of_slow": 0.0, "restitution_by_speed": 0.0}
+
+    def search_points(self, videos: Sequence[Tracks]) -> Sequence[Mapping[str, float]]:
+        """With thresholds between slow and middling contacts."""
+        return [{"slow_contact": speed} for speed in SLOW_CONTACTS]
+
     def restitution(
         self,
         closing_speed: Scalar,
@@ -110,6 +140,7 @@ class UnlistedLaw(Effect):
         parameters: Mapping[str, Scalar],
     ) -> Scalar:
         """Coefficient of a contact, by its closing speed."""
-        slow = exp(-closing_speed * closing_speed / SLOW**2)
-        change = parameters["restitution_of_slow"] * slow - parameters["restitution_by_speed"] * closing_speed
+        squared = (closing_speed / parameters["slow_contact"]) ** 2
+        slow = parameters["restitution_of_slow"] * exp(-squared * squared)
+        change = slow - parameters["restitution_by_speed"] * closing_speed
         return minimum(1.0, restitution * exp(change))

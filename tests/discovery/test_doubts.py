@@ -1,0 +1,51 @@
+"""What speaks against a cause that was found."""
+
+import pytest
+
+from tests.discovery.fitted import SMALL, fitted
+from vrdp_prob.discovery.checks import run_checks
+from vrdp_prob.discovery.doubts import OWN_CHECKS, doubts
+from vrdp_prob.discovery.finding import Check
+from vrdp_prob.discovery.trials import Trial
+from vrdp_prob.models.effects.effect import Effect
+from vrdp_prob.models.effects.speed_dependent_restitution import SpeedDependentRestitution
+from vrdp_prob.models.effects.surface_tilt import SurfaceTilt
+from vrdp_prob.models.model_file import known_effects
+
+REBOUND = "restitution against approach speed"
+
+
+@pytest.fixture(scope="module")
+def trial() -> Trial:
+    return Trial((), fitted("surface_tilt", 5.0, seed=2, setting=SMALL)[1])
+
+
+def left(name: str, p_value: float, *, significant: bool = True) -> list[Check]:
+    return [Check(name, 1.0, p_value, significant, "")]
+
+
+@pytest.mark.parametrize(
+    ("cause", "checks"),
+    [
+        (SpeedDependentRestitution(), []),
+        (SpeedDependentRestitution(), left(REBOUND, 0.02, significant=False)),
+        (SpeedDependentRestitution(), left("push against place", 1e-9)),
+        (SurfaceTilt(), left(REBOUND, 1e-9)),
+    ],
+)
+def test_nothing_speaks_against_a_cause_that_leaves_nothing_of_its_own(
+    trial: Trial, cause: Effect, checks: list[Check]
+) -> None:
+    assert list(doubts(trial, cause, checks)) == []
+
+
+def test_what_is_left_of_the_very_thing_that_a_cause_does_speaks_against_it(trial: Trial) -> None:
+    (doubt,) = doubts(trial, SpeedDependentRestitution(), left(REBOUND, 5e-4))
+    assert doubt.credible == pytest.approx(0.05)
+    assert REBOUND in doubt.sentence
+
+
+def test_checks_and_causes_go_by_their_names(trial: Trial) -> None:
+    names = {one.name for one in run_checks(trial.fit, seed=0)}
+    assert known_effects().keys() >= OWN_CHECKS.keys()
+    assert names >= {name for name in OWN_CHECKS.values() if "friction of the bodies" not in name}

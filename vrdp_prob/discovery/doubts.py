@@ -1,0 +1,74 @@
+"""Reasons to doubt that what was found is the cause that it is called."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+from vrdp_prob.discovery.body_checks import REBOUND, friction_against
+from vrdp_prob.discovery.contact_checks import DISTANCE, RUBBING
+from vrdp_prob.discovery.estimates import surprise
+from vrdp_prob.discovery.finding import Check
+from vrdp_prob.discovery.measurement_checks import DISTORTION
+from vrdp_prob.discovery.trials import Trial
+from vrdp_prob.models.effects.contact_friction import ContactFriction
+from vrdp_prob.models.effects.contact_radius_error import ContactRadiusError
+from vrdp_prob.models.effects.effect import Effect
+from vrdp_prob.models.effects.lens_distortion import LensDistortion
+from vrdp_prob.models.effects.mass_dependent_friction import MassDependentFriction
+from vrdp_prob.models.effects.material_friction import MaterialFriction
+from vrdp_prob.models.effects.speed_dependent_restitution import SpeedDependentRestitution
+
+SURPRISING = 0.01
+"""Probability below which parameters of a cause, or what is left of what it acts on, say that it is something else."""
+OWN_CHECKS = {
+    SpeedDependentRestitution.name: REBOUND,
+    ContactFriction.name: RUBBING,
+    ContactRadiusError.name: DISTANCE,
+    LensDistortion.name: DISTORTION,
+    MassDependentFriction.name: friction_against("mass"),
+    MaterialFriction.name: friction_against("material"),
+}
+"""By the name of a cause: the check that asks for what it does, and for nothing else."""
+
+
+@dataclass(frozen=True)
+class Doubt:
+    """A reason to doubt that something is the cause that it is called.
+
+    Parameters
+    ----------
+    credible
+        Factor of the probability of the cause.
+    sentence
+        The reason, for a reader.
+    """
+
+    credible: float
+    sentence: str
+
+
+def doubts(trial: Trial, cause: Effect, left: Sequence[Check] = ()) -> Iterator[Doubt]:
+    """Reasons to doubt a cause of a model.
+
+    Parameters
+    ----------
+    trial
+        The model.
+    cause
+        One of its causes.
+    left
+        Checks of what the model leaves.
+    """
+    of_parameters = surprise(trial.fit, cause)
+    if of_parameters < SURPRISING:
+        yield Doubt(
+            of_parameters / SURPRISING,
+            f"The parameters of '{cause.name}' are far from what was expected of this cause: it may stand for "
+            "something that it has as its limit, and its probability counts that.",
+        )
+    own = next((one for one in left if one.name == OWN_CHECKS.get(cause.name) and one.significant), None)
+    if own is not None:
+        yield Doubt(
+            min(1.0, own.p_value / SURPRISING),
+            f"With '{cause.name}' the check of {own.name} fails still, which asks for just what this cause does: its "
+            "law is another one, and its probability counts that.",
+        )

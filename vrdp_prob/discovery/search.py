@@ -222,13 +222,17 @@ class _Searcher:
         """The model to go on from, and the same with the cause that a step has established; None where it has none.
 
         Where the winner's refit has found a better course of events, which is no merit of the cause, the model with
-        that course is the one to go on from.
+        that course is the one to go on from; so it is where a search finds one that the winner's kicks stood for.
         """
         winner = next((one for one in step.tried[:1] if gain(one, trial)[0] >= self.needed), None)
         if winner is not None:
             without = winner.without(winner.causes[-1])
             if gain(without, trial)[0] > self.needed:
                 trial = without
+            if happens_once(winner.causes[-1]):
+                kicked = doubtful(trial.fit.fits, winner.acting(winner.causes[-1]))
+                mended = trial.mended(kicked, seed=self.seed)
+                trial = mended if gain(mended, trial)[0] > self.needed else trial
             if self.doubted(winner, trial, self.first(winner).overdispersion):
                 winner = None
         return trial, self.or_first_of(step.pair, winner)

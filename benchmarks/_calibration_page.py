@@ -2,6 +2,7 @@
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
+from functools import cache
 from itertools import zip_longest
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -11,6 +12,8 @@ from _page import write_between
 from _resumable import Result
 from scipy.stats import binomtest
 
+from tests.inference.linear_posterior import linear_errors
+from tests.inference.prior_scenes import prior_scene
 from tests.inference.rank_statistics import shares, simultaneous_band, uniformity
 from tests.inference.scene_ranks import KINDS, LEVELS
 
@@ -26,13 +29,15 @@ FEWEST = 10
 class Calibration(NamedTuple):
     """Ranks of one kind of quantity, one per scene, and the probability that uniform ones deviate as much.
 
-    `squared_error` is the mean squared difference of the posterior's mean from the truth, in its standard deviations.
+    `squared_error` is the mean squared difference of the posterior's mean from the truth, in its standard deviations;
+    `by_chance` that of the exact posterior to first order, for the same quantities of the same scenes.
     """
 
     kind: str
     ranks: np.ndarray
     below: np.ndarray
     squared_error: float
+    by_chance: float | None
     probability: float
 
     @property
@@ -68,14 +73,27 @@ def calibrations(results: Sequence[Result]) -> list[Calibration]:
     """One quantity of each kind and scene, chosen by lot, so that all are independent."""
     found = []
     for kind in KINDS:
-        chosen = [_one(result, kind) for result in results]
+        drawn = {int(result["seed"]): _one(result, kind) for result in results}
+        chosen = list(drawn.values())
         ranks = np.array([one["rank"] for one in chosen if one], dtype=int)
         below = np.array([one["below"] for one in chosen if one])
         errors = np.array([one["error"] for one in chosen if one and one["error"] is not None])
         if len(ranks) >= FEWEST:
             squared = float(np.mean(errors**2)) if len(errors) else float("nan")
-            found.append(Calibration(kind, ranks, below, squared, uniformity(ranks, LEVELS)))
+            exact = [
+                error
+                for seed, one in drawn.items()
+                if one and (error := _linear_errors(seed).get(one["name"])) is not None
+            ]
+            by_chance = float(np.mean(np.square(exact))) if exact else None
+            found.append(Calibration(kind, ranks, below, squared, by_chance, uniformity(ranks, LEVELS)))
     return found
+
+
+@cache
+def _linear_errors(seed: int) -> dict[str, float]:
+    scene = prior_scene(seed)
+    return {} if scene is None else linear_errors(scene)
 
 
 def _one(result: Result, kind: str) -> Result | None:
@@ -96,11 +114,18 @@ def tables(results: Results) -> str:
                 parts.append(f"### {name}, {group}: {len(chosen)} scenes")
                 continue
             rows = [
-                (one.kind, str(len(one.ranks)), *_shown(one), f"{one.squared_error:.2f}", f"{one.probability:.4f}")
+                (
+                    one.kind,
+                    str(len(one.ranks)),
+                    *_shown(one),
+                    f"{one.squared_error:.2f}",
+                    "-" if one.by_chance is None else f"{one.by_chance:.2f}",
+                    f"{one.probability:.4f}",
+                )
                 for one in kinds
             ]
             shares_of = (f"{100 * interval:.0f} %" for interval in INTERVALS)
-            head = ("kind", "scenes", *shares_of, "squared error", "uniform ranks, p")
+            head = ("kind", "scenes", *shares_of, "squared error", "by chance", "uniform ranks, p")
             parts.append(f"### {name}, {group}: {len(chosen)} scenes\n\n{_table(head, rows)}")
     return "\n\n".join(parts)
 

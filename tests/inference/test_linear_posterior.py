@@ -1,0 +1,35 @@
+"""The posterior to first order around the truth, with which the inference is compared."""
+
+from itertools import count, islice
+
+import numpy as np
+from scipy.stats import chi2
+
+from tests.inference.linear_posterior import linear_errors
+from tests.inference.prior_scenes import PriorScene, prior_scene
+
+SCENES = 40
+FALSE_ALARM = 1e-3
+
+
+def test_its_errors_are_standard_normal_over_scenes() -> None:
+    scenes = islice((one for seed in count() if (one := prior_scene(seed)) is not None), SCENES)
+    chosen = []
+    for scene in scenes:
+        errors = [error for name, error in linear_errors(scene).items() if name != "log likelihood"]
+        chosen.append(errors[scene.seed % len(errors)])
+    low, high = chi2.ppf([FALSE_ALARM / 2, 1 - FALSE_ALARM / 2], SCENES)
+    assert low < np.square(chosen).sum() < high
+
+
+def test_a_body_that_nothing_meets_and_that_rests_is_as_far_off_as_the_mean_of_its_measurements() -> None:
+    scene = next(one for seed in count() if (one := prior_scene(seed)) is not None and _untouched(one))
+    body = _untouched(scene)[0]
+    seen = scene.tracks.seen[:, body]
+    noise = (scene.tracks.positions - scene.exact)[seen, body, 0] / scene.noise
+    assert np.isclose(linear_errors(scene)[f"position x {body}"], noise.mean() * np.sqrt(seen.sum()), atol=1e-3)
+
+
+def _untouched(scene: PriorScene) -> list[int]:
+    met = {int(body) for pair in scene.pairs for body in pair}
+    return [body for body, v in enumerate(scene.scene.velocity) if not v.any() and body not in met]

@@ -257,7 +257,7 @@ def discover_causes(
     if sampler != SAMPLER_OF_FITS:
         note = f"Causes are compared by fits, without draws: --sampler {sampler} changed nothing."
         finding = replace(finding, notes=(*finding.notes, note))
-    files = write_finding(finding, out, figures=finding.figures)
+    files = write_finding(finding, out)
     if as_json:
         print(json.dumps(finding_document(finding, model=files.model), allow_nan=False))
     elif not quiet:

@@ -22,6 +22,7 @@ from tests.report.outline import Outline
 from vrdp_prob.discovery.changed_answers import answers_sentence
 from vrdp_prob.discovery.page import render
 from vrdp_prob.discovery.summary import lines, summary, verdict_sentence
+from vrdp_prob.discovery.wording import typeset
 from vrdp_prob.discovery.wording import TIMES
 
 DRAWING = """<?xml version="1.0"?>
@@ -51,13 +52,10 @@ def test_needs_nothing_from_outside_and_nests(kind):
 def test_every_word_of_a_finding_is_told(kind):
     finding, page = EVERY_KIND[kind](), render(EVERY_KIND[kind]())
     text = text_of(page)
-    assert page.index(verdict_sentence(finding)[:20]) < page.index("<main>")
-    for words in (verdict_sentence(finding), *summary(finding), *finding.notes):
-        assert words in text
-    for cause in finding.causes:
-        assert cause.sentence in text
-    for check in finding.checks:
-        assert check.sentence in text
+    assert page.index(typeset(verdict_sentence(finding))[:20]) < page.index("<main>")
+    told = (verdict_sentence(finding), *summary(finding), *finding.notes)
+    for words in (*told, *(one.sentence for one in (*finding.causes, *finding.checks))):
+        assert typeset(words) in text
     for bound in finding.upper_bounds:
         assert bound.parameter in text
 
@@ -185,7 +183,7 @@ def test_text_of_a_finding_is_no_html():
 
 
 def test_figures_stand_in_the_page_with_names_of_their_own():
-    page = render(named(), {"Along the path": DRAWING, "Across <it>": DRAWING})
+    page = render(replace(named(), figures={"Along the path": DRAWING, "Across <it>": DRAWING}))
     assert "<?xml" not in page
     assert "http://" not in page.replace('xmlns="http://www.w3.org/2000/svg"', "")
     assert page.index("Along the path") < page.index("Across &lt;it&gt;")
@@ -199,7 +197,7 @@ def test_figures_stand_in_the_page_with_names_of_their_own():
 
 def test_a_figure_that_is_no_svg_is_a_mistake():
     with pytest.raises(ValueError, match="must be an SVG element"):
-        render(named(), {"Nothing": "<p>a picture</p>"})
+        render(replace(named(), figures={"Nothing": "<p>a picture</p>"}))
 
 
 def test_lines_for_a_terminal_are_lines():
@@ -221,7 +219,7 @@ def browser(tmp_path_factory):
 @pytest.mark.parametrize("kind", EVERY_KIND)
 def test_a_browser_shows_it_without_scrolling_sideways(browser, tmp_path, kind, width):
     file = tmp_path / "finding.html"
-    file.write_text(render(EVERY_KIND[kind](), {"Along the path": DRAWING}), encoding="utf-8")
+    file.write_text(render(replace(EVERY_KIND[kind](), figures={"Along the path": DRAWING})), encoding="utf-8")
     browser.problems.clear()
     browser.requests.clear()
     browser.size(width, 900)

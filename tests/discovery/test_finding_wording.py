@@ -23,6 +23,7 @@ from vrdp_prob.discovery.wording import (
     p_words,
     parameter_words,
     signed,
+    typeset,
     with_unit,
 )
 from vrdp_prob.models.effects.surface_tilt import SurfaceTilt
@@ -90,6 +91,18 @@ def test_p_values_and_probabilities() -> None:
 def test_lengths_stand_in_the_unit_that_suits_them() -> None:
     assert [length_unit([size])[1] for size in (2.0, 0.02, 0.00002, 0.0)] == ["m", "mm", "µm", "m"]
     assert length_unit([math.inf, 0.02]) == (1e3, "mm")
+
+
+@pytest.mark.parametrize(
+    ("plain", "seen"),
+    [
+        ("by 0.19 m/s^2 towards -37 degrees", f"by 0.19 m/s² towards {MINUS}37 degrees"),
+        ("tilt_y = -0.0119 ± 9.4e-05;", f"tilt_y = {MINUS}0.0119 ± 9.4{TIMES}10⁻⁵;"),
+        ("of run-1, 3-5 and case1e-05x", "of run-1, 3-5 and case1e-05x"),
+    ],
+)
+def test_a_sentence_is_typeset(plain: str, seen: str) -> None:
+    assert typeset(plain) == seen
 
 
 def test_parameters_are_described() -> None:

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from vrdp_prob.discovery.finding import Check, ComparedAnswer, Finding, FoundCause, Gain
-from vrdp_prob.discovery.page import NO_FIGURES, render
+from vrdp_prob.discovery.page import render
 from vrdp_prob.discovery.summary import verdict_sentence
 from vrdp_prob.files import write_atomically
 from vrdp_prob.models.physics import PhysicsModel
@@ -58,7 +58,7 @@ def to_document(finding: Finding, *, model: Path | None = None) -> dict[str, Any
     return {key: _strict(value) for key, value in document.items()}
 
 
-def write_finding(finding: Finding, directory: Path | str, *, figures: Mapping[str, str] = NO_FIGURES) -> FindingFiles:
+def write_finding(finding: Finding, directory: Path | str) -> FindingFiles:
     """Write finding.html, finding.json and model.toml into a folder, which is made where it is missing.
 
     Parameters
@@ -67,8 +67,6 @@ def write_finding(finding: Finding, directory: Path | str, *, figures: Mapping[s
         What was found.
     directory
         The folder.
-    figures
-        Figures for the page; see `vrdp_prob.discovery.page.render`.
 
     Raises
     ------
@@ -77,7 +75,7 @@ def write_finding(finding: Finding, directory: Path | str, *, figures: Mapping[s
     """
     files = FindingFiles.of(Path(directory))
     texts = (
-        render(finding, figures),
+        render(finding),
         json.dumps(to_document(finding, model=files.model), indent=1, allow_nan=False) + "\n",
         finding.extended.text,
     )

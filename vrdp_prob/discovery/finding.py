@@ -261,7 +261,8 @@ class Finding:
     notes
         Limits of the result, in sentences.
     figures
-        What the model misses, and the extended one, as SVG by title.
+        What the model misses, and the extended one: an SVG element as text by its title. One whose root has the class
+        `themed` uses the page's colours (`var(--ink)`, `var(--accent)`, ...); any other stands on white.
     answers
         Answers to questions about the videos under both models; None where nothing was asked or nothing is named.
     """

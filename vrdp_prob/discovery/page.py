@@ -1,7 +1,7 @@
 """finding.html: what was found, what it is worth, and what could have hidden, on one page that opens from disk."""
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 from markupsafe import Markup
@@ -22,13 +22,13 @@ from vrdp_prob.discovery.wording import (
     p_words,
     parameter_words,
     title,
+    typeset,
     with_unit,
 )
 from vrdp_prob.report.templating import asset, environment
 from vrdp_prob.report.wording import counted, listed, sentence
 from vrdp_prob.version import __version__
 
-NO_FIGURES: Mapping[str, str] = {}
 ALIKE = (
     "These leave nearly the same traces in such videos. Their probabilities say how well the videos tell them apart; "
     "other starts, speeds or places would tell more."
@@ -36,23 +36,14 @@ ALIKE = (
 NOT_EXCLUDED = "The likeliest causes of the catalogue. None of them explains the videos well enough to be named."
 
 
-def render(finding: Finding, figures: Mapping[str, str] = NO_FIGURES) -> str:
-    """The page as HTML text; the same finding gives the same text.
-
-    Parameters
-    ----------
-    finding
-        What was found.
-    figures
-        Figures of the residuals: a title and an SVG element as text. One whose root has the class `themed` uses the
-        page's colours (`var(--ink)`, `var(--accent)`, ...); any other stands on white.
-    """
+def render(finding: Finding) -> str:
+    """The page as HTML text; the same finding gives the same text."""
     named = finding.named
     values = {
         "css": asset("page.css"),
-        "verdict": verdict_sentence(finding),
-        "summary": summary(finding),
-        "notes": finding.notes,
+        "verdict": typeset(verdict_sentence(finding)),
+        "summary": [typeset(one) for one in summary(finding)],
+        "notes": [typeset(note) for note in finding.notes],
         "video_count": counted(len(finding.videos), "video"),
         "errors": error_figure(named) if named else None,
         "description": None if finding.description is None else _description(finding.description),
@@ -61,7 +52,7 @@ def render(finding: Finding, figures: Mapping[str, str] = NO_FIGURES) -> str:
         **_others(finding),
         "coverage": _coverage(named),
         "checks": _checks(finding),
-        "figures": [(name, _inline(figure, index)) for index, (name, figure) in enumerate(figures.items())],
+        "figures": [(name, _inline(figure, index)) for index, (name, figure) in enumerate(finding.figures.items())],
         "bounds": _bounds(finding),
         "bounds_lead": finding.verdict is Verdict.NONE and bool(finding.upper_bounds),
         **_model(finding),
@@ -74,7 +65,7 @@ def _cause(cause: FoundCause, finding: Finding) -> dict[str, Any]:
     said = chance(cause.probability)
     return {
         "title": title(cause.name),
-        "sentence": cause.sentence,
+        "sentence": typeset(cause.sentence),
         "chance": said,
         "bar": {
             "probability": round(cause.probability, 6),
@@ -150,12 +141,12 @@ def _fails(check: Check | None) -> bool:
 def _check(check: Check, after: Check | None) -> dict[str, Any]:
     return {
         "name": sentence(check.name),
-        "sentence": check.sentence,
+        "sentence": typeset(check.sentence),
         "p": p_words(check.p_value),
         "fails": check.significant,
         "p_after": UNDEFINED if after is None else p_words(after.p_value),
         "fails_after": _fails(after),
-        "sentence_after": after.sentence if after is not None and after.significant else "",
+        "sentence_after": typeset(after.sentence) if after is not None and after.significant else "",
     }
 
 
@@ -180,7 +171,7 @@ def _bounds(finding: Finding) -> list[dict[str, Any]]:
 
 def _description(description: Description) -> dict[str, Any]:
     return {
-        "sentences": description.sentences,
+        "sentences": [typeset(one) for one in description.sentences],
         "formula": description.formula,
         "size": with_unit(number(description.size), "m/s^2"),
         "explained": _percent(description.explained),

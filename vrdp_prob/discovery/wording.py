@@ -1,6 +1,7 @@
 """Numbers of a finding as a physicist reads them: rounded to what they mean, with their units."""
 
 import math
+import re
 from collections.abc import Iterable
 
 from vrdp_prob.discovery.finding import Estimate, Gain, UpperBound
@@ -62,6 +63,12 @@ def unit_words(unit: str) -> str:
     for plain, raised in UNIT_POWERS.items():
         unit = unit.replace(plain, raised)
     return unit
+
+
+def typeset(text: str) -> str:
+    """A sentence with raised powers and true minus signs where `1e-05` and `m/s^2` stand in it."""
+    raised = re.sub(r"(?<=\d)e([-+]\d+)\b", lambda found: TIMES + _power_of_ten(int(found[1])), unit_words(text))
+    return re.sub(r"(?<![\w.)])-(?=\d)", MINUS, raised)
 
 
 def estimate_words(estimate: Estimate) -> tuple[str, str]:

@@ -22,8 +22,7 @@ from tests.report.outline import Outline
 from vrdp_prob.discovery.changed_answers import answers_sentence
 from vrdp_prob.discovery.page import render
 from vrdp_prob.discovery.summary import lines, summary, verdict_sentence
-from vrdp_prob.discovery.wording import typeset
-from vrdp_prob.discovery.wording import TIMES
+from vrdp_prob.discovery.wording import TIMES, typeset
 
 DRAWING = """<?xml version="1.0"?>
 <!DOCTYPE svg PUBLIC "-//W3C//DTD SVG 1.1//EN" "http://www.w3.org/Graphics/SVG/1.1/DTD/svg11.dtd">

@@ -5,7 +5,7 @@ from unittest.mock import Mock, create_autospec
 import numpy as np
 import pytest
 
-from vrdp_prob.discovery import search
+from vrdp_prob.discovery import refits, search
 from vrdp_prob.discovery.trials import Trial
 from vrdp_prob.inference.several_videos.ascent import ImpossibleStartError
 from vrdp_prob.models.effects.surface_tilt import SurfaceTilt
@@ -21,7 +21,11 @@ def _refit(cause: str, gained: float, *, patches: bool = False) -> Mock:
 
 
 def _searcher(needed: float = 0.0) -> search._Searcher:
-    return search._Searcher((), seed=0, needed=needed, advance=lambda _count: None)
+    return search._Searcher(_refits(needed), seed=0, needed=needed)
+
+
+def _refits(needed: float = 0.0) -> refits.Refits:
+    return refits.Refits((), seed=0, needed=needed, advance=lambda _count: None)
 
 
 @pytest.mark.parametrize(("in_doubt", "order"), [(False, ["tilt", "drag", "kicks"]), (True, ["kicks", "tilt", "drag"])])
@@ -55,9 +59,9 @@ def test_two_causes_are_found_of_which_neither_stands_out_beside_chance(
     both: float, in_doubt: bool, is_found: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     nothing, tilt, second = _refit("", 0.0), _refit("tilt", -1.0), _refit("tilt+drag", both)
-    monkeypatch.setattr(search._Searcher, "_with_lost", lambda _self, trial: [second] if trial is tilt else [])
+    monkeypatch.setattr(refits.Refits, "with_lost", lambda _self, trial: [second] if trial is tilt else [])
     monkeypatch.setattr(search._Searcher, "_in_order", lambda _self, _trial, found: found)
-    monkeypatch.setattr(search._Searcher, "first", Mock())
+    monkeypatch.setattr(refits.Refits, "left", Mock())
     monkeypatch.setattr(search._Searcher, "doubted", lambda *_given: in_doubt)
     assert _searcher(needed=2.0)._pair(nothing, tilt) == ((tilt, second) if is_found else None)
 
@@ -99,14 +103,40 @@ def test_what_a_better_course_of_events_brings_is_no_merit_of_the_cause(
     nothing, winner, better = _refit("", 0.0), _refit("tilt", 10.0), _refit("better course", without)
     winner.without.return_value = better
 
+    monkeypatch.setattr(search, "happens_once", lambda _cause: False)
+    _judge_by_gain(monkeypatch)
+    base, found = _searcher(needed=2.0).chosen(nothing, search.Step(Mock(spec=refits.Left), (winner,)))
+    assert base.causes[0] == goes_on_from
+    assert (found and found.causes[0]) == taken
+
+
+@pytest.mark.parametrize(
+    ("found", "goes_on_from", "taken"),
+    [(9.0, "tilt searched anew", None), (0.0, "tilt", "kicks")],
+    ids=["a course that kicks stood for", "no other course"],
+)
+def test_videos_with_kicks_are_searched_anew_without_them(
+    found: float, goes_on_from: str, taken: str | None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    tilt, kicked, anew = _refit("tilt", 0.0), _refit("kicks", 10.0), _refit("tilt searched anew", found)
+    kicked.without.return_value, tilt.mended.return_value = tilt, anew
+    kicked.acting.return_value = [2]
+    asked: list[object] = []
+    monkeypatch.setattr(search, "doubtful", lambda _fits, among: asked.append(among) or among)
+    monkeypatch.setattr(search, "happens_once", lambda _cause: True)
+    _judge_by_gain(monkeypatch)
+    base, winner = _searcher(needed=2.0).chosen(tilt, search.Step(Mock(spec=refits.Left), (kicked,)))
+    assert base.causes[0] == goes_on_from
+    assert (winner and winner.causes[0]) == taken
+    assert asked == [[2]]
+
+
+def _judge_by_gain(monkeypatch: pytest.MonkeyPatch) -> None:
     def doubted(_self: object, trial: Trial, lesser: Trial, _divisor: object) -> bool:
         return bool((trial.log_density - lesser.log_density).sum() < 2.0)
 
-    monkeypatch.setattr(search._Searcher, "first", Mock())
+    monkeypatch.setattr(refits.Refits, "left", Mock())
     monkeypatch.setattr(search._Searcher, "doubted", doubted)
-    base, found = _searcher(needed=2.0).chosen(nothing, search.Step((), (), (winner,), np.ones(3)))
-    assert base.causes[0] == goes_on_from
-    assert (found and found.causes[0]) == taken
 
 
 def test_lost_videos_are_searched_once_and_only_where_refits_leave_something(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -117,14 +147,14 @@ def test_lost_videos_are_searched_once_and_only_where_refits_leave_something(mon
         asked.append(trial)
         return [lost]
 
-    monkeypatch.setattr(search._Searcher, "_new_refits", lambda _self, trial: [_refit("drag", 5.0)])
-    monkeypatch.setattr(search._Searcher, "_settled", lambda _self, trial, _found: trial is plain)
-    monkeypatch.setattr(search._Searcher, "_lost", searched)
-    searcher = _searcher()
-    assert [one.causes for one in searcher._with_lost(plain)] == [("drag",)]
+    monkeypatch.setattr(refits.Refits, "_new", lambda _self, trial: [_refit("drag", 5.0)])
+    monkeypatch.setattr(refits.Refits, "settled", lambda _self, trial, _found: trial is plain)
+    monkeypatch.setattr(refits.Refits, "_lost", searched)
+    found = _refits()
+    assert [one.causes for one in found.with_lost(plain)] == [("drag",)]
     for _ in range(2):
-        assert [one.causes for one in searcher._with_lost(leaving)] == [("tilt", "friction"), ("drag",)]
-    assert searcher._refits(leaving) == searcher._with_lost(leaving)
+        assert [one.causes for one in found.with_lost(leaving)] == [("tilt", "friction"), ("drag",)]
+    assert found.of(leaving) == found.with_lost(leaving)
     assert asked == [leaving]
 
 
@@ -132,10 +162,10 @@ def test_a_cause_with_which_no_joint_world_can_begin_is_left_out(monkeypatch: py
     def impossible(*_given: object, **_named: object) -> None:
         raise ImpossibleStartError
 
-    monkeypatch.setattr(search, "fit_together", impossible)
-    monkeypatch.setattr(search, "lost_videos", lambda _fit: [0])
-    monkeypatch.setattr(search, "causes_of_lost_videos", lambda *_given, **_named: [(SurfaceTilt(), 50.0)])
-    monkeypatch.setattr(search._Searcher, "first", lambda _self, _trial: Mock(scores=()))
+    monkeypatch.setattr(refits, "fit_together", impossible)
+    monkeypatch.setattr(refits, "lost_videos", lambda _fit: [0])
+    monkeypatch.setattr(refits, "causes_of_lost_videos", lambda *_given, **_named: [(SurfaceTilt(), 50.0)])
+    monkeypatch.setattr(refits.Refits, "left", lambda _self, _trial: Mock(scores=()))
     trial = _refit("", 0.0)
     trial.choices, trial.names, trial.fit = {}, (), Mock(fits=[])
-    assert _searcher()._lost(trial, []) == []
+    assert _refits()._lost(trial, []) == []

@@ -188,7 +188,7 @@ def _bounds(found: Search) -> list[UpperBound]:
     named = set(found.best.names)
     return [
         bound
-        for score in found.steps[-1].beside_chance
+        for score in found.steps[-1].left.beside_chance
         if score.effect.name not in named
         for bound in upper_bounds(score)
     ]

@@ -6,22 +6,21 @@ and importance sampling says what it weighs. Chains come in groups whose gradien
 
 import os
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float
 
 from vrdp_prob.inference.checkpoint import Checkpoint, kept
-from vrdp_prob.inference.curved_gaussian import CurvedGaussian
 from vrdp_prob.inference.diagnostics import Reported, drift, joined, ordered, settled
 from vrdp_prob.inference.importance import Weighted, smoothed_weights
 from vrdp_prob.inference.mixture import Jumps, Mixture
 from vrdp_prob.inference.mode_weights import doubts, weights_from_chains, weights_from_importance
-from vrdp_prob.inference.nuts_chain import Courses, Piece, Task
-from vrdp_prob.inference.nuts_worker import Workers, workers
+from vrdp_prob.inference.nuts_chain import Courses
+from vrdp_prob.inference.nuts_groups import AT_ONCE, Group, GroupRun
+from vrdp_prob.inference.nuts_worker import workers
 from vrdp_prob.inference.rate_steps import RateSteps
 from vrdp_prob.inference.samples import (
-    DIVERGENT_GOAL,
     ESS_GOAL,
     PARETO_K_GOAL,
     R_HAT_GOAL,
@@ -32,10 +31,10 @@ from vrdp_prob.inference.samples import (
 )
 from vrdp_prob.inference.shaping import Shaped, shaped, starting_places
 from vrdp_prob.models.simulator.work import metered, work_sentence
-from vrdp_prob.progress import Advance, ProgressDisplay, SilentProgress
+from vrdp_prob.progress import ProgressDisplay, SilentProgress
 
-GROUPS = 2
-"""Groups of chains per mode, one process each..."""
+GROUPS = AT_ONCE
+"""Groups of chains per mode..."""
 TOGETHER = 8
 """...and chains per group, whose gradients are computed together."""
 CHAINS = GROUPS * TOGETHER
@@ -45,14 +44,8 @@ WARM_UP = 30
 """Transitions that only adapt the step size: the mass matrix is the whitening, which other draws have shaped."""
 CHUNK = 25
 """Transitions per chain after which the draws are judged and kept on disk."""
-SHORTENINGS = 2
-"""How often steps are halved and chains begin anew where more than..."""
-TRIAL_GOAL = DIVERGENT_GOAL / 2
-"""...this share of the transitions diverges, since few transitions tell it badly..."""
-TRIAL_CHUNKS = 2
-"""...in up to so many chunks..."""
 TRIAL_SHARE = 0.5
-"""...while less than this share of the budgets is used up."""
+"""Share of the budgets from which on steps are no longer shortened."""
 MOST_GRADIENTS = 150_000
 """Gradients of all chains after which sampling stops; a minute on two cores of 2020."""
 WORK_LIMIT = 40_000_000
@@ -133,7 +126,7 @@ def sample_nuts(
     inhabited = [index for index in range(len(places)) if len(places) == 1 or modes[index].weight >= HARDLY_ANY]
     far = None if jumps is None else jumps.mixture
     groups = [
-        _Group(
+        Group(
             form.mixture.components[mode],
             mode,
             number,
@@ -149,13 +142,13 @@ def sample_nuts(
     count = min(os.cpu_count() or 1, MOST_PROCESSES) if processes is None else processes
     stage = (progress or SilentProgress()).stage("Sampling (NUTS), at most", total=most_gradients)
     with stage as advance, workers(count) as pool:
-        run = _Run(density, form.mixture, groups, checkpoint, pool, advance)
+        run = GroupRun(density, groups, checkpoint, pool, advance)
         run.further(warm_up)
         while True:
             run.further(CHUNK)
             if max(run.gradients / most_gradients, run.work / work_limit) < TRIAL_SHARE and run.with_shorter_steps():
                 continue
-            drawn = _in_proportion(run, inhabited, modes, np.random.default_rng(seed))
+            drawn = _in_proportion(run, form.mixture, inhabited, modes, np.random.default_rng(seed))
             enough = drawn.by_chain[..., 0].size >= draws and not drawn.missed
             if enough and settled(
                 drawn.by_chain, drawn.by_time, reported, r_hat=R_HAT_GOAL, effective=MARGIN * ESS_GOAL
@@ -187,131 +180,6 @@ def sample_nuts(
     )
 
 
-@dataclass
-class _Group:
-    """Chains in one mode, in the coordinates of its cloud."""
-
-    cloud: CurvedGaussian
-    mode: int
-    number: int
-    places: Float[np.ndarray, "chain dimension"]
-    seed: int
-    jumps: Mixture | None = None
-    rate_steps: RateSteps | None = None
-    courses: Courses | None = None
-    pieces: list[Piece] = field(default_factory=list)
-    step_size: float | None = None
-    warm_up_pieces: int = 0
-
-    @property
-    def name(self) -> str:
-        """Name of the piece that comes next."""
-        return f"mode_{self.mode}_group_{self.number}_piece_{len(self.pieces)}"
-
-    def task(self, density: LogDensity, transitions: int) -> Task:
-        """The piece that comes next; the first one finds the length of a step."""
-        places = self.pieces[-1].whitened[:, -1] if self.pieces else self.cloud.whitened(self.places)
-        own = np.random.SeedSequence([self.seed, self.mode, self.number, len(self.pieces)])
-        seeds = tuple(int(one) for one in own.generate_state(len(places)))
-        sizes = None if self.step_size is None else np.full(len(places), self.step_size)
-        return Task(density, self.cloud, places, sizes, transitions, seeds, self.jumps, self.rate_steps, self.courses)
-
-    def add(self, piece: Piece) -> None:
-        """Take a piece that was made; chains share a step length, since one alone finds it in few transitions badly."""
-        self.pieces.append(piece)
-        if self.step_size is None:
-            self.step_size, self.warm_up_pieces = float(np.median(piece.step_sizes)), 1
-
-    def shorten_steps(self) -> None:
-        """Halve the length of a step; what there is counts as warm-up."""
-        assert self.step_size is not None
-        self.step_size, self.warm_up_pieces = self.step_size / 2, len(self.pieces)
-
-    @property
-    def counted(self) -> list[Piece]:
-        """The pieces after the warm-up."""
-        return self.pieces[self.warm_up_pieces :]
-
-    @property
-    def points(self) -> Float[np.ndarray, "chain draw dimension"]:
-        """All draws after the warm-up."""
-        return self.cloud.points(np.concatenate([piece.whitened for piece in self.counted], axis=1))
-
-
-@dataclass
-class _Run:
-    """All groups of chains, and what they have cost."""
-
-    density: LogDensity
-    mixture: Mixture
-    groups: list[_Group]
-    checkpoint: Checkpoint | None
-    pool: Workers
-    advance: Advance
-    shortened: int = 0
-
-    def further(self, transitions: int) -> None:
-        """One more piece of every group: those that were kept, and the others made now, a few at a time."""
-        wanting = []
-        for group in self.groups:
-            found = self.checkpoint.arrays(group.name) if self.checkpoint is not None else None
-            if found is None:
-                wanting.append(group)
-            else:
-                group.add(Piece.of_arrays(found))
-        for begin in range(0, len(wanting), GROUPS):
-            several = wanting[begin : begin + GROUPS]
-            made = self.pool.make([group.task(self.density, transitions) for group in several])
-            for group, piece in zip(several, made, strict=True):
-                if self.checkpoint is not None:
-                    self.checkpoint.keep(group.name, piece.arrays())
-                group.add(piece)
-                self.advance(piece.gradients)
-
-    def with_shorter_steps(self) -> bool:
-        """Whether so many transitions diverged at first that all chains begin anew with shorter steps."""
-        many = self.divergences > TRIAL_GOAL * self.transitions
-        if not many or self.shortened == SHORTENINGS or len(self.groups[0].counted) > TRIAL_CHUNKS:
-            return False
-        for group in self.groups:
-            group.shorten_steps()
-        self.shortened += 1
-        return True
-
-    def points(self, mode: int) -> Float[np.ndarray, "chain draw dimension"]:
-        """All draws of the chains of a mode."""
-        return np.concatenate([group.points for group in self.groups if group.mode == mode])
-
-    @property
-    def gradients(self) -> int:
-        """Gradients of all chains."""
-        return sum(piece.gradients for group in self.groups for piece in group.pieces)
-
-    @property
-    def work(self) -> int:
-        """Work of all chains."""
-        return sum(piece.work for group in self.groups for piece in group.pieces)
-
-    @property
-    def transitions(self) -> int:
-        """Transitions of all chains after the warm-up."""
-        return sum(piece.whitened[..., 0].size for piece in self._counted)
-
-    @property
-    def divergences(self) -> int:
-        """Transitions after the warm-up that diverged within a course of events."""
-        return sum(piece.divergences for piece in self._counted)
-
-    @property
-    def cliffs(self) -> int:
-        """Transitions after the warm-up that ended where a contact comes or goes."""
-        return sum(piece.cliffs for piece in self._counted)
-
-    @property
-    def _counted(self) -> list[Piece]:
-        return [piece for group in self.groups for piece in group.counted]
-
-
 @dataclass(frozen=True)
 class _Drawn:
     """Draws of all modes in proportion to what these weigh.
@@ -332,7 +200,11 @@ class _Drawn:
 
 
 def _in_proportion(
-    run: _Run, inhabited: list[int], modes: tuple[ModeWeight, ...], generator: np.random.Generator
+    run: GroupRun,
+    mixture: Mixture,
+    inhabited: list[int],
+    modes: tuple[ModeWeight, ...],
+    generator: np.random.Generator,
 ) -> _Drawn:
     """The draws of each result's chains, thinned to the modes' weights.
 
@@ -343,7 +215,7 @@ def _in_proportion(
     by_result = np.concatenate([one.reshape(RESULTS, -1, *one.shape[1:]) for one in chains], axis=1)
     if len(inhabited) == 1:
         return _Drawn(joined(by_result), ordered(by_result))
-    regions = run.mixture.regions(by_result.reshape(-1, run.mixture.dimension)).reshape(by_result.shape[:3])
+    regions = mixture.regions(by_result.reshape(-1, mixture.dimension)).reshape(by_result.shape[:3])
     counts = np.array([(regions == mode).sum(axis=(1, 2)).min() for mode in inhabited])
     weights = np.array([modes[mode].weight for mode in inhabited])
     there = counts >= FEWEST_IN_MODE
@@ -352,7 +224,7 @@ def _in_proportion(
         return _Drawn(joined(by_result), ordered(by_result), missed)
     wanted = np.floor(weights[there] * (counts[there] / weights[there]).min()).astype(int)
     labels = generator.permutation(np.repeat(held, wanted))
-    shape = (RESULTS, len(labels), run.mixture.dimension)
+    shape = (RESULTS, len(labels), mixture.dimension)
     drawn = _Drawn(np.empty(shape), np.empty(shape), missed)
     for points, where, by_chain, by_time in zip(by_result, regions, drawn.by_chain, drawn.by_time, strict=True):
         for mode, count in zip(held, wanted, strict=True):

@@ -1,0 +1,210 @@
+"""Refits with one more cause: which causes are tried on a model, and with what lost or hidden things beside them."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from functools import partial
+
+import numpy as np
+from jaxtyping import Float
+
+from vrdp_prob.discovery.overdispersion import overdispersion
+from vrdp_prob.discovery.proposals import hidden_things
+from vrdp_prob.discovery.scores import CauseScore, happens_once, score_causes
+from vrdp_prob.discovery.single_videos import causes_of_lost_videos, lost_videos
+from vrdp_prob.discovery.trials import Trial, gain, with_own_population
+from vrdp_prob.inference.parallel import in_processes
+from vrdp_prob.inference.several_videos.ascent import ImpossibleStartError
+from vrdp_prob.inference.several_videos.fitting import fit_together
+from vrdp_prob.models.effects.effect import Effect
+from vrdp_prob.models.effects.external_impulse import ExternalImpulse
+from vrdp_prob.progress import Advance
+
+SHORTLIST_LEVEL = 0.01
+"""Causes whose score chance makes as large more often are not refitted."""
+CLOSE = 0.5
+"""Share of the largest statistic below which a cause is refitted only if those above it leave something."""
+HOPEFUL = 0.2
+"""Share of the largest statistic below which a cause cannot be the best one, nor a rival of it."""
+MOST_REFITTED = 5
+SHORT, MENDINGS = 0.5, 3
+"""Share of what was promised or brought by another that a cause must bring, and number of refits searched anew."""
+
+
+@dataclass(frozen=True)
+class Left:
+    """What a model leaves, by the causes that may be behind it.
+
+    Parameters
+    ----------
+    scores
+        Scores of all further causes, the least probable by chance first, where all that is left is noise.
+    beside_chance
+        The same beside what the model leaves to chance.
+    overdispersion
+        Of each video, by what the model leaves unexplained.
+    """
+
+    scores: tuple[CauseScore, ...]
+    beside_chance: tuple[CauseScore, ...]
+    overdispersion: Float[np.ndarray, "video"]
+
+
+@dataclass(frozen=True)
+class Refits:
+    """The refits of models with one more cause, each made the first time that it is asked for.
+
+    Parameters
+    ----------
+    catalogue
+        Causes that are looked for.
+    seed
+        Of the null distributions and of searches.
+    needed
+        Gain (nats) in the predictive density that a cause must bring.
+    advance
+        Told of each refit.
+    """
+
+    catalogue: tuple[Effect, ...]
+    seed: int
+    needed: float
+    advance: Advance
+    _left: dict[Trial, Left] = field(default_factory=dict)
+    _made: dict[Trial, list[Trial]] = field(default_factory=dict)
+    _searched: set[Trial] = field(default_factory=set)
+
+    def left(self, trial: Trial) -> Left:
+        """What a model leaves."""
+        if trial not in self._left:
+            further = [effect for effect in self.catalogue if effect.name not in trial.names]
+            found = trial.unexplained
+            scores = beside = score_causes(trial.fit, found.plain, further, seed=self.seed)
+            if found.accelerated:
+                beside = score_causes(trial.fit, found.model, further, seed=self.seed)
+            self._left[trial] = Left(tuple(scores), tuple(beside), overdispersion(found.model, seed=self.seed))
+        return self._left[trial]
+
+    def of(self, trial: Trial) -> list[Trial]:
+        """Refits of a model, the best first."""
+        if trial not in self._made:
+            self._made[trial] = self._new(trial)
+        return self._made[trial]
+
+    def _new(self, trial: Trial) -> list[Trial]:
+        """Hidden things are tried only where nothing explains the videos better than kicks do."""
+        scores = self.left(trial).scores
+        likely = _shortlist(scores)
+        close = [one for one in likely if one.size > CLOSE * likely[0].size]
+        found = self.made_of(trial, close)
+        if not self.settled(trial, found):
+            found += self.made_of(trial, [one for one in likely if one not in close])
+            found.sort(key=merit, reverse=True)
+        kicks = next((one for one in scores if isinstance(one.effect, ExternalImpulse) and one.sites), None)
+        if kicks is not None and (not found or found[0].causes[-1].name == kicks.effect.name):
+            found += self._hidden(trial, found, kicks)
+        return sorted(found, key=merit, reverse=True)
+
+    def with_lost(self, trial: Trial) -> list[Trial]:
+        """The refits, and where they leave something fits from the beginning, which count among them from then on."""
+        found = self.of(trial)
+        if trial not in self._searched and not self.settled(trial, found):
+            self._searched.add(trial)
+            found = self._made[trial] = sorted([*found, *self._lost(trial, found)], key=merit, reverse=True)
+        return found
+
+    def settled(self, trial: Trial, found: Sequence[Trial]) -> bool:
+        """Whether the best cause leaves nothing to explain, and is not a kick in each of several videos."""
+        if not found or gain(found[0], trial)[0] < self.needed:
+            return False
+        if _mends_several(found[0]):
+            return False
+        left = self.left(found[0]).beside_chance
+        return min((one.p_value for one in left), default=1.0) * len(left) > SHORTLIST_LEVEL
+
+    def _lost(self, trial: Trial, found: Sequence[Trial]) -> list[Trial]:
+        """Fits from the beginning, with causes that explain videos whose course of events nothing else explains.
+
+        What happens once in each of several videos explains none of them: kicks mend any course.
+        """
+        if trial.choices:
+            return []
+        left = [effect for effect in self.catalogue if effect.name not in trial.names]
+        likely = {one.effect.name for one in _shortlist(self.left(trial).scores)}
+        reached = {one.causes[-1].name: one.brought(trial) for one in reversed(found)}
+        best = next((one.fit for one in found if not _mends_several(one)), trial.fit)
+        still_lost = lost_videos(best)
+        lost = [one for one in lost_videos(trial.fit) if one in still_lost]
+        told = causes_of_lost_videos(trial.fit, lost, left, likely, self.needed, seed=self.seed)
+        again = [effect for effect, promised in told if reached.get(effect.name, 0.0) < promised]
+
+        def searched(effect: Effect) -> Trial | None:
+            model = trial.fit.model.with_effect(effect)
+            tracks = [part.clues.tracks for part in trial.fit.fits]
+            try:
+                fit = fit_together(tracks, model=model, shared=trial.fit.shared, seed=self.seed, model_error=False)
+                return Trial((*trial.causes, effect), with_own_population(fit), trial.choices)
+            except ImpossibleStartError:  # what single videos say of the cause fits no world of all of them
+                return None
+            finally:
+                self.advance(1)
+
+        return [one for one in map(searched, again) if one is not None]
+
+    def _hidden(self, trial: Trial, found: Sequence[Trial], kicks: CauseScore) -> list[Trial]:
+        """Fits with something unseen in the place of kicks."""
+        kicked = next((one for one in found if one.causes[-1].name == kicks.effect.name), None)
+        kicked = kicked or next(iter(self.made_of(trial, [kicks])), None)
+        if kicked is None:
+            return []
+        left = [effect for effect in self.catalogue if effect.name not in trial.names]
+        starts = hidden_things(kicked.fit, left, kicks.p_value)
+        return self._all(partial(kicked.with_cause_in_place, least=trial.fit.joint.log_density), starts)
+
+    def made_of(self, trial: Trial, scores: Sequence[CauseScore]) -> list[Trial]:
+        """Fits with one cause more, the best first.
+
+        Where the score of a cause promises more than any refit has brought, and its own brought far less, videos have
+        lost their course of events on the way to it, and are searched anew.
+        """
+        found = self._all(trial.with_cause, scores)
+        promised = {one.effect.name: one.size / 2 for one in scores if not happens_once(one.effect)}
+        for _ in range(MENDINGS):
+            most = max((one.brought(trial) for one in found), default=0.0)
+            short = [
+                one
+                for one in found
+                if promised.get(one.causes[-1].name, 0.0) > max(most, one.brought(trial) / SHORT, 0.0)
+                and one.fallen_from(trial)
+            ]
+            if not short:
+                break
+            hopeful = max(short, key=lambda one: promised[one.causes[-1].name])
+            mended = hopeful.mended(hopeful.fallen_from(trial), seed=self.seed)
+            if mended is hopeful:
+                promised.pop(hopeful.causes[-1].name)
+            found = [mended if one is hopeful else one for one in found]
+        most = max((one.brought(trial) for one in found), default=0.0)
+        close = [one for one in found if one.brought(trial) > SHORT * most > 0]
+        rest = [one for one in found if one not in close]
+        return sorted([*in_processes(Trial.continued, close), *rest], key=merit, reverse=True)
+
+    def _all(self, refit: Callable[[CauseScore], Trial | None], scores: Sequence[CauseScore]) -> list[Trial]:
+        return [one for one in in_processes(refit, scores, advance=self.advance) if one is not None]
+
+
+def merit(trial: Trial) -> float:
+    """By which models are ordered: what they predict of left-out videos, less what their causes are believed less."""
+    return float(trial.log_density.sum()) + trial.log_prior
+
+
+def _mends_several(trial: Trial) -> bool:
+    """Whether the last cause of a model happens once in each of several videos."""
+    cause = trial.causes[-1]
+    return happens_once(cause) and len(trial.acting(cause)) > 1
+
+
+def _shortlist(scores: Sequence[CauseScore]) -> list[CauseScore]:
+    """Causes that may be the best one, or come near it."""
+    largest = max((one.size for one in scores), default=0.0)
+    hopeful = [one for one in scores if one.p_value < SHORTLIST_LEVEL and one.size > HOPEFUL * largest]
+    return sorted(hopeful, key=lambda one: -one.size)[:MOST_REFITTED]

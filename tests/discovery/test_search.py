@@ -112,7 +112,7 @@ def test_what_a_better_course_of_events_brings_is_no_merit_of_the_cause(
 
 @pytest.mark.parametrize(
     ("found", "goes_on_from", "taken"),
-    [(9.0, "tilt searched anew", None), (0.0, "tilt", "kicks")],
+    [(9.5, "tilt searched anew", None), (0.0, "tilt", "kicks")],
     ids=["a course that kicks stood for", "no other course"],
 )
 def test_videos_with_kicks_are_searched_anew_without_them(

@@ -14,6 +14,7 @@ from vrdp_prob.discovery.checks import run_checks
 from vrdp_prob.discovery.finding import Check
 from vrdp_prob.discovery.free_flight import FreeFlight
 from vrdp_prob.discovery.free_flight_checks import QUESTIONS
+from vrdp_prob.discovery.free_flight_patterns import patterns, spanned
 from vrdp_prob.discovery.measurement_checks import GENERAL
 from vrdp_prob.discovery.residual_model import ResidualModel
 
@@ -100,6 +101,18 @@ def test_a_tilt_is_a_push_in_one_direction_of_its_size() -> None:
 def test_the_check_of_the_effect_is_among_those_that_lead(way: str, names: tuple[str, ...]) -> None:
     _, fit = fitted(way, 4.0, seed=5, setting=LARGER)
     assert set(names) & set(leading(run_checks(fit, seed=0), 3))
+
+
+def test_nothing_is_said_of_an_axis_across_which_bodies_hardly_move() -> None:
+    along = np.linspace(0.0, 1.0, 50)
+    assert spanned(np.stack([along, 1e-3 * along], axis=1)) == (0,)
+    assert spanned(np.stack([along, 0.1 * along], axis=1)) == (0, 1)
+    flight = FreeFlight.of(ResidualModel.of(fitted(seed=1)[1]))
+    names = {one.name for one in patterns(replace(flight.scales, axes=(0,)))}
+    assert {"push x x", "push y x", "along x", "along distance", "across speed x"} < names
+    assert names.isdisjoint({"push x y", "push y y", "along y", "across speed y"})
+    (distance,) = (one for one in patterns(replace(flight.scales, axes=(0,))) if one.name == "along distance")
+    assert "y" not in distance.formula
 
 
 @pytest.mark.slow

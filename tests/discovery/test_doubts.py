@@ -3,9 +3,10 @@
 import pytest
 
 from tests.discovery.fitted import SMALL, fitted
+from vrdp_prob.discovery import discover as module
 from vrdp_prob.discovery.checks import run_checks
-from vrdp_prob.discovery.doubts import OWN_CHECKS, doubts
-from vrdp_prob.discovery.finding import Check
+from vrdp_prob.discovery.doubts import OWN_CHECKS, Doubt, doubts
+from vrdp_prob.discovery.finding import Check, Verdict
 from vrdp_prob.discovery.trials import Trial
 from vrdp_prob.models.effects.effect import Effect
 from vrdp_prob.models.effects.speed_dependent_restitution import SpeedDependentRestitution
@@ -49,3 +50,19 @@ def test_checks_and_causes_go_by_their_names(trial: Trial) -> None:
     names = {one.name for one in run_checks(trial.fit, seed=0)}
     assert known_effects().keys() >= OWN_CHECKS.keys()
     assert names >= {name for name in OWN_CHECKS.values() if "friction of the bodies" not in name}
+
+
+def test_a_doubted_cause_is_told_of_and_not_part_of_the_extended_model(monkeypatch: pytest.MonkeyPatch) -> None:
+    data, _ = fitted("surface_tilt", 5.0, seed=2, setting=SMALL)
+    monkeypatch.setattr(module, "doubts", lambda *_given: [Doubt(0.1, "It is something else.")])
+    finding = module.discover(data.tracks, catalogue=[SurfaceTilt()], processes=1)
+    assert finding.verdict is Verdict.UNKNOWN
+    assert finding.named == ()
+    assert finding.extended.effects == finding.model.effects
+    assert finding.checks_after == finding.checks
+    (tilt,) = finding.causes
+    assert tilt.name == SurfaceTilt.name
+    assert tilt.probability < 0.11
+    assert "It is something else." in finding.notes
+    assert finding.description is not None
+    assert "e" in finding.description.formula  # of what the model that was given leaves

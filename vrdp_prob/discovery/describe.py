@@ -9,7 +9,7 @@ from vrdp_prob.discovery.checks import run_checks
 from vrdp_prob.discovery.finding import Check, Description
 from vrdp_prob.discovery.free_flight import FreeFlight
 from vrdp_prob.discovery.free_flight_checks import BESIDE
-from vrdp_prob.discovery.free_flight_patterns import SYMBOLS, Pattern
+from vrdp_prob.discovery.free_flight_patterns import SYMBOLS, Pattern, spanned
 from vrdp_prob.discovery.measurement_checks import GENERAL, roughness
 from vrdp_prob.discovery.missing_acceleration import Separate, Windows, missing_acceleration
 from vrdp_prob.discovery.residual_model import ResidualModel
@@ -111,8 +111,7 @@ def _window_sentences(windows: Windows) -> Iterator[str]:
     aspects = (
         ("speeds", windows.speed, "m/s"),
         ("times", windows.time, "s"),
-        ("x", windows.position[:, 0], "m"),
-        ("y", windows.position[:, 1], "m"),
+        *(("xy"[axis], windows.position[:, axis], "m") for axis in spanned(windows.position)),
         ("distances from the middle of the plane", np.linalg.norm(windows.position - middle, axis=1), "m"),
     )
     for name, values, unit in aspects:

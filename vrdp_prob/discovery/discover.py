@@ -1,7 +1,7 @@
 """The search for what a model lacks."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from jaxtyping import Float
@@ -9,7 +9,7 @@ from jaxtyping import Float
 from vrdp_prob.discovery.checking import check_video_count
 from vrdp_prob.discovery.checks import run_checks
 from vrdp_prob.discovery.describe import describe
-from vrdp_prob.discovery.doubts import doubts
+from vrdp_prob.discovery.doubts import Doubt, doubts
 from vrdp_prob.discovery.estimates import cause_sentence, estimates, upper_bounds
 from vrdp_prob.discovery.figures import residual_figures
 from vrdp_prob.discovery.finding import Check, Finding, FoundCause, Gain, UpperBound, Verdict
@@ -85,20 +85,25 @@ def discover(
             found, unlisted = without_mimics(found, laws, seed=seed, progress=progress)
             if unlisted is not None and unlisted.mimics:
                 after = _checks_after(found, checks, seed)
-    causes = _causes(found, after, seed)
-    verdict = Verdict.UNKNOWN if unlisted is not None else _verdict(found, after)
+        doubted = {
+            cause: reasons for cause in found.best.causes if (reasons := tuple(doubts(found.best, cause, after)))
+        }
+        kept = found.without(list(doubted))
+        verdict = Verdict.UNKNOWN if unlisted is not None or doubted else _verdict(kept, after)
+        causes = _causes(found, doubted, seed)
+        after = _checks_after(kept, checks, seed) if doubted else after
     return Finding(
         verdict=verdict,
         causes=tuple(causes),
         checks=checks,
         checks_after=after,
-        upper_bounds=tuple(_bounds(found)),
+        upper_bounds=tuple(_bounds(kept)),
         model=physics,
-        extended=found.best.fit.model,
+        extended=kept.best.fit.model,
         videos=tuple(tracks.video for tracks in videos),
-        description=describe(found.best.fit, seed=seed) if verdict is Verdict.UNKNOWN else None,
-        notes=tuple(_notes(found, after, unlisted)),
-        figures=residual_figures(found.base.fit, found.best.fit if found.best.causes else None),
+        description=describe(kept.best.fit, seed=seed) if verdict is Verdict.UNKNOWN else None,
+        notes=tuple(_notes(kept, [one for reasons in doubted.values() for one in reasons], unlisted)),
+        figures=residual_figures(kept.base.fit, kept.best.fit if kept.best.causes else None),
     )
 
 
@@ -117,8 +122,6 @@ def _verdict(found: Search, after: Sequence[Check]) -> Verdict:
     left = min((check.p_value for check in after), default=1.0) * len(after) < LEFT_LEVEL
     if not found.best.causes:
         return Verdict.UNKNOWN if left else Verdict.NONE
-    if any(True for cause in found.best.causes for _ in doubts(found.best, cause, after)):
-        return Verdict.UNKNOWN
     before, now = _excess(found.base), _excess(found.best)
     return Verdict.UNKNOWN if left and now > (1 - EXPLAINED) * before else Verdict.NAMED
 
@@ -128,7 +131,7 @@ def _excess(trial: Trial) -> float:
     return max(float(np.mean([part.misfit.chi_square for part in trial.fit.fits])) - 1.0, 0.0)
 
 
-def _causes(found: Search, after: Sequence[Check], seed: int) -> list[FoundCause]:
+def _causes(found: Search, doubted: Mapping[Effect, Sequence[Doubt]], seed: int) -> list[FoundCause]:
     """The causes of the best model, and those that could take the place of one."""
     named: list[FoundCause] = []
     others: list[FoundCause] = []
@@ -140,9 +143,9 @@ def _causes(found: Search, after: Sequence[Check], seed: int) -> list[FoundCause
         log_prior.insert(1, 0.0)
         shares = weights(trials, log_prior, np.random.default_rng(seed), overdispersion=found.overdispersion)
         cause = found.best.causes[number]
-        doubted = list(doubts(found.best, cause, after))
-        probability = float(shares[0]) * math.prod(one.credible for one in doubted)
-        named.append(_cause(found.best, cause, lesser, found.overdispersion, probability, named=not doubted))
+        reasons = doubted.get(cause, ())
+        probability = float(shares[0]) * math.prod(one.credible for one in reasons)
+        named.append(_cause(found.best, cause, lesser, found.overdispersion, probability, named=not reasons))
         for rival, share in zip(best_of.values(), shares[2:], strict=True):
             if share >= LEAST_SHARE:
                 probability = float(share) * math.prod(one.credible for one in doubts(rival, rival.causes[-1]))
@@ -194,7 +197,7 @@ def _bounds(found: Search) -> list[UpperBound]:
     ]
 
 
-def _notes(found: Search, after: Sequence[Check], unlisted: Unlisted | None) -> list[str]:
+def _notes(found: Search, doubted: Sequence[Doubt], unlisted: Unlisted | None) -> list[str]:
     notes = []
     if unlisted is not None:
         notes.append(_unlisted_note(unlisted))
@@ -202,7 +205,7 @@ def _notes(found: Search, after: Sequence[Check], unlisted: Unlisted | None) -> 
         notes.append(
             "The joint fit ended before it had converged: some video is at the edge between two courses of events."
         )
-    notes += [one.sentence for cause in found.best.causes for one in doubts(found.best, cause, after)]
+    notes += [one.sentence for one in doubted]
     largest = found.best.unexplained.accelerated
     if largest:
         sizes = [f"{one.size:.2g}" for one in sorted(largest, key=lambda one: one.size)]

@@ -88,8 +88,7 @@ QUESTIONS = (
         ("along x", "along y", "along distance"),
         lambda part: (
             f"along their velocity bodies are accelerated by {number(part.size)} m/s^2 (root mean square) in "
-            f"a way that changes with the place: {by(part.estimate('along x'), 'm/s^2 per m along x')}, "
-            f"{by(part.estimate('along y'), 'm/s^2 per m along y')}"
+            f"a way that changes with the place: {_by_place(part, 'along')}"
         ),
     ),
     Question(
@@ -236,7 +235,17 @@ def _direction(part: Part, names: Sequence[str]) -> str:
     return direction_words(x, y)
 
 
+def _by_place(part: Part, what: str) -> str:
+    """How fast something changes along each axis along which bodies move."""
+    shown = {one.name for one in part.patterns}
+    return ", ".join(
+        by(part.estimate(f"{what} {axis}"), f"m/s^2 per m along {axis}") for axis in "xy" if f"{what} {axis}" in shown
+    )
+
+
 def _spreading(part: Part) -> str:
+    if len(part.patterns) < 4:
+        return " and ".join(f"towards {towards} {_by_place(part, f'push {towards}')}" for towards in "xy")
     xx, xy, yx, yy = (part.estimate(f"push {a} {b}") for a in "xy" for b in "xy")
     away, turn = (xx + yy) / 2, (yx - xy) / 2
     outward = opposite(away, "towards a middle", "away from a middle")

@@ -15,6 +15,8 @@ SLOWEST_SHAKING, MOST_SHAKINGS = 0.5, 16
 """Periods in the longest video of the slowest shaking that is looked for, and how many multiples of it at most."""
 FASTEST_SHAKING = 0.25
 """Shaking is looked for up to this share of the frame rate."""
+FLAT = 0.01
+"""Bodies move along a line where their places spread across it by a smaller share of what they do along it."""
 DECAY = 0.4
 """Share of the typical speed over which what acts on slow bodies alone fades."""
 
@@ -56,6 +58,8 @@ class Scales:
         Median speed in m/s of what moves.
     middle
         Middle in m of the places where bodies moved.
+    axes
+        Axes along which these places differ: both, unless everything moves along one.
     materials
         All materials that are stated.
     shapes
@@ -72,6 +76,7 @@ class Scales:
 
     speed: float
     middle: Float[np.ndarray, "2"]
+    axes: tuple[int, ...]
     materials: tuple[str, ...]
     shapes: frozenset[Shape]
     weighed: bool
@@ -106,6 +111,7 @@ class Scales:
         return cls(
             float(np.median(speeds)) if len(speeds) else 1.0,
             np.median(places, axis=0) if len(places) else np.zeros(2),
+            spanned(places),
             tuple(sorted({body.material for body in bodies if body.material is not None})),
             frozenset(body.shape for body in bodies),
             all(body.mass is not None for body in bodies),
@@ -116,20 +122,28 @@ class Scales:
         )
 
 
+def spanned(places: Float[np.ndarray, "place 2"]) -> tuple[int, ...]:
+    """Axes along which places differ, more than by the noise of a motion along the other one."""
+    spread = places.std(axis=0) if len(places) else np.ones(2)
+    return tuple(int(axis) for axis in np.flatnonzero(spread >= FLAT * spread.max()))
+
+
 def patterns(scales: Scales) -> Iterator[Pattern]:
     """All patterns that videos of such scales can show."""
     places = scales.place_words
     for axis, letter in enumerate("xy"):
         yield Pattern(f"push {letter}", _push(axis), f"e{letter}")
         yield Pattern(f"push {letter} speed", _push(axis, lambda m: m.speed), f"|v| e{letter}")
-        for other, name in enumerate("xy"):
-            yield Pattern(f"push {letter} {name}", _push(axis, _place(scales, other)), f"{places[other]} e{letter}")
+        for other in scales.axes:
+            yield Pattern(
+                f"push {letter} {'xy'[other]}", _push(axis, _place(scales, other)), f"{places[other]} e{letter}"
+            )
     for name, factor, words in _factors(scales):
         yield Pattern(f"along {name}", _along(factor), f"{words} u")
     yield Pattern("across", _across(lambda m: np.ones_like(m.speed)), "n")
     yield Pattern("across speed", _across(lambda m: m.speed), "|v| n")
-    for axis, letter in enumerate("xy"):
-        yield Pattern(f"across speed {letter}", _across(_turning(_place(scales, axis))), f"{places[axis]} |v| n")
+    for axis in scales.axes:
+        yield Pattern(f"across speed {'xy'[axis]}", _across(_turning(_place(scales, axis))), f"{places[axis]} |v| n")
     yield Pattern("across speed time", _across(_turning(_clock)), "t |v| n")
     yield Pattern("across cosine", _across(_heading(np.cos)), "cos(2 phi) n")
     yield Pattern("across sine", _across(_heading(np.sin)), "sin(2 phi) n")
@@ -158,14 +172,15 @@ Factor = Callable[[FittedMotion], Float[np.ndarray, "time body"]]
 def _factors(scales: Scales) -> Iterator[tuple[str, Factor, str]]:
     """What an acceleration along the velocity may depend on, and the words of a formula for it."""
     decay = DECAY * scales.speed
-    x, y = scales.place_words
+    words = [scales.place_words[axis] for axis in scales.axes]
     yield "speed", lambda m: m.speed, "|v|"
     yield "slowness", lambda m: np.exp(-m.speed / decay), f"exp(-|v|/{decay:.2g})"
     yield "cosine", _heading(np.cos), "cos(2 phi)"
     yield "sine", _heading(np.sin), "sin(2 phi)"
-    yield "x", _place(scales, 0), x
-    yield "y", _place(scales, 1), y
-    yield "distance", lambda m: _place(scales, 0)(m) ** 2 + _place(scales, 1)(m) ** 2, f"({x}^2 + {y}^2)"
+    for axis, word in zip(scales.axes, words, strict=True):
+        yield "xy"[axis], _place(scales, axis), word
+    squares = " + ".join(f"{word}^2" for word in words)
+    yield "distance", _square_distance(scales), f"({squares})"
     yield "time", _clock, "t"
     yield "way", _way, "s"
     if scales.turning:
@@ -206,6 +221,12 @@ def _turning(factor: Factor) -> Factor:
 
 def _place(scales: Scales, axis: int) -> Factor:
     return lambda motion: motion.position[..., axis] - scales.middle[axis]
+
+
+def _square_distance(scales: Scales) -> Factor:
+    """Square of the distance from the middle, along the axes along which bodies move."""
+    axes = list(scales.axes)
+    return lambda motion: ((motion.position - scales.middle)[..., axes] ** 2).sum(axis=-1)
 
 
 def _clock(motion: FittedMotion) -> Float[np.ndarray, "time body"]:

@@ -7,7 +7,7 @@ of each: of the motion, of the rebound, or of both, by what remains.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
@@ -87,7 +87,7 @@ def without_mimics(
         advance(1)
         if alone is not None and _merit(alone, best, found) > 0:
             gained = gain(alone, best, found.overdispersion)
-            return _without(found, best.causes), Unlisted(tuple(laws), best.names, *gained)
+            return found.without(best.causes), Unlisted(tuple(laws), best.names, *gained)
         others = [lesser for lesser in found.lesser if lesser is not found.base]
         refitted = in_processes(with_laws, others, advance=advance)
     instead = {found.base: alone, **dict(zip(others, refitted, strict=True))}
@@ -98,7 +98,7 @@ def without_mimics(
     ]
     names = tuple(one.name for one in mimics)
     explained = Unlisted(tuple(laws), names, *gain(beside, best, found.overdispersion))
-    return (_without(found, mimics) if mimics else found), explained
+    return found.without(mimics), explained
 
 
 def _with_laws(trial: Trial, laws: Sequence[Effect], seed: int) -> Trial | None:
@@ -124,16 +124,3 @@ def _believed(found: Search, beside: Trial, lesser: Trial, instead: Trial | None
     log_prior = [trial.log_prior + odds for trial, odds in compared]
     shares = weights(trials, log_prior, np.random.default_rng(seed), overdispersion=found.overdispersion)
     return float(shares[:2].sum())
-
-
-def _without(found: Search, mimics: Sequence[Effect]) -> Search:
-    """The search with a best model that lacks some causes."""
-    left = [k for k, cause in enumerate(found.best.causes) if cause not in mimics]
-    if not left:
-        return replace(found, best=found.base, lesser=(), rivals=())
-    best = found.best
-    for cause in mimics:
-        best = best.without(cause)
-    best = best.continued()
-    lesser = tuple(best.without(cause).continued() for cause in best.causes)
-    return replace(found, best=best, lesser=lesser, rivals=tuple(() for _ in lesser))

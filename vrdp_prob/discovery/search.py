@@ -1,7 +1,7 @@
 """Forward selection of causes by how well whole videos are predicted that the model was not fitted to."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Float
@@ -75,6 +75,20 @@ class Search:
     rivals: tuple[tuple[Trial, ...], ...]
     needed: float
     overdispersion: Float[np.ndarray, "video"]
+
+    def without(self, causes: Sequence[Effect]) -> "Search":
+        """The search with a best model that lacks some of its causes."""
+        if not causes:
+            return self
+        left = [cause for cause in self.best.causes if cause not in causes]
+        if not left:
+            return replace(self, best=self.base, steps=self.steps[:1], lesser=(), rivals=())
+        best = self.best
+        for cause in causes:
+            best = best.without(cause)
+        best = best.continued()
+        lesser = tuple(best.without(cause).continued() for cause in best.causes)
+        return replace(self, best=best, lesser=lesser, rivals=tuple(() for _ in lesser))
 
 
 def search(

@@ -68,7 +68,7 @@ def unit_words(unit: str) -> str:
 def typeset(text: str) -> str:
     """A sentence with raised powers and true minus signs where `1e-05` and `m/s^2` stand in it."""
     raised = re.sub(r"(?<=\d)e([-+]\d+)\b", lambda found: TIMES + _power_of_ten(int(found[1])), unit_words(text))
-    return re.sub(r"(?<![\w.)])-(?=\d)", MINUS, raised)
+    return re.sub(r"(?<![\w.)])-(?=\d|[xy]\b)", MINUS, raised)
 
 
 def estimate_words(estimate: Estimate) -> tuple[str, str]:

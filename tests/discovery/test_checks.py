@@ -8,6 +8,7 @@ import pytest
 from scipy.stats import kstest
 
 from tests.discovery.fitted import fitted
+from tests.discovery.hidden import hide
 from tests.discovery.measurement import Measurement
 from tests.discovery.scenes import Setting
 from vrdp_prob.discovery.checks import run_checks
@@ -17,6 +18,8 @@ from vrdp_prob.discovery.free_flight_checks import QUESTIONS
 from vrdp_prob.discovery.free_flight_patterns import patterns, spanned
 from vrdp_prob.discovery.measurement_checks import GENERAL
 from vrdp_prob.discovery.residual_model import ResidualModel
+from vrdp_prob.inference import default_model
+from vrdp_prob.inference.several_videos.fitting import fit_together
 
 LARGER = Setting(videos=4, bodies=4)
 PAIRS = Setting(videos=3, bodies=2, frames=60)
@@ -113,6 +116,16 @@ def test_nothing_is_said_of_an_axis_across_which_bodies_hardly_move() -> None:
     assert names.isdisjoint({"push x y", "push y y", "along y", "across speed y"})
     (distance,) = (one for one in patterns(replace(flight.scales, axes=(0,))) if one.name == "along distance")
     assert "y" not in distance.formula
+
+
+def test_friction_that_goes_with_masses_that_nobody_stated_is_seen() -> None:
+    data = hide(["mass_dependent_friction"], seed=1, effect_size=6.0, setting=Setting(videos=5, bodies=3))
+    fit = fit_together(data.tracks, model=default_model(), model_error=False)
+    check = by_name(run_checks(fit, seed=0))["friction of the bodies against mass"]
+    (cause,) = data.truth.causes
+    assert check.significant
+    assert check.p_value < 1e-6
+    assert abs(abs(check.statistic) - cause.strength) < 0.1
 
 
 @pytest.mark.slow

@@ -5,11 +5,13 @@ body's fitted value follows its speed, its material or its mass. The values are 
 scatter is estimated beside it, and the F test needs no replications.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 
 from vrdp_prob.discovery.finding import Check
 from vrdp_prob.discovery.fitted_contacts import FittedContacts
@@ -19,7 +21,7 @@ from vrdp_prob.discovery.residual_model import ResidualModel
 from vrdp_prob.discovery.scatter_regression import Dependence, dependence
 from vrdp_prob.discovery.words import number, opposite
 from vrdp_prob.inference.several_videos.fitting import SharedFit
-from vrdp_prob.models.parameters import RESTITUTION
+from vrdp_prob.models.parameters import MASS, RESTITUTION
 from vrdp_prob.scene import Body, Shape
 
 REBOUND = "restitution against approach speed"
@@ -102,6 +104,49 @@ class Rebounds:
         return cls((rows @ own.values)[known], covariance[np.ix_(known, known)], np.array(speeds)[known], rows[known])
 
 
+@dataclass(frozen=True)
+class FittedMasses:
+    """Masses that nobody stated, as collisions tell them: up to one factor for all bodies that met each other.
+
+    Parameters
+    ----------
+    logarithm
+        Logarithm of the mass, by video and body.
+    group
+        Number of the group of bodies of which only ratios are known, by video and body.
+    """
+
+    logarithm: Mapping[tuple[int, int], float]
+    group: Mapping[tuple[int, int], int]
+
+    @classmethod
+    def of(cls, fit: SharedFit, contacts: Sequence[FittedContacts]) -> "FittedMasses":
+        """Those whose ratios are known well enough."""
+        own = OwnValues.of(fit, MASS.name)
+        place = {body: k for k, body in enumerate(own.bodies)}
+        logarithm: dict[tuple[int, int], float] = {}
+        group: dict[tuple[int, int], int] = {}
+        for index, one in enumerate(contacts):
+            count = len(one.motion.tracks.bodies)
+            met = coo_array((np.ones(len(one)), tuple(one.bodies.T)), shape=(count, count))
+            labels = connected_components(met, directed=False)[1]
+            for label in np.unique(labels):
+                members = [(index, int(k)) for k in np.flatnonzero(labels == label) if (index, int(k)) in place]
+                places = [place[member] for member in members]
+                centred = np.eye(len(members)) - 1 / max(len(members), 1)
+                sd = np.sqrt(np.diag(centred @ own.covariance[np.ix_(places, places)] @ centred))
+                known = [k for k in range(len(members)) if sd[k] < LARGEST_SD]
+                if len(known) > 1:
+                    number = len(set(group.values()))
+                    logarithm |= {members[k]: float(own.values[places[k]]) for k in known}
+                    group |= {members[k]: number for k in known}
+        return cls(logarithm, group)
+
+    def scales(self, bodies: Sequence[tuple[int, int]]) -> Float[np.ndarray, "body group"]:
+        """Which of some bodies are in which group."""
+        return np.eye(len(set(self.group.values())))[[self.group[body] for body in bodies]].reshape(len(bodies), -1)
+
+
 def friction_against(what: str) -> str:
     """Name of the check of what bodies rub by."""
     return f"friction of the bodies against {what}"
@@ -142,8 +187,9 @@ def _friction_checks(fit: SharedFit, model: ResidualModel) -> Iterator[Check]:
     known = np.stack([rolls, ~rolls], axis=1).astype(float)
     known = known[:, known.any(axis=0)]
 
+    covariance = own.covariance[np.ix_(keep, keep)]
+
     def asked(columns: Sequence[Float[np.ndarray, "number"]]) -> Dependence | None:
-        covariance = own.covariance[np.ix_(keep, keep)]
         return dependence(own.values[keep], covariance, np.eye(len(keep)), known, np.stack(columns, axis=1))
 
     materials = sorted({body.material for body in bodies if body.material is not None})
@@ -155,8 +201,19 @@ def _friction_checks(fit: SharedFit, model: ResidualModel) -> Iterator[Check]:
         yield from _friction_check("shape", found, f"that of cubes is {_more(found)} than that of cylinders")
     if all(body.mass is not None for body in bodies):
         found = asked([np.log([body.mass or 1.0 for body in bodies])])
-        power = 0.0 if found is None else float(found.slope[0])
-        yield from _friction_check("mass", found, f"it goes with the mass to the power {number(power)}")
+    else:
+        masses = FittedMasses.of(fit, [FittedContacts.of(video.motion) for video in model.videos])
+        rows = [row for row, k in enumerate(keep) if own.bodies[k] in masses.logarithm]
+        chosen = [own.bodies[keep[row]] for row in rows]
+        found = dependence(
+            own.values[keep[rows]],
+            covariance[np.ix_(rows, rows)],
+            np.eye(len(rows)),
+            _independent_columns(np.concatenate([masses.scales(chosen), known[rows]], axis=1)),
+            np.array([masses.logarithm[one] for one in chosen]).reshape(-1, 1),
+        )
+    power = 0.0 if found is None else float(found.slope[0])
+    yield from _friction_check("mass", found, f"it goes with the mass to the power {number(power)}")
 
 
 def _friction_check(name: str, found: Dependence | None, words: str) -> Iterator[Check]:
@@ -168,6 +225,13 @@ def _friction_check(name: str, found: Dependence | None, words: str) -> Iterator
         else f"Nothing seen; {number(100 * NORMAL_95 * float(found.sd.max()))} % would have shown."
     )
     yield Check(friction_against(name), float(found.slope[0]), found.p_value, False, sentence)
+
+
+def _independent_columns(columns: Float[np.ndarray, "number column"]) -> Float[np.ndarray, "number independent"]:
+    """Columns without those that are sums of earlier ones."""
+    rank = np.linalg.matrix_rank
+    kept = [k for k in range(columns.shape[1]) if rank(columns[:, : k + 1]) > rank(columns[:, :k])]
+    return columns[:, kept]
 
 
 def _indicator(bodies: Sequence[Body], material: str) -> Float[np.ndarray, "number"]:

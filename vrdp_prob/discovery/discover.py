@@ -29,7 +29,8 @@ from vrdp_prob.report.wording import listed
 from vrdp_prob.scene import Tracks
 
 EXPLAINED = 0.5
-"""Share of what the model left unexplained beyond the noise that the named causes must explain, for a verdict."""
+"""Share of what the model left unexplained beyond the noise, and of the checks that failed, that the named causes must
+explain for them to be the verdict where something is left."""
 
 LEFT_LEVEL = 0.005
 """Probability, over all checks, with which a model that explains everything is taken to leave something."""
@@ -89,7 +90,7 @@ def discover(
             cause: reasons for cause in found.best.causes if (reasons := tuple(doubts(found.best, cause, after)))
         }
         kept = found.without(list(doubted))
-        verdict = Verdict.UNKNOWN if unlisted is not None or doubted else _verdict(kept, after)
+        verdict = Verdict.UNKNOWN if unlisted is not None or doubted else _verdict(kept, checks, after)
         causes = _causes(found, doubted, seed)
         after = _checks_after(kept, checks, seed) if doubted else after
     return Finding(
@@ -118,12 +119,18 @@ def _checks_after(found: Search, checks: tuple[Check, ...], seed: int) -> tuple[
     return run_checks(found.best.fit, seed=seed) if found.best.causes else checks
 
 
-def _verdict(found: Search, after: Sequence[Check]) -> Verdict:
+def _verdict(found: Search, before: Sequence[Check], after: Sequence[Check]) -> Verdict:
+    """What is said of a model whose causes nobody doubts, by the checks before and after."""
     left = min((check.p_value for check in after), default=1.0) * len(after) < LEFT_LEVEL
     if not found.best.causes:
         return Verdict.UNKNOWN if left else Verdict.NONE
-    before, now = _excess(found.base), _excess(found.best)
-    return Verdict.UNKNOWN if left and now > (1 - EXPLAINED) * before else Verdict.NAMED
+    most = 1 - EXPLAINED
+    explained = _excess(found.best) <= most * _excess(found.base) and _failing(after) <= most * _failing(before)
+    return Verdict.UNKNOWN if left and not explained else Verdict.NAMED
+
+
+def _failing(checks: Sequence[Check]) -> int:
+    return sum(check.significant for check in checks)
 
 
 def _excess(trial: Trial) -> float:

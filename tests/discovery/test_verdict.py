@@ -1,0 +1,53 @@
+"""When the causes that were found are the verdict, and when something else is left."""
+
+from unittest.mock import Mock, create_autospec
+
+import pytest
+
+from vrdp_prob.discovery import discover
+from vrdp_prob.discovery.finding import Check, Verdict
+from vrdp_prob.discovery.search import Search
+
+
+def _checks(failing: int, p_value: float = 1e-9) -> list[Check]:
+    passing = [Check(f"passing {k}", 1.0, 0.5, False, "") for k in range(20 - failing)]
+    return [*(Check(f"failing {k}", 1.0, p_value, True, "") for k in range(failing)), *passing]
+
+
+def _search(causes: tuple[str, ...]) -> Search:
+    found = create_autospec(Search, instance=True)
+    found.best, found.base = Mock(causes=causes), Mock(causes=())
+    return found
+
+
+@pytest.mark.parametrize(
+    ("causes", "excess", "after", "verdict"),
+    [
+        ((), 3.0, _checks(5), Verdict.UNKNOWN),
+        ((), 0.0, _checks(0), Verdict.NONE),
+        (("tilt",), 0.1, _checks(0), Verdict.NAMED),
+        (("tilt",), 0.1, _checks(2), Verdict.NAMED),
+        (("kicks",), 0.1, _checks(9), Verdict.UNKNOWN),
+        (("tilt",), 2.0, _checks(2), Verdict.UNKNOWN),
+        (("tilt",), 2.0, _checks(2, p_value=2e-3), Verdict.NAMED),
+    ],
+    ids=[
+        "something and no cause",
+        "nothing",
+        "a cause that explains all",
+        "a cause that leaves little",
+        "causes with which most checks fail still",
+        "a cause that leaves most of the residuals",
+        "a cause with which what fails may be chance",
+    ],
+)
+def test_the_verdict(
+    causes: tuple[str, ...],
+    excess: float,
+    after: list[Check],
+    verdict: Verdict,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    found = _search(causes)
+    monkeypatch.setattr(discover, "_excess", lambda trial: excess if trial is found.best else 3.0)
+    assert discover._verdict(found, _checks(12), after) is verdict

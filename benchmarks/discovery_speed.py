@@ -4,7 +4,7 @@
 
 Each data set hides one cause (`none`: nothing) as those of `benchmarks/discovery.py` do. It is fitted, and then
 searched, in as many processes as there are cores, so that nothing else should run beside. The fit is the reference: the
-search contains one such fit, and makes a refit of it for every cause that it tries.
+search contains one such fit, and refits of it with the causes that seem to act.
 """
 
 import argparse
@@ -17,8 +17,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
-sys.path.insert(0, str(Path(__file__).parents[1]))  # the generator is that of the tests
-
+import _project  # noqa: F401  the generator belongs to the tests, which lie beside the package
 from _clock import processor_seconds
 from _page import table_row
 
@@ -34,8 +33,8 @@ from vrdp_prob.models.simulator.rollout import compile_model
 
 NOTHING = "none"
 CAUSES = (NOTHING, "surface_tilt", "linear_drag", "pair_force", "time_varying_friction", "clock_error")
-GOAL = 180.0
-"""Seconds of 12 videos of 4 bodies on two cores."""
+GOAL, GOAL_OF = 180.0, (12, 4, 2)
+"""Seconds that a search may take, and of how many videos of how many bodies on how many cores."""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -57,9 +56,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
         rows.append(one(name, options.size, options.seed, setting))
         print(_row(rows[-1]), flush=True)
     slowest = max(row["seconds"] for row in rows)
-    print(f"\nThe slowest took {slowest:.0f} s (goal {GOAL:.0f}) on {os.cpu_count()} cores.")
+    of_the_goal = (options.videos, options.bodies, os.cpu_count()) == GOAL_OF
+    goal = f" (goal {GOAL:.0f})" if of_the_goal else ""
+    print(f"\nThe slowest took {slowest:.0f} s{goal} on {os.cpu_count()} cores.")
     if options.json:
-        checks = [{"name": "slowest search, s", "value": slowest, "goal": GOAL, "ok": slowest <= GOAL}]
+        check = {"name": "slowest search, s", "value": slowest, "goal": GOAL, "ok": slowest <= GOAL}
+        checks = [check] if of_the_goal else []
         with write_atomically(options.json) as temporary:
             temporary.write_text(json.dumps({"checks": checks, "rows": rows}, indent=1) + "\n", encoding="utf-8")
     return 0

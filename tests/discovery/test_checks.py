@@ -20,6 +20,7 @@ from vrdp_prob.discovery.measurement_checks import GENERAL
 from vrdp_prob.discovery.residual_model import ResidualModel
 from vrdp_prob.inference import default_model
 from vrdp_prob.inference.several_videos.fitting import fit_together
+from vrdp_prob.scene import Body, Shape, Tracks
 
 LARGER = Setting(videos=4, bodies=4)
 PAIRS = Setting(videos=3, bodies=2, frames=60)
@@ -116,6 +117,17 @@ def test_nothing_is_said_of_an_axis_across_which_bodies_hardly_move() -> None:
     assert names.isdisjoint({"push x y", "push y y", "along y", "across speed y"})
     (distance,) = (one for one in patterns(replace(flight.scales, axes=(0,))) if one.name == "along distance")
     assert "y" not in distance.formula
+
+
+@pytest.mark.parametrize("bodies", [1, 2])
+def test_nothing_is_asked_of_masses_where_collisions_tell_none(bodies: int) -> None:
+    times = np.arange(40) / 25
+    places = np.arange(bodies)[None, :, None] * np.array([0.0, 1.0]) + times[:, None, None] * np.array([0.5, 0.0])
+    noise = np.random.default_rng(0).normal(0, 0.002, (3, *places.shape))
+    shapes = tuple(Body(str(k), Shape.CYLINDER, radius=0.1) for k in range(bodies))
+    videos = [Tracks.from_arrays(f"v{k}", shapes, times, places + noise[k]) for k in range(3)]
+    fit = fit_together(videos, model=default_model(), model_error=False)
+    assert "friction of the bodies against mass" not in by_name(run_checks(fit, seed=0))
 
 
 def test_friction_that_goes_with_masses_that_nobody_stated_is_seen() -> None:

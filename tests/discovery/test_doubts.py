@@ -3,17 +3,21 @@
 import pytest
 
 from tests.discovery.fitted import SMALL, fitted
+from tests.discovery.hidden import hide
+from tests.discovery.scenes import Setting
 from vrdp_prob.discovery import discover as module
+from vrdp_prob.discovery.body_checks import REBOUND
 from vrdp_prob.discovery.checks import run_checks
+from vrdp_prob.discovery.describe import describe
 from vrdp_prob.discovery.doubts import OWN_CHECKS, Doubt, doubts
 from vrdp_prob.discovery.finding import Check, Verdict
 from vrdp_prob.discovery.trials import Trial
+from vrdp_prob.inference.several_videos.fitting import SharedFit
 from vrdp_prob.models.effects.effect import Effect
+from vrdp_prob.models.effects.linear_drag import LinearDrag
 from vrdp_prob.models.effects.speed_dependent_restitution import SpeedDependentRestitution
 from vrdp_prob.models.effects.surface_tilt import SurfaceTilt
 from vrdp_prob.models.model_file import known_effects
-
-REBOUND = "restitution against approach speed"
 
 
 @pytest.fixture(scope="module")
@@ -29,7 +33,8 @@ def left(name: str, p_value: float, *, significant: bool = True) -> list[Check]:
     ("cause", "checks"),
     [
         (SpeedDependentRestitution(), []),
-        (SpeedDependentRestitution(), left(REBOUND, 0.02, significant=False)),
+        (SpeedDependentRestitution(), left(REBOUND, 0.005, significant=False)),
+        (SpeedDependentRestitution(), left(REBOUND, 0.02)),
         (SpeedDependentRestitution(), left("push against place", 1e-9)),
         (SurfaceTilt(), left(REBOUND, 1e-9)),
     ],
@@ -54,6 +59,8 @@ def test_checks_and_causes_go_by_their_names(trial: Trial) -> None:
 
 def test_a_doubted_cause_is_told_of_and_not_part_of_the_extended_model(monkeypatch: pytest.MonkeyPatch) -> None:
     data, _ = fitted("surface_tilt", 5.0, seed=2, setting=SMALL)
+    described: list[SharedFit] = []
+    monkeypatch.setattr(module, "describe", lambda fit, **_: described.append(fit) or describe(fit, seed=0))
     monkeypatch.setattr(module, "doubts", lambda *_given: [Doubt(0.1, "It is something else.")])
     finding = module.discover(data.tracks, catalogue=[SurfaceTilt()], processes=1)
     assert finding.verdict is Verdict.UNKNOWN
@@ -64,5 +71,21 @@ def test_a_doubted_cause_is_told_of_and_not_part_of_the_extended_model(monkeypat
     assert tilt.name == SurfaceTilt.name
     assert tilt.probability < 0.11
     assert "It is something else." in finding.notes
-    assert finding.description is not None
-    assert "e" in finding.description.formula  # of what the model that was given leaves
+    assert [fit.model.effects for fit in described] == [finding.model.effects]
+
+
+@pytest.mark.slow
+def test_of_two_causes_only_the_doubted_one_is_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
+    data = hide(["surface_tilt", "linear_drag"], seed=1, effect_size=6.0, setting=Setting(videos=4, bodies=2))
+
+    def only_the_tilt(_trial: Trial, cause: Effect, _left: object = ()) -> list[Doubt]:
+        return [Doubt(0.1, "It is something else.")] if cause.name == SurfaceTilt.name else []
+
+    monkeypatch.setattr(module, "doubts", only_the_tilt)
+    finding = module.discover(data.tracks, catalogue=[SurfaceTilt(), LinearDrag()], processes=1)
+    assert finding.verdict is Verdict.UNKNOWN
+    assert [one.name for one in finding.named] == [LinearDrag.name]
+    assert [effect.name for effect in finding.extended.effects][-1] == LinearDrag.name
+    assert SurfaceTilt.name not in finding.extended.text
+    assert SurfaceTilt.name in {bound.name for bound in finding.upper_bounds}
+    assert finding.notes.count("It is something else.") == 1

@@ -98,7 +98,7 @@ def test_lengths_stand_in_the_unit_that_suits_them() -> None:
     [
         ("by 0.19 m/s^2 towards -37 degrees", f"by 0.19 m/s² towards {MINUS}37 degrees"),
         ("tilt_y = -0.0119 ± 9.4e-05;", f"tilt_y = {MINUS}0.0119 ± 9.4{TIMES}10⁻⁵;"),
-        ("of run-1, 3-5 and case1e-05x", "of run-1, 3-5 and case1e-05x"),
+        ("of run-1, 3-5, run-2e-05 and case1e-05x", "of run-1, 3-5, run-2e-05 and case1e-05x"),
     ],
 )
 def test_a_sentence_is_typeset(plain: str, seen: str) -> None:

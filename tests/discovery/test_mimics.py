@@ -8,6 +8,7 @@ from tests.discovery.scenes import Setting
 from vrdp_prob.discovery.body_checks import REBOUND
 from vrdp_prob.discovery.finding import Check
 from vrdp_prob.discovery.mimics import laws_of, without_mimics
+from vrdp_prob.discovery.refits import Refits
 from vrdp_prob.discovery.scores import score_causes
 from vrdp_prob.discovery.search import Search
 from vrdp_prob.discovery.trials import Trial
@@ -28,7 +29,8 @@ def search_that_found(cause: Effect, way: str, effect_size: float, setting: Sett
     (score,) = score_causes(fit, base.unexplained.plain, [cause], seed=0)
     refitted = base.with_cause(score)
     assert refitted is not None
-    return Search(base, refitted.continued(), (), (base,), ((),), 6.0, np.ones(setting.videos))
+    refits = Refits((), seed=0, needed=6.0, advance=lambda _count: None)
+    return Search(base, refitted.continued(), (), (base,), ((),), refits)
 
 
 def test_a_patch_that_follows_the_grain_of_a_table_is_not_named() -> None:
@@ -51,10 +53,13 @@ def test_a_tilt_that_acts_stays_and_leaves_nothing_to_a_law_outside_the_catalogu
 def test_what_remains_decides_which_law_is_asked() -> None:
     motion = Check("push against place", 1.0, 1e-6, True, "")
     rebound = Check(REBOUND, 1.0, 1e-6, True, "")
+    memory = Check("memory of the residuals", 1.0, 1e-6, True, "")
     by_chance = Check("outliers", 1.0, 0.2, False, "")
     asked = {
         (motion, by_chance): (UnlistedMotion,),
         (rebound, by_chance): (UnlistedRebound,),
+        (rebound, memory): (UnlistedRebound,),
+        (memory,): (UnlistedMotion,),
         (rebound, motion): (UnlistedMotion, UnlistedRebound),
         (by_chance,): (),
     }

@@ -21,7 +21,7 @@ def _refit(cause: str, gained: float, *, patches: bool = False) -> Mock:
 
 
 def _searcher(needed: float = 0.0) -> search._Searcher:
-    return search._Searcher(_refits(needed), seed=0, needed=needed)
+    return search._Searcher(_refits(needed))
 
 
 def _refits(needed: float = 0.0) -> refits.Refits:

@@ -137,14 +137,16 @@ class FittedMasses:
                 sd = np.sqrt(np.diag(centred @ own.covariance[np.ix_(places, places)] @ centred))
                 known = [k for k in range(len(members)) if sd[k] < LARGEST_SD]
                 if len(known) > 1:
-                    number = len(set(group.values()))
+                    place_of_group = len(set(group.values()))
                     logarithm |= {members[k]: float(own.values[places[k]]) for k in known}
-                    group |= {members[k]: number for k in known}
+                    group |= {members[k]: place_of_group for k in known}
         return cls(logarithm, group)
 
-    def scales(self, bodies: Sequence[tuple[int, int]]) -> Float[np.ndarray, "body group"]:
-        """Which of some bodies are in which group."""
-        return np.eye(len(set(self.group.values())))[[self.group[body] for body in bodies]].reshape(len(bodies), -1)
+    def membership(self, bodies: Sequence[tuple[int, int]]) -> Float[np.ndarray, "body group"]:
+        """1 where a body is in a group, else 0."""
+        found = np.zeros((len(bodies), len(set(self.group.values()))))
+        found[np.arange(len(bodies)), [self.group[body] for body in bodies]] = 1.0
+        return found
 
 
 def friction_against(what: str) -> str:
@@ -205,11 +207,12 @@ def _friction_checks(fit: SharedFit, model: ResidualModel) -> Iterator[Check]:
         masses = FittedMasses.of(fit, [FittedContacts.of(video.motion) for video in model.videos])
         rows = [row for row, k in enumerate(keep) if own.bodies[k] in masses.logarithm]
         chosen = [own.bodies[keep[row]] for row in rows]
+        beside = np.concatenate([masses.membership(chosen), known[rows]], axis=1)
         found = dependence(
             own.values[keep[rows]],
             covariance[np.ix_(rows, rows)],
             np.eye(len(rows)),
-            _independent_columns(np.concatenate([masses.scales(chosen), known[rows]], axis=1)),
+            _independent_columns(beside),
             np.array([masses.logarithm[one] for one in chosen]).reshape(-1, 1),
         )
     power = 0.0 if found is None else float(found.slope[0])

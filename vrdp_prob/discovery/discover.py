@@ -86,25 +86,27 @@ def discover(
             found, unlisted = without_mimics(found, laws, seed=seed, progress=progress)
             if unlisted is not None and unlisted.mimics:
                 after = _checks_after(found, checks, seed)
-        doubted = {
-            cause: reasons for cause in found.best.causes if (reasons := tuple(doubts(found.best, cause, after)))
-        }
-        kept = found.without(list(doubted))
-        verdict = Verdict.UNKNOWN if unlisted is not None or doubted else _verdict(kept, checks, after)
-        causes = _causes(found, doubted, seed)
-        after = _checks_after(kept, checks, seed) if doubted else after
+        not_named: list[FoundCause] = []
+        reasons: list[Doubt] = []
+        while doubted := _doubted(found, after):
+            not_named += [one for one in _causes(found, doubted, seed) if not one.named]
+            reasons += [one for some in doubted.values() for one in some]
+            found = found.without(list(doubted))
+            after = _checks_after(found, checks, seed)
+        verdict = Verdict.UNKNOWN if unlisted is not None or reasons else _verdict(found, checks, after)
+        causes = [*_causes(found, {}, seed), *not_named]
     return Finding(
         verdict=verdict,
         causes=tuple(causes),
         checks=checks,
         checks_after=after,
-        upper_bounds=tuple(_bounds(kept)),
+        upper_bounds=tuple(_bounds(found)),
         model=physics,
-        extended=kept.best.fit.model,
+        extended=found.best.fit.model,
         videos=tuple(tracks.video for tracks in videos),
-        description=describe(kept.best.fit, seed=seed) if verdict is Verdict.UNKNOWN else None,
-        notes=tuple(_notes(kept, [one for reasons in doubted.values() for one in reasons], unlisted)),
-        figures=residual_figures(kept.base.fit, kept.best.fit if kept.best.causes else None),
+        description=describe(found.best.fit, seed=seed) if verdict is Verdict.UNKNOWN else None,
+        notes=tuple(_notes(found, reasons, unlisted)),
+        figures=residual_figures(found.base.fit, found.best.fit if found.best.causes else None),
     )
 
 
@@ -117,6 +119,12 @@ def _catalogue(model: PhysicsModel, catalogue: Sequence[Effect] | None) -> list[
 def _checks_after(found: Search, checks: tuple[Check, ...], seed: int) -> tuple[Check, ...]:
     """The checks of the best model; those of the base model where it has no causes."""
     return run_checks(found.best.fit, seed=seed) if found.best.causes else checks
+
+
+def _doubted(found: Search, after: Sequence[Check]) -> dict[Effect, tuple[Doubt, ...]]:
+    """The causes of the best model that are doubted, and why."""
+    reasons = {cause: tuple(doubts(found.best, cause, after)) for cause in found.best.causes}
+    return {cause: some for cause, some in reasons.items() if some}
 
 
 def _verdict(found: Search, before: Sequence[Check], after: Sequence[Check]) -> Verdict:
@@ -197,10 +205,7 @@ def _gain(before: Trial, after: Trial, overdispersion: Float[np.ndarray, "video"
 def _bounds(found: Search) -> list[UpperBound]:
     named = set(found.best.names)
     return [
-        bound
-        for score in found.steps[-1].left.beside_chance
-        if score.effect.name not in named
-        for bound in upper_bounds(score)
+        bound for score in found.left.beside_chance if score.effect.name not in named for bound in upper_bounds(score)
     ]
 
 
@@ -237,6 +242,7 @@ def _notes(found: Search, doubted: Sequence[Doubt], unlisted: Unlisted | None) -
 def _unlisted_note(unlisted: Unlisted) -> str:
     than = listed(f"'{name}'" for name in unlisted.mimics)
     rest = f"; {than} may only follow it, and {'are' if len(unlisted.mimics) > 1 else 'is'} not named" if than else ""
-    laws = " ".join(law.sentence for law in unlisted.laws)
+    laws = listed(f"{law.sentence[0].lower()}{law.sentence[1:].rstrip('.')}" for law in unlisted.laws)
     better = "better" if unlisted.gain > NORMAL_95 * unlisted.error else "at least as well, as far as they can tell,"
-    return f"{laws} That predicts left-out videos {better} ({unlisted.gain:.0f} ± {unlisted.error:.0f} nats){rest}."
+    size = f"{unlisted.gain:.0f} ± {unlisted.error:.0f} nats"
+    return f"A model in which {laws} predicts left-out videos {better} ({size}){rest}."

@@ -66,9 +66,9 @@ def doubts(trial: Trial, cause: Effect, left: Sequence[Check] = ()) -> Iterator[
             "something that it has as its limit, and its probability counts that.",
         )
     own = next((one for one in left if one.name == OWN_CHECKS.get(cause.name) and one.significant), None)
-    if own is not None:
+    if own is not None and own.p_value < SURPRISING:
         yield Doubt(
-            min(1.0, own.p_value / SURPRISING),
+            own.p_value / SURPRISING,
             f"With '{cause.name}' the check of {own.name} fails still, which asks for just what this cause does: its "
             "law is another one, and its probability counts that.",
         )

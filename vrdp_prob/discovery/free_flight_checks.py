@@ -244,7 +244,7 @@ def _by_place(part: Part, what: str) -> str:
 
 
 def _spreading(part: Part) -> str:
-    if len(part.patterns) < 4:
+    if {f"push {a} {b}" for a in "xy" for b in "xy"} - {one.name for one in part.patterns}:
         return " and ".join(f"towards {towards} {_by_place(part, f'push {towards}')}" for towards in "xy")
     xx, xy, yx, yy = (part.estimate(f"push {a} {b}") for a in "xy" for b in "xy")
     away, turn = (xx + yy) / 2, (yx - xy) / 2

@@ -123,7 +123,7 @@ class Scales:
 
 
 def spanned(places: Float[np.ndarray, "place 2"]) -> tuple[int, ...]:
-    """Axes along which places differ, more than by the noise of a motion along the other one."""
+    """Axes along which places differ; one of them where everything moves along it."""
     spread = places.std(axis=0) if len(places) else np.ones(2)
     return tuple(int(axis) for axis in np.flatnonzero(spread >= FLAT * spread.max()))
 

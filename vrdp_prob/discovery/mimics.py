@@ -14,6 +14,7 @@ import numpy as np
 
 from vrdp_prob.discovery.body_checks import REBOUND
 from vrdp_prob.discovery.finding import Check
+from vrdp_prob.discovery.measurement_checks import GENERAL
 from vrdp_prob.discovery.scores import score_causes
 from vrdp_prob.discovery.search import FALSE_ALARM, Search
 from vrdp_prob.discovery.trials import Trial, gain, weights
@@ -35,7 +36,7 @@ class Unlisted:
     Parameters
     ----------
     laws
-        The parts of it that were asked.
+        The parts of it of which the videos say something.
     mimics
         Names of the causes that it explains away, in the order in which they were found.
     gain, error
@@ -52,8 +53,9 @@ class Unlisted:
 def laws_of(left: Sequence[Check]) -> tuple[Effect, ...]:
     """Laws of no particular cause for what checks say is left."""
     failing = {check.name for check in left if check.significant}
-    motion = (UnlistedMotion(),) if failing - {REBOUND} else ()
-    return (*motion, UnlistedRebound()) if REBOUND in failing else motion
+    telling = failing - set(GENERAL) or failing
+    motion = (UnlistedMotion(),) if telling - {REBOUND} else ()
+    return (*motion, UnlistedRebound()) if REBOUND in telling else motion
 
 
 def without_mimics(
@@ -87,7 +89,7 @@ def without_mimics(
         advance(1)
         if alone is not None and _merit(alone, best, found) > 0:
             gained = gain(alone, best, found.overdispersion)
-            return found.without(best.causes), Unlisted(tuple(laws), best.names, *gained)
+            return found.without(best.causes), Unlisted(_of(alone, laws), best.names, *gained)
         others = [lesser for lesser in found.lesser if lesser is not found.base]
         refitted = in_processes(with_laws, others, advance=advance)
     instead = {found.base: alone, **dict(zip(others, refitted, strict=True))}
@@ -97,7 +99,7 @@ def without_mimics(
         if _believed(found, beside, lesser, instead[lesser], seed) < BELIEVED
     ]
     names = tuple(one.name for one in mimics)
-    explained = Unlisted(tuple(laws), names, *gain(beside, best, found.overdispersion))
+    explained = Unlisted(_of(beside, laws), names, *gain(beside, best, found.overdispersion))
     return found.without(mimics), explained
 
 
@@ -108,6 +110,11 @@ def _with_laws(trial: Trial, laws: Sequence[Effect], seed: int) -> Trial | None:
         scores = score_causes(found.fit, found.unexplained.plain, [law], seed=seed)
         found = (found.with_cause(scores[0]) if scores else None) or found
     return None if found is trial else found.continued()
+
+
+def _of(trial: Trial, laws: Sequence[Effect]) -> tuple[Effect, ...]:
+    """The laws that are part of a model."""
+    return tuple(law for law in laws if law.name in trial.names)
 
 
 def _merit(trial: Trial, other: Trial, found: Search) -> float:

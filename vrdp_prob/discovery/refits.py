@@ -26,6 +26,7 @@ CLOSE = 0.5
 HOPEFUL = 0.2
 """Share of the largest statistic below which a cause cannot be the best one, nor a rival of it."""
 MOST_REFITTED = 5
+"""Causes that are refitted, at most."""
 SHORT, MENDINGS = 0.5, 3
 """Share of what was promised or brought by another that a cause must bring, and number of refits searched anew."""
 

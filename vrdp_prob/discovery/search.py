@@ -62,10 +62,8 @@ class Search:
         For each cause of `best`: the model without it.
     rivals
         For each cause of `best`: models in which another cause takes its place, as far as any came close.
-    needed
-        Gain (nats) in the predictive density that a cause must bring.
-    overdispersion
-        Factor of each video by which gains are divided.
+    refits
+        What every model leaves, and the refits of it.
     """
 
     base: Trial
@@ -73,8 +71,22 @@ class Search:
     steps: tuple[Step, ...]
     lesser: tuple[Trial, ...]
     rivals: tuple[tuple[Trial, ...], ...]
-    needed: float
-    overdispersion: Float[np.ndarray, "video"]
+    refits: Refits
+
+    @property
+    def needed(self) -> float:
+        """Gain (nats) in the predictive density that a cause must bring."""
+        return self.refits.needed
+
+    @property
+    def left(self) -> Left:
+        """What the best model leaves."""
+        return self.refits.left(self.best)
+
+    @property
+    def overdispersion(self) -> Float[np.ndarray, "video"]:
+        """Factor of each video by which gains are divided."""
+        return self.left.overdispersion
 
     def without(self, causes: Sequence[Effect]) -> "Search":
         """The search with a best model that lacks some of its causes."""
@@ -82,7 +94,7 @@ class Search:
             return self
         left = [cause for cause in self.best.causes if cause not in causes]
         if not left:
-            return replace(self, best=self.base, steps=self.steps[:1], lesser=(), rivals=())
+            return replace(self, best=self.base, lesser=(), rivals=())
         best = self.best
         for cause in causes:
             best = best.without(cause)
@@ -109,7 +121,7 @@ def search(
     """
     needed = float(np.log(len(catalogue) / FALSE_ALARM))
     with (progress or SilentProgress()).stage("Trying causes", total=None) as advance:
-        searcher = _Searcher(Refits(tuple(catalogue), seed, needed, advance), seed, needed)
+        searcher = _Searcher(Refits(tuple(catalogue), seed, needed, advance))
         chain = [Trial((), with_own_population(fit)).continued()]
         steps = [searcher.untried(chain[0])]
         while len(chain) <= MOST_CAUSES:
@@ -117,19 +129,19 @@ def search(
             base, winner = searcher.chosen(chain[-1], step)
             found_better_course = base is not chain[-1]
             chain[-1] = base
+            if found_better_course:
+                steps[-1] = replace(step, left=searcher.refits.left(base))
             if winner is not None:
                 chain.append(winner)
                 steps.append(searcher.untried(winner))
-            elif found_better_course:
-                steps[-1] = searcher.untried(base)
-            else:
+            elif not found_better_course:
                 break
         best = searcher.unpatched(chain[-1])
         if best is not chain[-1]:
             chain.append(best)
             steps.append(searcher.untried(best))
         best, lesser, rivals = searcher.compared(chain, steps)
-    return Search(chain[0], best, tuple(steps), lesser, rivals, needed, steps[-1].left.overdispersion)
+    return Search(chain[0], best, tuple(steps), lesser, rivals, searcher.refits)
 
 
 @dataclass(frozen=True)
@@ -137,8 +149,14 @@ class _Searcher:
     """What is looked for."""
 
     refits: Refits
-    seed: int
-    needed: float
+
+    @property
+    def seed(self) -> int:
+        return self.refits.seed
+
+    @property
+    def needed(self) -> float:
+        return self.refits.needed
 
     def untried(self, trial: Trial) -> Step:
         """A step in which nothing was tried yet."""

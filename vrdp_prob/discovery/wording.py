@@ -67,7 +67,8 @@ def unit_words(unit: str) -> str:
 
 def typeset(text: str) -> str:
     """A sentence with raised powers and true minus signs where `1e-05` and `m/s^2` stand in it."""
-    raised = re.sub(r"(?<=\d)e([-+]\d+)\b", lambda found: TIMES + _power_of_ten(int(found[1])), unit_words(text))
+    number_with_power = r"(?<![\w.-])(-?\d+(?:\.\d+)?)e([-+]\d+)\b"
+    raised = re.sub(number_with_power, lambda it: it[1] + TIMES + _power_of_ten(int(it[2])), unit_words(text))
     return re.sub(r"(?<![\w.)])-(?=\d|[xy]\b)", MINUS, raised)
 
 

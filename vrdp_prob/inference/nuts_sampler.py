@@ -17,7 +17,7 @@ from vrdp_prob.inference.importance import Weighted, smoothed_weights
 from vrdp_prob.inference.mixture import Jumps, Mixture
 from vrdp_prob.inference.mode_weights import doubts, weights_from_chains, weights_from_importance
 from vrdp_prob.inference.nuts_chain import Courses
-from vrdp_prob.inference.nuts_groups import AT_ONCE, Group, GroupRun
+from vrdp_prob.inference.nuts_groups import Group, GroupRun
 from vrdp_prob.inference.nuts_worker import workers
 from vrdp_prob.inference.rate_steps import RateSteps
 from vrdp_prob.inference.samples import (
@@ -33,7 +33,7 @@ from vrdp_prob.inference.shaping import Shaped, shaped, starting_places
 from vrdp_prob.models.simulator.work import metered, work_sentence
 from vrdp_prob.progress import ProgressDisplay, SilentProgress
 
-GROUPS = AT_ONCE
+GROUPS = 2
 """Groups of chains per mode..."""
 TOGETHER = 8
 """...and chains per group, whose gradients are computed together."""

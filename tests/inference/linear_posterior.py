@@ -39,8 +39,8 @@ class _Number:
 def linear_errors(scene: PriorScene) -> dict[str, float]:
     """Errors of means in standard deviations, by the names that ranks give them.
 
-    Those of positions and velocities are standard normal over scenes from the prior, however scenes are chosen by their
-    measurement.
+    Those of positions and velocities are standard normal to first order over scenes from the prior, however scenes are
+    chosen by their measurement.
     """
     numbers = _unknowns(scene)
     values = np.array([one.value for one in numbers])

@@ -1,25 +1,41 @@
 """The posterior to first order around the truth, with which the inference is compared."""
 
+from collections.abc import Iterator
 from itertools import count, islice
 
 import numpy as np
-from scipy.stats import chi2
+import pytest
+from scipy.stats import chi2, norm
 
 from tests.inference.linear_posterior import linear_errors
 from tests.inference.prior_scenes import PriorScene, prior_scene
 
-SCENES = 40
+SCENES, MANY, FIRST = 40, 300, 20_000
 FALSE_ALARM = 1e-3
 
 
 def test_its_errors_are_standard_normal_over_scenes() -> None:
-    scenes = islice((one for seed in count() if (one := prior_scene(seed)) is not None), SCENES)
-    chosen = []
-    for scene in scenes:
-        errors = [error for name, error in linear_errors(scene).items() if name != "log likelihood"]
-        chosen.append(errors[scene.seed % len(errors)])
+    chosen = [_one_of(scene, "position", "velocity") for scene in _scenes(SCENES)]
     low, high = chi2.ppf([FALSE_ALARM / 2, 1 - FALSE_ALARM / 2], SCENES)
     assert low < np.square(chosen).sum() < high
+
+
+@pytest.mark.slow
+def test_its_squared_errors_are_one_over_many_scenes() -> None:
+    scenes = list(_scenes(MANY))
+    for kind in ("position", "velocity", "log likelihood"):
+        squares = np.square([_one_of(scene, kind) for scene in scenes])
+        error = squares.std() / np.sqrt(MANY)
+        assert abs(squares.mean() - 1) < norm.ppf(1 - FALSE_ALARM / 2) * error, kind
+
+
+def _scenes(number: int) -> Iterator[PriorScene]:
+    return islice((one for seed in count(FIRST) if (one := prior_scene(seed)) is not None), number)
+
+
+def _one_of(scene: PriorScene, *kinds: str) -> float:
+    errors = [error for name, error in linear_errors(scene).items() if name.startswith(kinds)]
+    return errors[scene.seed % len(errors)] if errors else 0.0
 
 
 def test_a_body_that_nothing_meets_and_that_rests_is_as_far_off_as_the_mean_of_its_measurements() -> None:

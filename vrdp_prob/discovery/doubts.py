@@ -65,7 +65,7 @@ def doubts(trial: Trial, cause: Effect, left: Sequence[Check] = ()) -> Iterator[
             f"The parameters of '{cause.name}' are far from what was expected of this cause: it may stand for "
             "something that it has as its limit, and its probability counts that.",
         )
-    own = next((one for one in left if one.name == OWN_CHECKS.get(cause.name) and one.significant), None)
+    own = next((one for one in left if one.name == OWN_CHECKS.get(cause.name)), None)
     if own is not None and own.p_value < SURPRISING:
         yield Doubt(
             own.p_value / SURPRISING,

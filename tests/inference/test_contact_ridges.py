@@ -164,7 +164,7 @@ def test_clouds_with_and_without_ridges_know_their_inverses(fit: MapFit, ridge: 
 
 
 def test_cubes_have_a_ridge_along_which_their_spins_follow() -> None:
-    tracks = observe(scene(Shape.CUBE), noise=0.008, frames=45, seed=1, angles=True)
+    tracks = observe(scene(Shape.CUBE), noise=0.008, frames=45, seed=3, angles=True)
     fitted = fit_map(tracks, default_model(), np.random.default_rng(0))
     (found,) = contact_ridges(fitted.likelihood, fitted.point)
     spins = fitted.likelihood.coordinates.mask(["spin"])

@@ -1,5 +1,6 @@
 """What is hidden in the data sets of `benchmarks/discovery.py`."""
 
+import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
@@ -7,7 +8,10 @@ from enum import StrEnum
 import _project  # noqa: F401  the generator belongs to the tests, which lie beside the package
 
 from tests.discovery.causes import CATALOGUE, VARIANTS
+from tests.discovery.data_set import DataSet
 from tests.discovery.other_effects import OTHERS
+from vrdp_prob import load_all
+from vrdp_prob.scene import Tracks
 
 SIZES = (1.5, 3.0, 6.0)
 """Effect sizes at which single causes are hidden."""
@@ -117,3 +121,10 @@ def tasks(
     share = -(-nulls // max(seeds, 1))
     listed = [task for k, found in enumerate(rounds) for task in (*found, *empty[k * share : (k + 1) * share])]
     return [replace(task, videos=videos, bodies=bodies) for task in (listed if rounds else empty)]
+
+
+def handed_over(data: DataSet) -> list[Tracks]:
+    """What discovery gets of a data set: its tracks, written and read again."""
+    with tempfile.TemporaryDirectory() as folder:
+        data.write(folder)
+        return load_all(folder)

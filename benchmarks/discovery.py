@@ -13,7 +13,6 @@ import argparse
 import json
 import os
 import sys
-import tempfile
 import time
 import traceback
 from collections.abc import Sequence
@@ -26,7 +25,7 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 import torch
 from _discovery_page import page, tables
 from _discovery_results import checks
-from _discovery_tasks import SIZES, Kind, Task, tasks
+from _discovery_tasks import SIZES, Kind, Task, handed_over, tasks
 from _resumable import Result, measured, read
 
 from tests.discovery.data_set import Truth
@@ -34,7 +33,6 @@ from tests.discovery.hidden import ROUGH, hide, true_values
 from tests.discovery.other_effects import ALL
 from tests.discovery.scenes import Setting
 from tests.discovery.videos import UnendingMotionError
-from vrdp_prob import load_all
 from vrdp_prob.discovery.discover import discover
 from vrdp_prob.discovery.finding import Finding, FoundCause
 from vrdp_prob.inference import default_model
@@ -117,9 +115,7 @@ def one(task: Task) -> Result:
         }
         for cause in data.truth.causes
     ]
-    with tempfile.TemporaryDirectory() as folder:
-        data.write(folder)
-        videos = load_all(folder)
+    videos = handed_over(data)
     wall, cpu = time.perf_counter(), time.process_time()
     try:
         finding = discover(videos, seed=0, catalogue=catalogue(task), processes=1)

@@ -11,19 +11,17 @@ import argparse
 import json
 import os
 import sys
-import tempfile
 import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
-import _project  # noqa: F401  the generator belongs to the tests, which lie beside the package
 from _clock import processor_seconds
+from _discovery_tasks import handed_over
 from _page import table_row
 
 from tests.discovery.hidden import hide
 from tests.discovery.scenes import Setting
-from vrdp_prob import load_all
 from vrdp_prob.discovery.discover import discover
 from vrdp_prob.files import write_atomically
 from vrdp_prob.inference import default_model
@@ -70,9 +68,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def one(name: str, size: float, seed: int, setting: Setting) -> dict[str, Any]:
     """Times of one data set, and what was found."""
     data = hide([] if name == NOTHING else [name], seed=seed, effect_size=size, setting=setting)
-    with tempfile.TemporaryDirectory() as folder:
-        data.write(folder)
-        videos = load_all(folder)
+    videos = handed_over(data)
 
     def fit() -> None:
         with several_processes(None):

@@ -5,6 +5,7 @@ import pytest
 
 from tests.discovery.fitted import fitted
 from tests.discovery.scenes import Setting
+from vrdp_prob.discovery.checks import run_checks
 from vrdp_prob.discovery.describe import describe
 from vrdp_prob.discovery.missing_acceleration import Separate
 from vrdp_prob.discovery.sparse_formula import sparse_formula
@@ -39,7 +40,7 @@ def test_one_video_by_itself_gives_no_formula() -> None:
 
 def test_a_tilt_is_described_by_its_formula_and_size() -> None:
     data, fit = fitted("surface_tilt", seed=2, setting=PAIRS)
-    found = describe(fit, seed=0)
+    found = describe(fit, run_checks(fit, seed=0))
     assert {term[-2:] for term in found.formula.removeprefix("a = ").replace("-", "+").split(" + ")} <= {"ex", "ey"}
     assert found.explained > 0.5
     assert found.size == pytest.approx(9.81 * data.truth.causes[0].strength, rel=0.6)
@@ -48,7 +49,7 @@ def test_a_tilt_is_described_by_its_formula_and_size() -> None:
 
 def test_a_null_has_nothing_to_describe() -> None:
     _, fit = fitted(seed=1)
-    found = describe(fit, seed=0)
+    found = describe(fit, run_checks(fit, seed=0))
     assert found.formula == "none of the terms"
     assert found.explained == 0
     assert any("hardly larger" in sentence for sentence in found.sentences)
@@ -68,7 +69,7 @@ def test_a_null_has_nothing_to_describe() -> None:
 )
 def test_effects_outside_the_catalogue_are_described_by_terms_of_their_kind(way: str, words: tuple[str, ...]) -> None:
     _, fit = fitted(way, 5.0, seed=7, setting=LARGER)
-    found = describe(fit, seed=0)
+    found = describe(fit, run_checks(fit, seed=0))
     assert any(word in found.formula for word in words)
     assert found.explained > 0.3
 
@@ -76,5 +77,7 @@ def test_effects_outside_the_catalogue_are_described_by_terms_of_their_kind(way:
 @pytest.mark.slow
 def test_contacts_that_stick_are_said_to_be_about_contacts() -> None:
     _, fit = fitted("contact_friction", 5.0, seed=7, setting=LARGER)
-    share = next(sentence for sentence in describe(fit, seed=0).sentences if "begins at contacts" in sentence)
+    share = next(
+        sentence for sentence in describe(fit, run_checks(fit, seed=0)).sentences if "begins at contacts" in sentence
+    )
     assert float(share.split()[0]) > 50

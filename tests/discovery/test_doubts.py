@@ -59,7 +59,7 @@ def test_checks_and_causes_go_by_their_names(trial: Trial) -> None:
 def test_a_doubted_cause_is_told_of_and_not_part_of_the_extended_model(monkeypatch: pytest.MonkeyPatch) -> None:
     data, _ = fitted("surface_tilt", 5.0, seed=2, setting=SMALL)
     described: list[SharedFit] = []
-    monkeypatch.setattr(module, "describe", lambda fit, **_: described.append(fit) or describe(fit, seed=0))
+    monkeypatch.setattr(module, "describe", lambda fit, checks: described.append(fit) or describe(fit, checks))
     monkeypatch.setattr(module, "doubts", lambda *_given: [Doubt(0.1, "It is something else.")])
     finding = module.discover(data.tracks, catalogue=[SurfaceTilt()], processes=1)
     assert finding.verdict is Verdict.UNKNOWN

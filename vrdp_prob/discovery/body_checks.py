@@ -110,22 +110,18 @@ class FittedMasses:
 
     Parameters
     ----------
-    logarithm
-        Logarithm of the mass, by video and body.
-    group
-        Number of the group of bodies of which only ratios are known, by video and body.
+    groups
+        Logarithms of the masses by video and body, for each group of bodies of which only ratios are known.
     """
 
-    logarithm: Mapping[tuple[int, int], float]
-    group: Mapping[tuple[int, int], int]
+    groups: tuple[Mapping[tuple[int, int], float], ...]
 
     @classmethod
     def of(cls, fit: SharedFit, contacts: Sequence[FittedContacts]) -> "FittedMasses":
         """Those whose ratios are known well enough."""
         own = OwnValues.of(fit, MASS.name)
         place = {body: k for k, body in enumerate(own.bodies)}
-        logarithm: dict[tuple[int, int], float] = {}
-        group: dict[tuple[int, int], int] = {}
+        groups = []
         for index, one in enumerate(contacts):
             count = len(one.motion.tracks.bodies)
             met = coo_array((np.ones(len(one)), tuple(one.bodies.T)), shape=(count, count))
@@ -135,18 +131,20 @@ class FittedMasses:
                 places = [place[member] for member in members]
                 centred = np.eye(len(members)) - 1 / max(len(members), 1)
                 sd = np.sqrt(np.diag(centred @ own.covariance[np.ix_(places, places)] @ centred))
-                known = [k for k in range(len(members)) if sd[k] < LARGEST_SD]
+                known = {members[k]: float(own.values[places[k]]) for k in np.flatnonzero(sd < LARGEST_SD)}
                 if len(known) > 1:
-                    place_of_group = len(set(group.values()))
-                    logarithm |= {members[k]: float(own.values[places[k]]) for k in known}
-                    group |= {members[k]: place_of_group for k in known}
-        return cls(logarithm, group)
+                    groups.append(known)
+        return cls(tuple(groups))
+
+    @property
+    def logarithm(self) -> dict[tuple[int, int], float]:
+        """Those of all groups together."""
+        return {body: value for group in self.groups for body, value in group.items()}
 
     def membership(self, bodies: Sequence[tuple[int, int]]) -> Float[np.ndarray, "body group"]:
         """1 where a body is in a group, else 0."""
-        found = np.zeros((len(bodies), len(set(self.group.values()))))
-        found[np.arange(len(bodies)), [self.group[body] for body in bodies]] = 1.0
-        return found
+        found = np.array([[body in group for group in self.groups] for body in bodies], dtype=float)
+        return found.reshape(len(bodies), len(self.groups))
 
 
 def friction_against(what: str) -> str:
@@ -156,8 +154,9 @@ def friction_against(what: str) -> str:
 
 def body_checks(fit: SharedFit, model: ResidualModel) -> Iterator[Check]:
     """All checks of fitted values of single bodies."""
-    yield from _restitution_check(Rebounds.of(fit, [FittedContacts.of(video.motion) for video in model.videos]))
-    yield from _friction_checks(fit, model)
+    contacts = [FittedContacts.of(video.motion) for video in model.videos]
+    yield from _restitution_check(Rebounds.of(fit, contacts))
+    yield from _friction_checks(fit, contacts)
 
 
 def _restitution_check(rebounds: Rebounds) -> Iterator[Check]:
@@ -179,12 +178,12 @@ def _restitution_check(rebounds: Rebounds) -> Iterator[Check]:
     yield Check(REBOUND, slope, found.p_value, False, sentence)
 
 
-def _friction_checks(fit: SharedFit, model: ResidualModel) -> Iterator[Check]:
+def _friction_checks(fit: SharedFit, contacts: Sequence[FittedContacts]) -> Iterator[Check]:
     own = OwnValues.of(fit, FRICTION)
     keep = np.flatnonzero(np.diag(own.covariance) < LARGEST_SD**2)
     if not len(keep):
         return
-    bodies = [model.videos[video].motion.tracks.bodies[body] for video, body in (own.bodies[k] for k in keep)]
+    bodies = [contacts[video].motion.tracks.bodies[body] for video, body in (own.bodies[k] for k in keep)]
     rolls = np.array([body.shape is Shape.SPHERE for body in bodies])
     known = np.stack([rolls, ~rolls], axis=1).astype(float)
     known = known[:, known.any(axis=0)]
@@ -204,8 +203,9 @@ def _friction_checks(fit: SharedFit, model: ResidualModel) -> Iterator[Check]:
     if all(body.mass is not None for body in bodies):
         found = asked([np.log([body.mass or 1.0 for body in bodies])])
     else:
-        masses = FittedMasses.of(fit, [FittedContacts.of(video.motion) for video in model.videos])
-        rows = [row for row, k in enumerate(keep) if own.bodies[k] in masses.logarithm]
+        masses = FittedMasses.of(fit, contacts)
+        logarithm = masses.logarithm
+        rows = [row for row, k in enumerate(keep) if own.bodies[k] in logarithm]
         chosen = [own.bodies[keep[row]] for row in rows]
         beside = np.concatenate([masses.membership(chosen), known[rows]], axis=1)
         found = dependence(
@@ -213,7 +213,7 @@ def _friction_checks(fit: SharedFit, model: ResidualModel) -> Iterator[Check]:
             covariance[np.ix_(rows, rows)],
             np.eye(len(rows)),
             _independent_columns(beside),
-            np.array([masses.logarithm[one] for one in chosen]).reshape(-1, 1),
+            np.array([logarithm[one] for one in chosen]).reshape(-1, 1),
         )
     power = 0.0 if found is None else float(found.slope[0])
     yield from _friction_check("mass", found, f"it goes with the mass to the power {number(power)}")

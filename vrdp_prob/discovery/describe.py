@@ -1,11 +1,10 @@
 """What is known of an effect that no cause of the catalogue explains: where it shows, its size, a sparse formula."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 from jaxtyping import Float
 
-from vrdp_prob.discovery.checks import run_checks
 from vrdp_prob.discovery.finding import Check, Description
 from vrdp_prob.discovery.free_flight import FreeFlight
 from vrdp_prob.discovery.free_flight_checks import BESIDE
@@ -25,15 +24,15 @@ MOST_CHECKS = 2
 """Checks that are quoted."""
 
 
-def describe(fit: SharedFit, *, seed: int) -> Description:
+def describe(fit: SharedFit, checks: Sequence[Check]) -> Description:
     """Describe what a joint fit leaves unexplained.
 
     Parameters
     ----------
     fit
         The fit.
-    seed
-        Seed of the replications of the checks that are quoted.
+    checks
+        Checks of the fit, some of which are quoted.
 
     Returns
     -------
@@ -54,7 +53,7 @@ def describe(fit: SharedFit, *, seed: int) -> Description:
         *_share_sentences(model, flight.model, noise),
         *_window_sentences(windows),
         *_formula_sentences(found, formula),
-        *_check_sentences(run_checks(fit, seed=seed)),
+        *_check_sentences(checks),
     ]
     return Description(formula, found.explained, float(np.sqrt(2)) * windows.size, tuple(sentences))
 
@@ -134,7 +133,7 @@ def _formula_sentences(found: SparseFormula, formula: str) -> Iterator[str]:
     )
 
 
-def _check_sentences(checks: tuple[Check, ...]) -> Iterator[str]:
+def _check_sentences(checks: Sequence[Check]) -> Iterator[str]:
     specific = [check for check in checks if check.significant and check.name not in GENERAL]
     telling = [check for check in specific if BESIDE not in check.sentence]
     for check in telling[:MOST_CHECKS]:

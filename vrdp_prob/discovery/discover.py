@@ -104,7 +104,7 @@ def discover(
         model=physics,
         extended=found.best.fit.model,
         videos=tuple(tracks.video for tracks in videos),
-        description=describe(found.best.fit, seed=seed) if verdict is Verdict.UNKNOWN else None,
+        description=describe(found.best.fit, after) if verdict is Verdict.UNKNOWN else None,
         notes=tuple(_notes(found, reasons, unlisted)),
         figures=residual_figures(found.base.fit, found.best.fit if found.best.causes else None),
     )

@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 
 from vrdp_prob.discovery import refits, search
+from vrdp_prob.discovery.scores import CauseScore
 from vrdp_prob.discovery.trials import Trial
 from vrdp_prob.inference.several_videos.ascent import ImpossibleStartError
+from vrdp_prob.models.effects.external_impulse import ExternalImpulse
 from vrdp_prob.models.effects.surface_tilt import SurfaceTilt
 
 
@@ -120,15 +122,15 @@ def test_videos_with_kicks_are_searched_anew_without_them(
 ) -> None:
     tilt, kicked, anew = _refit("tilt", 0.0), _refit("kicks", 10.0), _refit("tilt searched anew", found)
     kicked.without.return_value, tilt.mended.return_value = tilt, anew
-    kicked.acting.return_value = [2]
-    asked: list[object] = []
-    monkeypatch.setattr(search, "doubtful", lambda _fits, among: asked.append(among) or among)
+    kicked.acting.return_value = [0, 2]
+    tilt.fit = Mock(fits=["of one course only", "", ""])
+    monkeypatch.setattr(refits, "may_take_another_course", lambda fit: fit != "of one course only")
     monkeypatch.setattr(search, "happens_once", lambda _cause: True)
     _judge_by_gain(monkeypatch)
     base, winner = _searcher(needed=2.0).chosen(tilt, search.Step(Mock(spec=refits.Left), (kicked,)))
     assert base.causes[0] == goes_on_from
     assert (winner and winner.causes[0]) == taken
-    assert asked == [[2]]
+    tilt.mended.assert_called_once_with([2], seed=0)
 
 
 def _judge_by_gain(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -156,6 +158,51 @@ def test_lost_videos_are_searched_once_and_only_where_refits_leave_something(mon
         assert [one.causes for one in found.with_lost(leaving)] == [("tilt", "friction"), ("drag",)]
     assert found.of(leaving) == found.with_lost(leaving)
     assert asked == [leaving]
+
+
+@pytest.mark.parametrize(
+    ("lost", "kicked", "asked", "taken"),
+    [
+        ([2], [], [2], "tilt searched anew"),
+        ([2], [], [2], "tilt"),
+        ([2], [2, 2], [2], "tilt searched anew"),
+        ([], [1], [1], "tilt searched anew"),
+        ([0, 1], [3], None, "tilt"),
+        ([], [], None, "tilt"),
+    ],
+    ids=["a better course", "no better one", "a lost one is kicked", "a kicked one", "more than half", "none"],
+)
+def test_a_cause_has_its_few_lost_videos_searched_anew(
+    lost: list[int],
+    kicked: list[int],
+    asked: list[int] | None,
+    taken: str,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    nothing, tilt, drag = _refit("", 0.0), _refit("tilt", 5.0), _refit("drag", 7.0)
+    tilt.fit = Mock(fits=[""] * 4)
+    tilt.mended.return_value = _refit("tilt searched anew", 9.0) if taken != "tilt" else tilt
+    kicks = Mock(spec=CauseScore, effect=ExternalImpulse(), sites=[Mock(video=video) for video in kicked])
+    monkeypatch.setattr(refits, "lost_videos", lambda _fit: lost)
+    monkeypatch.setattr(refits, "may_take_another_course", lambda _fit: True)
+    monkeypatch.setattr(refits.Refits, "left", lambda _self, _trial: Mock(scores=[kicks]))
+    monkeypatch.setattr(refits.Refits, "_new", lambda _self, _trial: [drag, tilt])
+    found = _refits()
+    first = found.with_lost_found(nothing, tilt)
+    assert first.causes == (taken,)
+    assert asked is None or found.searched_anew(first, asked) is first, "each video is searched once"
+    assert [call.args for call in tilt.mended.call_args_list] == ([] if asked is None else [(asked,)])
+    assert [one.causes[0] for one in found.of(nothing)] == (
+        ["drag", "tilt"] if taken == "tilt" else ["tilt searched anew", "drag"]
+    )
+
+
+def test_kicks_are_no_measure_of_laws(monkeypatch: pytest.MonkeyPatch) -> None:
+    sizes = {"kicks": 1000.0, "patch": 150.0, "drag": 100.0, "curl": 20.0, "a jump of the clock": 90.0}
+    scores = [Mock(spec=CauseScore, effect=cause, size=size, p_value=1e-9) for cause, size in sizes.items()]
+    monkeypatch.setattr(refits, "happens_once", lambda cause: cause in {"kicks", "a jump of the clock"})
+    assert [one.effect for one in refits._shortlist(scores)] == ["kicks", "patch", "drag"]
+    assert [one.effect for one in refits._shortlist(scores, 0.8)] == ["kicks", "patch"]
 
 
 def test_a_cause_with_which_no_joint_world_can_begin_is_left_out(monkeypatch: pytest.MonkeyPatch) -> None:

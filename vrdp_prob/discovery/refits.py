@@ -15,6 +15,7 @@ from vrdp_prob.discovery.trials import Trial, gain, with_own_population
 from vrdp_prob.inference.parallel import in_processes
 from vrdp_prob.inference.several_videos.ascent import ImpossibleStartError
 from vrdp_prob.inference.several_videos.fitting import fit_together
+from vrdp_prob.inference.several_videos.second_look import MOST, may_take_another_course
 from vrdp_prob.models.effects.effect import Effect
 from vrdp_prob.models.effects.external_impulse import ExternalImpulse
 from vrdp_prob.progress import Advance
@@ -73,6 +74,7 @@ class Refits:
     _left: dict[Trial, Left] = field(default_factory=dict)
     _made: dict[Trial, list[Trial]] = field(default_factory=dict)
     _searched: set[Trial] = field(default_factory=set)
+    _anew: dict[Trial, frozenset[int]] = field(default_factory=dict)
 
     def left(self, trial: Trial) -> Left:
         """What a model leaves."""
@@ -95,12 +97,12 @@ class Refits:
         """Hidden things are tried only where nothing explains the videos better than kicks do."""
         scores = self.left(trial).scores
         likely = _shortlist(scores)
-        close = [one for one in likely if one.size > CLOSE * likely[0].size]
+        close = _shortlist(scores, CLOSE)
         found = self.made_of(trial, close)
         if not self.settled(trial, found):
             found += self.made_of(trial, [one for one in likely if one not in close])
             found.sort(key=merit, reverse=True)
-        kicks = next((one for one in scores if isinstance(one.effect, ExternalImpulse) and one.sites), None)
+        kicks = next((one for one in scores if _kicks(one) and one.sites), None)
         if kicks is not None and (not found or found[0].causes[-1].name == kicks.effect.name):
             found += self._hidden(trial, found, kicks)
         return sorted(found, key=merit, reverse=True)
@@ -111,6 +113,27 @@ class Refits:
         if trial not in self._searched and not self.settled(trial, found):
             self._searched.add(trial)
             found = self._made[trial] = sorted([*found, *self._lost(trial, found)], key=merit, reverse=True)
+        return found
+
+    def with_lost_found(self, trial: Trial, one: Trial) -> Trial:
+        """One of the refits with its few lost videos searched anew, in the place of which it counts from then on.
+
+        What one lost video leaves calls for many causes, of which each costs more to try than the search.
+        """
+        kicked = [site.video for score in self.left(one).scores for site in score.sites if _kicks(score)]
+        videos = list(dict.fromkeys([*lost_videos(one.fit), *kicked]))
+        found = one if len(videos) > len(one.fit.fits) // MOST else self.searched_anew(one, videos)
+        if found is not one:
+            refits = [found if old is one else old for old in self.of(trial)]
+            self._made[trial] = sorted(refits, key=merit, reverse=True)
+        return found
+
+    def searched_anew(self, trial: Trial, videos: Sequence[int]) -> Trial:
+        """A model with some videos searched anew, as far as they were not before and may take another course."""
+        before = self._anew.get(trial, frozenset())
+        now = [one for one in videos if one not in before and may_take_another_course(trial.fit.fits[one])]
+        found = trial.mended(now, seed=self.seed) if now else trial
+        self._anew[trial] = self._anew[found] = before | frozenset(now)
         return found
 
     def settled(self, trial: Trial, found: Sequence[Trial]) -> bool:
@@ -204,8 +227,17 @@ def _mends_several(trial: Trial) -> bool:
     return happens_once(cause) and len(trial.acting(cause)) > 1
 
 
-def _shortlist(scores: Sequence[CauseScore]) -> list[CauseScore]:
-    """Causes that may be the best one, or come near it."""
-    largest = max((one.size for one in scores), default=0.0)
-    hopeful = [one for one in scores if one.p_value < SHORTLIST_LEVEL and one.size > HOPEFUL * largest]
-    return sorted(hopeful, key=lambda one: -one.size)[:MOST_REFITTED]
+def _kicks(score: CauseScore) -> bool:
+    return isinstance(score.effect, ExternalImpulse)
+
+
+def _shortlist(scores: Sequence[CauseScore], share: float = HOPEFUL) -> list[CauseScore]:
+    """Causes whose statistic is more than a share of the largest one.
+
+    What happens once mends the course of a lost video better than any law does from where the fit is; so it is no
+    measure of laws.
+    """
+    likely = sorted((one for one in scores if one.p_value < SHORTLIST_LEVEL), key=lambda one: -one.size)
+    lasting = [one for one in likely if not happens_once(one.effect)]
+    compared = [(one, lasting if one in lasting else likely) for one in likely]
+    return [one for one, others in compared if one.size > share * others[0].size][:MOST_REFITTED]

@@ -165,8 +165,11 @@ class _Searcher:
     def tried(self, trial: Trial) -> Step:
         """The step with the causes tried that may be the best one."""
         found, pair = self.refits.of(trial), None
+        first = None if self.refits.settled(trial, found) else self._provisional(trial, found)
+        if first is not None:
+            first = self.refits.with_lost_found(trial, first)
+            found = self.refits.of(trial)
         if not self.refits.settled(trial, found):
-            first = self._provisional(trial, found)
             if first is None:
                 found = self.refits.with_lost(trial)
             else:
@@ -203,8 +206,7 @@ class _Searcher:
             if gain(without, trial)[0] > self.needed:
                 trial = without
             if happens_once(winner.causes[-1]):
-                kicked = doubtful(trial.fit.fits, winner.acting(winner.causes[-1]))
-                mended = trial.mended(kicked, seed=self.seed)
+                mended = self.refits.searched_anew(trial, winner.acting(winner.causes[-1]))
                 trial = mended if gain(mended, trial)[0] > self.needed else trial
             if self.doubted(winner, trial, self.refits.left(winner).overdispersion):
                 winner = None

@@ -57,6 +57,26 @@ def test_without_contact_everything_is_default() -> None:
     assert status["0"].is_default
 
 
+def test_a_law_by_which_masses_matter_links_those_of_bodies_that_never_meet() -> None:
+    video = tracks(3)
+    told: list[dict[tuple[str, int], float]] = [{("mass", i): 1.0, ("mass", j): -1.0} for i, j in ((0, 1), (1, 2))]
+    known = information(video, [], [], more=told)
+    status = identifiability_of(video, [], [], known, felt={0, 1, 2})
+    for name, others in (("0", ("1", "2")), ("1", ("0", "2")), ("2", ("0", "1"))):
+        assert status[name].mass.status is Status.RATIO_ONLY
+        assert status[name].mass.partners == others
+        assert status[name].restitution.status is Status.DEFAULT
+    weighed = tracks(3, masses={2: 1.0})
+    status = identifiability_of(weighed, [], [], information(weighed, [], [], more=told), felt={0, 1, 2})
+    assert status["0"].mass.status is Status.IDENTIFIED
+
+
+def test_a_contact_of_which_nothing_is_told_is_idle_though_the_mass_is_felt() -> None:
+    video, pairs = tracks(2), [(0, 1)]
+    blunt = information(video, pairs, [], sharp=1e3, more=[{("mass", 0): 1.0, ("mass", 1): -1.0}])
+    assert uninformed(video, pairs, [], blunt, felt={0, 1}) == {0, 1}
+
+
 def test_a_chain_of_contacts_gives_ratios_and_products_with_the_partners() -> None:
     status = identifiability(tracks(4), [(0, 1), (1, 2)], [])
     assert status["1"].mass.status is Status.RATIO_ONLY

@@ -7,7 +7,7 @@ from tests.inference.prior_scenes import prior_scene
 from vrdp_prob.inference import default_model
 from vrdp_prob.inference.map_fit import fit_map
 from vrdp_prob.inference.passing import close_passes
-from vrdp_prob.inference.several_videos.parts import structure_of
+from vrdp_prob.models.unknowns import structure_of
 from vrdp_prob.scene import Body, Shape, Tracks, Wall
 
 RADIUS = 0.2

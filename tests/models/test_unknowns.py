@@ -4,9 +4,12 @@ import numpy as np
 import pytest
 
 from vrdp_prob.models.effects.contact_friction import ContactFriction
+from vrdp_prob.models.effects.effect import Effect
+from vrdp_prob.models.effects.mass_dependent_friction import MassDependentFriction
+from vrdp_prob.models.effects.pair_force import PairForce
 from vrdp_prob.models.effects.wall import Wall as HiddenWall
 from vrdp_prob.models.physics import PhysicsModel
-from vrdp_prob.models.unknowns import SPIN_SD, SURFACE_SPEED_SD, Structure, unknowns
+from vrdp_prob.models.unknowns import SPIN_SD, SURFACE_SPEED_SD, Structure, structure_of, unknowns
 from vrdp_prob.scene import Body, Shape, Tracks, Wall
 
 RUBBING = PhysicsModel.base().with_effect(ContactFriction())
@@ -46,3 +49,13 @@ def test_friction_of_walls_is_unknown_only_where_something_is_fixed() -> None:
         coordinates = unknowns(tracks, model, EVERYTHING)
         assert (("wall_friction", None) in coordinates.places) is expected
         assert ("contact_friction", None) in coordinates.places
+
+
+@pytest.mark.parametrize("effect", [PairForce(), MassDependentFriction()], ids=lambda effect: effect.name)
+def test_a_mass_that_a_path_depends_on_is_unknown_without_collision(effect: Effect) -> None:
+    tracks, alone = seen(Shape.CYLINDER, 0.2), Structure(moving=frozenset({0}), colliding=frozenset())
+    felt = unknowns(tracks, PhysicsModel.base().with_effect(effect), alone)
+    assert ("mass", 0) in felt.places, "what moves tells its mass"
+    assert ("mass", 1) not in felt.places, "what rests does not"
+    assert ("mass", 0) not in unknowns(tracks, PhysicsModel.base(), alone).places
+    assert structure_of(felt) == alone

@@ -17,7 +17,7 @@ from vrdp_prob.inference.samples import Convergence, Samples
 from vrdp_prob.inference.tree import posterior_tree
 from vrdp_prob.models.parameters import MASS, RESTITUTION
 from vrdp_prob.models.roughness import untold_noise
-from vrdp_prob.models.unknowns import mass_prior
+from vrdp_prob.models.unknowns import felt_masses, mass_prior, structure_of
 from vrdp_prob.scene import Tracks
 
 FEWEST_FRAMES = 5
@@ -28,8 +28,10 @@ BATCH = 500
 """Worlds simulated at once when the draws are looked at again."""
 BOTH = ("mass and restitution are default values", "mass and restitution are drawn from the prior")
 MASS_ALONE = ("mass is a default value", "mass is drawn from the prior")
+RESTITUTION_ALONE = ("restitution is a default value", "restitution is drawn from the prior")
 ALONE = ("never collides in view", "never collide in view", BOTH)
 LATE = ("collides too late or too weakly to tell", "collide too late or too weakly to tell", BOTH)
+FELT = ("never collides in view", "never collide in view", RESTITUTION_ALONE)
 BOUNCED = ("tells something only where it meets walls", "tell something only where they meet walls", MASS_ALONE)
 """Why the tracks do not tell (of one object, of several), and what stands in for what they do not tell."""
 
@@ -64,7 +66,8 @@ def posterior_from(
     tracks = fit.likelihood.tracks
     information = Information(fit.likelihood.coordinates, fit.modes[0])
     told = _telling(fit)
-    status = identifiability(tracks, told, wall_contacts(fit.rollout, 0), information)
+    felt = felt_masses(fit.likelihood.model, structure_of(fit.likelihood.coordinates).moving)
+    status = identifiability(tracks, told, wall_contacts(fit.rollout, 0), information, felt)
     changed = _changed_order(fit, samples.points)
     convergence = replace(convergence, collision_order_changes=float(changed.mean()))
     names = [body.id for body in tracks.bodies]
@@ -178,11 +181,13 @@ def _untold(fit: MapFit, status: dict[str, BodyStatus], *, drawn: bool) -> Itera
     """What the tracks say nothing about."""
     names = [body.id for body in fit.likelihood.tracks.bodies]
     met = {names[body] for pair in fit.contacts for body in pair}
-    groups: dict[tuple[str, str, tuple[str, str]], list[str]] = {ALONE: [], LATE: [], BOUNCED: []}
+    groups: dict[tuple[str, str, tuple[str, str]], list[str]] = {ALONE: [], LATE: [], FELT: [], BOUNCED: []}
     for name, one in status.items():
         if one.mass.status is Status.DEFAULT:
             bounced = one.restitution.status is not Status.DEFAULT
             groups[BOUNCED if bounced else LATE if name in met else ALONE].append(name)
+        elif one.restitution.status is Status.DEFAULT and name not in met:
+            groups[FELT].append(name)
     for (one_does, several_do, values), group in groups.items():
         if group:
             yield f"{_named(group, one_does, several_do)}: {values[drawn]}, not measured."

@@ -72,7 +72,8 @@ class HamiltonianMove(emcee.moves.Move):  # type: ignore[misc]  # emcee has no t
             place = np.where(goes[:, None], ahead, place)
             log_density = np.where(goes, values, log_density)
             gradient = np.where(goes[:, None], slopes, gradient)
-        gain = energy - (momentum**2).sum(axis=1) / 2 + log_density
+        with np.errstate(over="ignore"):  # what gains so much momentum is refused
+            gain = energy - (momentum**2).sum(axis=1) / 2 + log_density
         # No trajectory leads back to a place that is too far off, so a walker there waits for other moves.
         near = np.abs(state.coords).max(axis=1) < FARTHEST
         accepted = (np.log(random.uniform(size=walkers)) < gain) & near

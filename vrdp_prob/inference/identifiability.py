@@ -8,9 +8,10 @@ The graph says what contacts could tell under the base model; the curvature of t
 whether another law of the model (a force that depends on mass, say) tells the rest.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
+from itertools import combinations
 
 from vrdp_prob.inference.information import Information, Weights
 from vrdp_prob.models.parameters import MASS, RESTITUTION, WALL_RESTITUTION
@@ -106,10 +107,12 @@ class CollisionGroup:
 
 
 Graph = dict[str, set[str]]
-Pairs = Iterable[tuple[int, int]]
+Pairs = Collection[tuple[int, int]]
 
 
-def identifiability(tracks: Tracks, pairs: Pairs, walls: Pairs, information: Information) -> dict[str, BodyStatus]:
+def identifiability(
+    tracks: Tracks, pairs: Pairs, walls: Pairs, information: Information, felt: Collection[int] = ()
+) -> dict[str, BodyStatus]:
     """Status of every body.
 
     Parameters
@@ -122,12 +125,16 @@ def identifiability(tracks: Tracks, pairs: Pairs, walls: Pairs, information: Inf
         Pairs of a body and a wall that collide, by index.
     information
         How much the data narrow the prior.
+    felt
+        Bodies whose free motion depends on their mass, by index. A law that has the same strength for all of them links
+        their masses as collisions do.
     """
-    contacts, with_walls = _graphs(tracks, pairs, walls)
+    _, with_walls = _graphs(tracks, pairs, walls)
     names = [body.id for body in tracks.bodies]
+    linked, _ = _graphs(tracks, [*pairs, *combinations(sorted(felt), 2)], ())
     return {
         name: BodyStatus(
-            _mass_status(tracks, name, contacts, information),
+            _mass_status(tracks, name, linked, information),
             _restitution_status(tracks, name, with_walls, information),
         )
         for name in names
@@ -157,10 +164,12 @@ def collision_groups(
     return tuple(groups)
 
 
-def uninformed(tracks: Tracks, pairs: Pairs, walls: Pairs, information: Information) -> frozenset[int]:
-    """Bodies that collide, but of whose mass and restitution the tracks say nothing, for example as it was too late."""
+def uninformed(
+    tracks: Tracks, pairs: Pairs, walls: Pairs, information: Information, felt: Collection[int] = ()
+) -> frozenset[int]:
+    """Bodies that collide, but of whose mass and restitution that says nothing, for example as it was too late."""
     status = identifiability(tracks, pairs, walls, information)
-    weighed = {body.id for body in tracks.bodies if body.mass is not None}
+    weighed = {body.id for index, body in enumerate(tracks.bodies) if body.mass is not None or index in felt}
     return frozenset(
         index
         for index, body in enumerate(tracks.bodies)

@@ -17,7 +17,7 @@ from vrdp_prob.inference.refinement import Refined, mode_at
 from vrdp_prob.inference.samples import evaluate
 from vrdp_prob.models.coordinates import Coordinates
 from vrdp_prob.models.likelihood import Likelihood
-from vrdp_prob.models.unknowns import Structure, unknowns
+from vrdp_prob.models.unknowns import Structure, felt_masses, unknowns
 
 LEAST_EVIDENCE = 7.0
 """A mode whose Laplace evidence is more nats below the best one's is left out."""
@@ -71,7 +71,8 @@ def without_idle(
     likelihood: Likelihood, modes: Sequence[Mode], moving: frozenset[int]
 ) -> tuple[Likelihood, tuple[Mode, ...]]:
     """The same modes without the unknowns of bodies that meet nobody in any of them, or too late to tell."""
-    structure, idle = structure_at(likelihood, [mode.point for mode in modes], moving), _uninformed(likelihood, modes)
+    structure = structure_at(likelihood, [mode.point for mode in modes], moving)
+    idle = _uninformed(likelihood, modes, moving)
     structure = replace(structure, colliding=structure.colliding - idle, bouncing=structure.bouncing - idle)
     coordinates = in_unknowns_of(likelihood, structure).coordinates
     if len(coordinates) == len(likelihood.coordinates):
@@ -93,7 +94,7 @@ def restricted(
     )
 
 
-def _uninformed(likelihood: Likelihood, modes: Sequence[Mode]) -> frozenset[int]:
+def _uninformed(likelihood: Likelihood, modes: Sequence[Mode], moving: frozenset[int]) -> frozenset[int]:
     """Bodies of whose mass and restitution no mode says anything."""
     with torch.no_grad():
         rollout = likelihood.rollout(torch.from_numpy(np.array([mode.point for mode in modes])))
@@ -103,6 +104,7 @@ def _uninformed(likelihood: Likelihood, modes: Sequence[Mode]) -> frozenset[int]
             first_contacts(rollout, world),
             wall_contacts(rollout, world),
             Information(likelihood.coordinates, mode),
+            felt_masses(likelihood.model, moving),
         )
         for world, mode in enumerate(modes)
     ]

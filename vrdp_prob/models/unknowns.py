@@ -55,6 +55,7 @@ class Structure:
         Bodies whose release velocity and spin are unknown; the others are at rest when they are released.
     colliding
         Bodies that meet others, so that the motion can say something about mass and restitution (and yaw of a cube).
+        Of those that meet nobody it says something about the mass only under effects by which that matters.
     bouncing
         Bodies that meet walls, which say nothing about a mass, but about the rest.
     passing
@@ -113,6 +114,22 @@ def unknowns(
     return Coordinates(tuple(one for one in entries if (one.field, one.owner) not in structure.held), defaults)
 
 
+def structure_of(coordinates: Coordinates) -> Structure:
+    """Which bodies have which unknowns in a fit."""
+    owners = {
+        field: frozenset(e.owner for e in coordinates.entries if e.field == field and e.owner is not None)
+        for field in ("velocity_x", MASS.name, RESTITUTION.name, "angle")
+    }
+    # A weighed body that meets others counts among those that meet walls: it has the same unknowns. One that meets
+    # nothing may have a mass, by which its motion is felt, and no restitution.
+    return Structure(
+        moving=owners["velocity_x"],
+        colliding=owners[MASS.name] & owners[RESTITUTION.name],
+        bouncing=owners[RESTITUTION.name],
+        passing=owners["angle"] - owners[RESTITUTION.name],
+    )
+
+
 def _motion(tracks: Tracks, structure: Structure) -> Iterator[Coordinate]:
     """Where each body is released, and how fast."""
     first = first_positions(tracks)
@@ -157,7 +174,7 @@ def _spin_sd(body: Body) -> float:
 def _matter(tracks: Tracks, model: PhysicsModel, structure: Structure) -> Iterator[Coordinate]:
     """Mass, where nobody weighed it (expected near the weighed ones, if any), and restitution of bodies and walls."""
     prior = mass_prior(tracks, model)
-    for body in sorted(structure.colliding):
+    for body in sorted(structure.colliding | felt_masses(model, structure.moving)):
         if tracks.bodies[body].mass is None:
             yield Coordinate(MASS.name, body, MASS.transform, prior, scale=0.1)
     for body in sorted(structure.meeting):
@@ -165,6 +182,11 @@ def _matter(tracks: Tracks, model: PhysicsModel, structure: Structure) -> Iterat
     for index, wall in enumerate(tracks.walls):
         if wall.restitution is None:
             yield Coordinate.of(model.believed(WALL_RESTITUTION), index)
+
+
+def felt_masses(model: PhysicsModel, moving: frozenset[int]) -> frozenset[int]:
+    """Bodies on whose mass their motion depends also where they meet nothing, of those that move."""
+    return moving if any(effect.mass_matters for effect in model.effects) else frozenset()
 
 
 def _physics(tracks: Tracks, model: PhysicsModel, structure: Structure) -> Iterator[Coordinate]:

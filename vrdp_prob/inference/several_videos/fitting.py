@@ -20,13 +20,13 @@ from vrdp_prob.inference.several_videos.ascent import ROUNDS, ImpossibleStartErr
 from vrdp_prob.inference.several_videos.joining import joined
 from vrdp_prob.inference.several_videos.joint_fit import JointFit, with_alternatives
 from vrdp_prob.inference.several_videos.linking import check_names, link
-from vrdp_prob.inference.several_videos.parts import carried_starts, fit_alone, link_fits, structure_of
+from vrdp_prob.inference.several_videos.parts import carried_starts, fit_alone, link_fits
 from vrdp_prob.inference.several_videos.second_look import look_again
 from vrdp_prob.inference.several_videos.transfer import first_numbers
 from vrdp_prob.models.effects.effect import Effect
 from vrdp_prob.models.likelihood import Likelihood
 from vrdp_prob.models.physics import PhysicsModel
-from vrdp_prob.models.unknowns import Structure, unknowns
+from vrdp_prob.models.unknowns import Structure, structure_of, unknowns
 from vrdp_prob.progress import ProgressDisplay, SilentProgress
 from vrdp_prob.scene import Tracks
 

@@ -14,8 +14,9 @@ from vrdp_prob.inference.several_videos.clouds import Clouds
 from vrdp_prob.inference.several_videos.importance import weighted_locals
 from vrdp_prob.inference.several_videos.joint_fit import local_modes
 from vrdp_prob.inference.several_videos.linking import linked
-from vrdp_prob.inference.several_videos.parts import plain_likelihood, stream, structure_of
+from vrdp_prob.inference.several_videos.parts import plain_likelihood, stream
 from vrdp_prob.inference.several_videos.posterior import SharedPosterior
+from vrdp_prob.models.unknowns import structure_of
 from vrdp_prob.progress import ProgressDisplay
 from vrdp_prob.scene import Tracks
 

@@ -10,11 +10,9 @@ from vrdp_prob.inference.clues import Clues
 from vrdp_prob.inference.map_fit import MapFit, fit_map
 from vrdp_prob.inference.plan import FitPlan
 from vrdp_prob.inference.several_videos.linking import LinkedVideo, SharedNumbers, link
-from vrdp_prob.models.coordinates import Coordinates
 from vrdp_prob.models.likelihood import Likelihood
-from vrdp_prob.models.parameters import MASS, RESTITUTION
 from vrdp_prob.models.physics import PhysicsModel
-from vrdp_prob.models.unknowns import Structure, unknowns
+from vrdp_prob.models.unknowns import Structure, structure_of, unknowns
 from vrdp_prob.scene import Tracks
 
 
@@ -67,18 +65,3 @@ def link_fits(
         plain_likelihood(fit.clues, model, structure) for fit, structure in zip(fits, structures, strict=True)
     ]
     return link(likelihoods, shared)
-
-
-def structure_of(coordinates: Coordinates) -> Structure:
-    """Which bodies have which unknowns in a fit."""
-    owners = {
-        field: frozenset(e.owner for e in coordinates.entries if e.field == field and e.owner is not None)
-        for field in ("velocity_x", MASS.name, RESTITUTION.name, "angle")
-    }
-    # A weighed body that meets others counts among those that meet walls: it has the same unknowns.
-    return Structure(
-        moving=owners["velocity_x"],
-        colliding=owners[MASS.name],
-        bouncing=owners[RESTITUTION.name],
-        passing=owners["angle"] - owners[RESTITUTION.name],
-    )

@@ -14,9 +14,10 @@ from vrdp_prob.inference.map_fit import MapFit, fit_map
 from vrdp_prob.inference.parallel import in_processes
 from vrdp_prob.inference.plan import IN_DOUBT, TURNING, FitPlan
 from vrdp_prob.inference.several_videos.agreement import consensus
-from vrdp_prob.inference.several_videos.parts import carried_starts, link_fits, plain_likelihood, stream, structure_of
+from vrdp_prob.inference.several_videos.parts import carried_starts, link_fits, plain_likelihood, stream
 from vrdp_prob.models.parameters import Prior, Scope
 from vrdp_prob.models.physics import PhysicsModel
+from vrdp_prob.models.unknowns import structure_of
 
 WORSE = 1.08
 """Residuals that are larger than those of the video in the middle by this factor call for another look..."""

@@ -1,14 +1,19 @@
 """Which numbers are unknown, and what is believed of them."""
 
+from collections.abc import Mapping
+from typing import ClassVar
+
 import numpy as np
 import pytest
 
 from vrdp_prob.models.effects.contact_friction import ContactFriction
-from vrdp_prob.models.effects.effect import Effect
+from vrdp_prob.models.effects.effect import BodyView, Effect
+from vrdp_prob.models.effects.magnus_curl import MagnusCurl
 from vrdp_prob.models.effects.mass_dependent_friction import MassDependentFriction
 from vrdp_prob.models.effects.pair_force import PairForce
 from vrdp_prob.models.effects.wall import Wall as HiddenWall
 from vrdp_prob.models.physics import PhysicsModel
+from vrdp_prob.models.simulator.formula import Scalar
 from vrdp_prob.models.unknowns import SPIN_SD, SURFACE_SPEED_SD, Structure, structure_of, unknowns
 from vrdp_prob.scene import Body, Shape, Tracks, Wall
 
@@ -51,7 +56,39 @@ def test_friction_of_walls_is_unknown_only_where_something_is_fixed() -> None:
         assert ("contact_friction", None) in coordinates.places
 
 
-@pytest.mark.parametrize("effect", [PairForce(), MassDependentFriction()], ids=lambda effect: effect.name)
+class SteadyPush(Effect):
+    """The same force on every body, by the weight of which it is divided."""
+
+    name: ClassVar = "steady_push"
+    sentence: ClassVar = "Something pushes along x."
+    law: ClassVar = "a = 1 N / m"
+    source: ClassVar = "made up"
+
+    def acceleration(self, time: Scalar, body: BodyView, parameters: Mapping[str, Scalar]) -> tuple[Scalar, Scalar]:
+        """Along x, in m/s^2."""
+        return body.inverse_mass, 0.0
+
+
+class Blow(Effect):
+    """A blow at 1 s that heavy bodies hardly feel."""
+
+    name: ClassVar = "blow"
+    sentence: ClassVar = "Something hits all bodies at once."
+    law: ClassVar = "dv = 1 N s / m at 1 s"
+    source: ClassVar = "made up"
+
+    def kick_time(self, parameters: Mapping[str, Scalar]) -> Scalar:
+        """In s."""
+        return 1.0
+
+    def kick(self, time: Scalar, body: BodyView, parameters: Mapping[str, Scalar]) -> tuple[Scalar, Scalar, Scalar]:
+        """Along x, in m/s."""
+        return 1.0 / body.mass, 0.0, 0.0
+
+
+@pytest.mark.parametrize(
+    "effect", [PairForce(), MassDependentFriction(), SteadyPush(), Blow()], ids=lambda effect: effect.name
+)
 def test_a_mass_that_a_path_depends_on_is_unknown_without_collision(effect: Effect) -> None:
     tracks, alone = seen(Shape.CYLINDER, 0.2), Structure(moving=frozenset({0}), colliding=frozenset())
     felt = unknowns(tracks, PhysicsModel.base().with_effect(effect), alone)
@@ -59,3 +96,9 @@ def test_a_mass_that_a_path_depends_on_is_unknown_without_collision(effect: Effe
     assert ("mass", 1) not in felt.places, "what rests does not"
     assert ("mass", 0) not in unknowns(tracks, PhysicsModel.base(), alone).places
     assert structure_of(felt) == alone
+
+
+def test_a_spin_that_a_path_depends_on_is_unknown() -> None:
+    tracks, alone = seen(Shape.CYLINDER, 0.2), Structure(moving=frozenset({0}), colliding=frozenset())
+    assert ("spin", 0) in unknowns(tracks, PhysicsModel.base().with_effect(MagnusCurl()), alone).places
+    assert ("spin", 0) not in unknowns(tracks, PhysicsModel.base(), alone).places

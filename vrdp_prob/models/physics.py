@@ -16,7 +16,7 @@ from vrdp_prob.models.effects.effect import Effect
 from vrdp_prob.models.effects.normal_impact import NormalImpact
 from vrdp_prob.models.parameters import MATTER, Parameter
 from vrdp_prob.models.simulator.kernel import Kernel, load
-from vrdp_prob.models.simulator.laws import CONSTANTS, STATE, Layout
+from vrdp_prob.models.simulator.laws import CONSTANTS, STATE, Layout, path_depends_on_mass, path_depends_on_spin
 
 
 @dataclass(frozen=True)
@@ -142,6 +142,16 @@ class PhysicsModel:
     def layout(self) -> Layout:
         """Order of the numbers that the compiled kernel takes."""
         return Layout.of(self.parameters)
+
+    @cached_property
+    def path_depends_on_mass(self) -> bool:
+        """Whether the path of a body that touches nothing depends on its mass."""
+        return path_depends_on_mass(self.effects, self.layout)
+
+    @cached_property
+    def path_depends_on_spin(self) -> bool:
+        """Whether the path of a body that touches nothing depends on its angle or spin."""
+        return path_depends_on_spin(self.effects, self.layout)
 
     @cached_property
     def kernel(self) -> Kernel:

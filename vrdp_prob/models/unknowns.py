@@ -149,12 +149,11 @@ def _turning(tracks: Tracks, model: PhysicsModel, structure: Structure) -> Itera
     measured = set(Observations.of(tracks).angle_bodies)
     angles = tracks.angles
     rubs = any(effect.overrides("tangential_impulse") for effect in model.effects)
-    bends = any(effect.spin_matters for effect in model.effects)
     for body, description in enumerate(tracks.bodies):
         turning_cube = description.shape is Shape.CUBE and body in structure.turning
         if turning_cube:
             yield Coordinate("angle", body, Transform.IDENTITY, Prior(0.0, YAW_SD), scale=0.1)
-        spin_matters = bends or turning_cube or (rubs and body in structure.meeting)
+        spin_matters = model.path_depends_on_spin or turning_cube or (rubs and body in structure.meeting)
         if body in structure.moving and (spin_matters or body in measured):
             prior = Prior(0.0, _spin_sd(description))
             yield Coordinate("spin", body, Transform.IDENTITY, prior, scale=0.1)
@@ -186,14 +185,13 @@ def _matter(tracks: Tracks, model: PhysicsModel, structure: Structure) -> Iterat
 
 def felt_masses(model: PhysicsModel, moving: frozenset[int]) -> frozenset[int]:
     """Bodies on whose mass their motion depends also where they meet nothing, of those that move."""
-    return moving if any(effect.mass_matters for effect in model.effects) else frozenset()
+    return moving if model.path_depends_on_mass else frozenset()
 
 
 def _physics(tracks: Tracks, model: PhysicsModel, structure: Structure) -> Iterator[Coordinate]:
     """Parameters of the model that can have an effect on these bodies."""
     turning = any(tracks.bodies[body].shape is Shape.CUBE for body in structure.turning)
-    bends = any(effect.spin_matters for effect in model.effects)
-    spin_matters = turning or bends or bool(Observations.of(tracks).angle_bodies)
+    spin_matters = turning or model.path_depends_on_spin or bool(Observations.of(tracks).angle_bodies)
     walls = bool(tracks.walls) or any(effect.overrides("obstacles") for effect in model.effects)
     for parameter in model.parameters:
         if parameter.needs_walls and not walls:

@@ -128,10 +128,6 @@ class Effect:
     """Parameters, each with the one of another effect that leaves nothing of this one where both are equal."""
     stepwise: ClassVar[frozenset[str]] = frozenset()
     """Parameters on which the motion depends in steps, without a slope: they are found by a scan, and held there."""
-    spin_matters: ClassVar[bool] = False
-    """Whether the path of a body in free flight depends on its spin, which is then unknown where nobody saw it."""
-    mass_matters: ClassVar[bool] = False
-    """Whether the path of a body in free flight depends on its mass, which is then unknown though it meets nothing."""
 
     @classmethod
     def overrides(cls, hook: str) -> bool:

@@ -21,7 +21,6 @@ class MagnusCurl(Effect):
     source: ClassVar = "Magnus, Annalen der Physik 164 (1853)"
     parameters: ClassVar = (CURL,)
     vanishes_at: ClassVar = {"curl": 0.0}
-    spin_matters: ClassVar = True
 
     def acceleration(self, time: Scalar, body: BodyView, parameters: Mapping[str, Scalar]) -> tuple[Scalar, Scalar]:
         """Acceleration in m/s^2 to the left of the path where curl and spin are positive."""

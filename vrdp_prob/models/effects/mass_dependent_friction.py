@@ -33,7 +33,6 @@ class MassDependentFriction(Effect):
     )
     parameters: ClassVar = (MASS_EXPONENT,)
     vanishes_at: ClassVar = {"friction_mass_exponent": 0.0}
-    mass_matters: ClassVar = True
 
     def friction_factor(self, time: Scalar, body: BodyView, parameters: Mapping[str, Scalar]) -> Scalar:
         """Factor of the friction, 1 for 1 kg."""

@@ -42,7 +42,6 @@ class PairForce(Effect):
     source: ClassVar = "inverse-square law with a softening length: H. C. Plummer, MNRAS 71 (1911)"
     parameters: ClassVar = (PAIR_STRENGTH, PAIR_SOFTENING)
     vanishes_at: ClassVar = {"pair_strength": 0.0}
-    mass_matters: ClassVar = True
 
     def search_points(self, videos: Sequence[Tracks]) -> Sequence[Mapping[str, float]]:
         """With a short and a long range of the softening."""

@@ -150,17 +150,21 @@ def _vjp(
     return law_function(name, _arguments(f"{arguments} {' '.join(arrays)}"), by_array, add=True)
 
 
+def _motion(effects: Sequence[Effect], inputs: LawInputs) -> tuple[Scalar, ...]:
+    """Time derivative of the state of a body."""
+    phase = inputs.phase()
+    body = inputs.view(inputs.state("y"), inputs.constants("body"), phase)
+    outputs = derivative(effects, inputs.time, body, Phase(phase[0], phase[3]), inputs.shared)
+    return (*outputs, *[0.0] * (STATE_SIZE - len(outputs)))
+
+
 def _motion_text(effects: Sequence[Effect], layout: Layout) -> str:
     inputs = LawInputs(effects, layout)
-    state, constants = inputs.state("y"), inputs.constants("body")
-    phase = inputs.phase()
-    body = inputs.view(state, constants, phase)
-    outputs = derivative(effects, inputs.time, body, Phase(phase[0], phase[3]), inputs.shared)
-    outputs = (*outputs, *[0.0] * (STATE_SIZE - len(outputs)))
+    outputs = _motion(effects, inputs)
     value = law_function("motion", _arguments("t y phase body shared out"), {"out": outputs})
     arrays = {
-        "y_bar": state,
-        "body_bar": constants,
+        "y_bar": inputs.state("y"),
+        "body_bar": inputs.constants("body"),
         "shared_bar": list(inputs.shared.values()),
         "t_bar": [inputs.time],
     }
@@ -187,6 +191,29 @@ def is_timed(effects: Sequence[Effect], layout: Layout) -> bool:
     """Whether what pushes a body at rest, or its friction, changes with time."""
     inputs = LawInputs(effects, layout)
     return depends(_external(effects, inputs), inputs.time) or depends(_pair_force(effects, inputs), inputs.time)
+
+
+def path_depends_on_mass(effects: Sequence[Effect], layout: Layout) -> bool:
+    """Whether the path of a body that touches nothing depends on its mass; one that others push does."""
+    inputs = LawInputs(effects, layout)
+    constants = dict(zip(layout.constants, inputs.constants("body"), strict=True))
+    path = _path(effects, inputs)
+    return is_coupled(effects) or any(depends(path, constants[name]) for name in ("mass", "inverse_mass"))
+
+
+def path_depends_on_spin(effects: Sequence[Effect], layout: Layout) -> bool:
+    """Whether the path of a body that touches nothing depends on how it turns."""
+    inputs = LawInputs(effects, layout)
+    turning = [inputs.state(name)[index] for name in ("y", "ya", "yb") for index in (2, 5)]
+    path = [*_path(effects, inputs), *_pair_force(effects, inputs)]
+    return any(depends(path, one) for one in turning)
+
+
+def _path(effects: Sequence[Effect], inputs: LawInputs) -> list[Scalar]:
+    """What changes the velocity of a body that touches nothing, forces of other bodies apart."""
+    body = inputs.view(inputs.state("y"), inputs.constants("body"))
+    kicks = [effect.kick(inputs.time, body, inputs.shared) for effect in with_kick(effects)]
+    return [*_motion(effects, inputs)[3:5], *(change for kick in kicks for change in kick[:2])]
 
 
 def is_coupled(effects: Sequence[Effect]) -> bool:

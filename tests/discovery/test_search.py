@@ -121,7 +121,8 @@ def test_videos_with_kicks_are_searched_anew_without_them(
     found: float, goes_on_from: str, taken: str | None, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     tilt, kicked, anew = _refit("tilt", 0.0), _refit("kicks", 10.0), _refit("tilt searched anew", found)
-    kicked.without.return_value, tilt.mended.return_value = tilt, anew
+    kicked.without.return_value, tilt.mended.return_value, anew.mended.return_value = tilt, anew, anew
+    tilt.fallen_from.return_value = anew.fallen_from.return_value = []
     kicked.acting.return_value = [0, 2]
     tilt.fit = Mock(fits=["of one course only", "", ""])
     monkeypatch.setattr(refits, "may_take_another_course", lambda fit: fit != "of one course only")
@@ -181,7 +182,9 @@ def test_a_cause_has_its_few_lost_videos_searched_anew(
 ) -> None:
     nothing, tilt, drag = _refit("", 0.0), _refit("tilt", 5.0), _refit("drag", 7.0)
     tilt.fit = Mock(fits=[""] * 4)
-    tilt.mended.return_value = _refit("tilt searched anew", 9.0) if taken != "tilt" else tilt
+    anew = _refit("tilt searched anew", 9.0)
+    tilt.mended.return_value, anew.mended.return_value = anew if taken != "tilt" else tilt, anew
+    tilt.fallen_from.return_value = anew.fallen_from.return_value = []
     kicks = Mock(spec=CauseScore, effect=ExternalImpulse(), sites=[Mock(video=video) for video in kicked])
     monkeypatch.setattr(refits, "lost_videos", lambda _fit: lost)
     monkeypatch.setattr(refits, "may_take_another_course", lambda _fit: True)
@@ -190,11 +193,41 @@ def test_a_cause_has_its_few_lost_videos_searched_anew(
     found = _refits()
     first = found.with_lost_found(nothing, tilt)
     assert first.causes == (taken,)
-    assert asked is None or found.searched_anew(first, asked) is first, "each video is searched once"
     assert [call.args for call in tilt.mended.call_args_list] == ([] if asked is None else [(asked,)])
     assert [one.causes[0] for one in found.of(nothing)] == (
         ["drag", "tilt"] if taken == "tilt" else ["tilt searched anew", "drag"]
     )
+
+
+def test_a_video_is_searched_again_only_where_the_last_search_has_found_something_or_it_has_fallen_since(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    tilt, followed, better = _refit("tilt", 5.0), _refit("two videos followed", 7.0), _refit("all did", 9.0)
+    tilt.fit = better.fit = Mock(fits=[""] * 4)
+    tilt.mended.return_value, followed.mended.return_value, better.mended.return_value = followed, better, better
+    tilt.fallen_from.return_value = [2]
+    followed.fallen_from.side_effect = lambda other: [3] if other is tilt else []
+    better.fallen_from.return_value = []
+    monkeypatch.setattr(refits, "may_take_another_course", lambda _fit: True)
+    found = _refits()
+    assert found.searched_anew(tilt, [1, 2]) is better
+    for _ in range(2):
+        assert found.searched_anew(better, [1, 2]) is better
+    tilt.mended.assert_called_once_with([1, 2], seed=0)
+    followed.mended.assert_called_once_with([3], seed=0)
+    better.mended.assert_called_once_with([2], seed=1)
+
+
+def test_a_course_for_which_another_video_loses_its_own_is_a_wrong_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    tilt, wrong = _refit("tilt", 5.0), _refit("a wrong course", 9.0)
+    tilt.fit = wrong.fit = Mock(fits=[""] * 4)
+    tilt.mended.return_value = wrong.mended.return_value = wrong
+    tilt.fallen_from.return_value, wrong.fallen_from.return_value = [2], [3]
+    monkeypatch.setattr(refits, "may_take_another_course", lambda _fit: True)
+    found = _refits()
+    for _ in range(2):
+        assert found.searched_anew(tilt, [2]) is tilt
+    tilt.mended.assert_called_once_with([2], seed=0)
 
 
 def test_kicks_are_no_measure_of_laws(monkeypatch: pytest.MonkeyPatch) -> None:

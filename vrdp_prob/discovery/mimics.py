@@ -17,7 +17,7 @@ from vrdp_prob.discovery.finding import Check
 from vrdp_prob.discovery.measurement_checks import GENERAL
 from vrdp_prob.discovery.scores import score_causes
 from vrdp_prob.discovery.search import FALSE_ALARM, Search
-from vrdp_prob.discovery.trials import Trial, gain, weights
+from vrdp_prob.discovery.trials import EACH_PARAMETER, Trial, gain, weights
 from vrdp_prob.discovery.unlisted_law import UnlistedMotion, UnlistedRebound
 from vrdp_prob.inference.parallel import in_processes
 from vrdp_prob.models.effects.effect import Effect
@@ -104,11 +104,12 @@ def without_mimics(
 
 
 def _with_laws(trial: Trial, laws: Sequence[Effect], seed: int) -> Trial | None:
-    """A model with laws beside its causes; None where the videos say nothing of any or no refit can begin."""
+    """A model with laws beside its causes; None where no law promises to bring what it costs, or none can begin."""
     found = trial
     for law in laws:
         scores = score_causes(found.fit, found.unexplained.plain, [law], seed=seed)
-        found = (found.with_cause(scores[0]) if scores else None) or found
+        promising = [one for one in scores if one.size / 2 > EACH_PARAMETER * len(law.parameters) - UNLISTED]
+        found = (found.with_cause(promising[0]) if promising else None) or found
     return None if found is trial else found.continued()
 
 

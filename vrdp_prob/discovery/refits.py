@@ -74,7 +74,7 @@ class Refits:
     _left: dict[Trial, Left] = field(default_factory=dict)
     _made: dict[Trial, list[Trial]] = field(default_factory=dict)
     _searched: set[Trial] = field(default_factory=set)
-    _anew: dict[Trial, frozenset[int]] = field(default_factory=dict)
+    _anew: dict[Trial, tuple[frozenset[int], int]] = field(default_factory=dict)
 
     def left(self, trial: Trial) -> Left:
         """What a model leaves."""
@@ -120,20 +120,33 @@ class Refits:
 
         What one lost video leaves calls for many causes, of which each costs more to try than the search.
         """
-        kicked = [site.video for score in self.left(one).scores for site in score.sites if _kicks(score)]
-        videos = list(dict.fromkeys([*lost_videos(one.fit), *kicked]))
-        found = one if len(videos) > len(one.fit.fits) // MOST else self.searched_anew(one, videos)
+        found = one
+        for _ in range(MENDINGS):
+            kicked = [site.video for score in self.left(found).scores for site in score.sites if _kicks(score)]
+            videos = list(dict.fromkeys([*lost_videos(found.fit), *kicked]))
+            before, few = found, len(videos) <= len(one.fit.fits) // MOST
+            found = self.searched_anew(found, videos) if few else found
+            if found is before:
+                break
         if found is not one:
             refits = [found if old is one else old for old in self.of(trial)]
             self._made[trial] = sorted(refits, key=merit, reverse=True)
         return found
 
     def searched_anew(self, trial: Trial, videos: Sequence[int]) -> Trial:
-        """A model with some videos searched anew, as far as they were not before and may take another course."""
-        before = self._anew.get(trial, frozenset())
-        now = [one for one in videos if one not in before and may_take_another_course(trial.fit.fits[one])]
-        found = trial.mended(now, seed=self.seed) if now else trial
-        self._anew[trial] = self._anew[found] = before | frozenset(now)
+        """A model with some videos searched anew, as far as they may take another course.
+
+        A course for which other videos lose theirs, and do not find it again, is a wrong one. A video of which a
+        search has found nothing better is not searched again; where it has, a further search takes another seed.
+        """
+        settled, passed = self._anew.get(trial, (frozenset(), 0))
+        now = [one for one in videos if one not in settled and may_take_another_course(trial.fit.fits[one])]
+        found = trial.mended(now, seed=self.seed + passed) if now else trial
+        if found is not trial and (fallen := found.fallen_from(trial)):
+            found = found.mended(fallen, seed=self.seed + passed)
+            found = trial if found.fallen_from(trial) else found
+        settled |= frozenset(now).difference([] if found is trial else trial.fallen_from(found))
+        self._anew[trial] = self._anew[found] = (settled, passed + 1)
         return found
 
     def settled(self, trial: Trial, found: Sequence[Trial]) -> bool:

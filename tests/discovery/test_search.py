@@ -231,7 +231,7 @@ def test_a_course_for_which_another_video_loses_its_own_is_a_wrong_one(monkeypat
 
 
 def test_kicks_are_no_measure_of_laws(monkeypatch: pytest.MonkeyPatch) -> None:
-    sizes = {"kicks": 1000.0, "patch": 150.0, "drag": 100.0, "curl": 20.0, "a jump of the clock": 90.0}
+    sizes = {"kicks": 1000.0, "patch": 150.0, "drag": 100.0, "curl": 20.0, "wind": 45.0, "a jump of the clock": 90.0}
     scores = [Mock(spec=CauseScore, effect=cause, size=size, p_value=1e-9) for cause, size in sizes.items()]
     monkeypatch.setattr(refits, "happens_once", lambda cause: cause in {"kicks", "a jump of the clock"})
     assert [one.effect for one in refits._shortlist(scores)] == ["kicks", "patch", "drag"]

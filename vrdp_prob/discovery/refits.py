@@ -26,6 +26,8 @@ CLOSE = 0.5
 """Share of the largest statistic below which a cause is refitted only if those above it leave something."""
 HOPEFUL = 0.2
 """Share of the largest statistic below which a cause cannot be the best one, nor a rival of it."""
+TRIFLE = 0.05
+"""Share of any statistic, also of what happens once in a video, below which nothing is refitted."""
 MOST_REFITTED = 5
 """Causes that are refitted, at most."""
 SHORT, MENDINGS = 0.5, 3
@@ -247,10 +249,12 @@ def _kicks(score: CauseScore) -> bool:
 def _shortlist(scores: Sequence[CauseScore], share: float = HOPEFUL) -> list[CauseScore]:
     """Causes whose statistic is more than a share of the largest one.
 
-    What happens once mends the course of a lost video better than any law does from where the fit is; so it is no
-    measure of laws.
+    What happens once mends the course of a lost video better than any law does from where the fit is; so it is no good
+    measure of laws, as long as these are no mere trifle beside it.
     """
-    likely = sorted((one for one in scores if one.p_value < SHORTLIST_LEVEL), key=lambda one: -one.size)
+    largest = max((one.size for one in scores), default=0.0)
+    likely = [one for one in scores if one.p_value < SHORTLIST_LEVEL and one.size > TRIFLE * largest]
+    likely.sort(key=lambda one: -one.size)
     lasting = [one for one in likely if not happens_once(one.effect)]
     compared = [(one, lasting if one in lasting else likely) for one in likely]
     return [one for one, others in compared if one.size > share * others[0].size][:MOST_REFITTED]

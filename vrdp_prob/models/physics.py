@@ -145,7 +145,7 @@ class PhysicsModel:
 
     @cached_property
     def path_depends_on_mass(self) -> bool:
-        """Whether the path of a body that touches nothing depends on its mass."""
+        """Whether what accelerates or kicks a body depends on its mass."""
         return path_depends_on_mass(self.effects, self.layout)
 
     @cached_property

@@ -194,26 +194,30 @@ def is_timed(effects: Sequence[Effect], layout: Layout) -> bool:
 
 
 def path_depends_on_mass(effects: Sequence[Effect], layout: Layout) -> bool:
-    """Whether the path of a body that touches nothing depends on its mass; one that others push does."""
+    """Whether what accelerates or kicks a body depends on its mass, as a force of other bodies does.
+
+    A friction that follows the mass is apart: a body may have a friction of its own, which tells no mass.
+    """
     inputs = LawInputs(effects, layout)
     constants = dict(zip(layout.constants, inputs.constants("body"), strict=True))
-    path = _path(effects, inputs)
-    return is_coupled(effects) or any(depends(path, constants[name]) for name in ("mass", "inverse_mass"))
+    pushes = [*_external(effects, inputs)[:2], *_kicks(effects, inputs)]
+    felt = ("mass", "inverse_mass", "inverse_inertia")
+    return is_coupled(effects) or any(depends(pushes, constants[name]) for name in felt)
 
 
 def path_depends_on_spin(effects: Sequence[Effect], layout: Layout) -> bool:
     """Whether the path of a body that touches nothing depends on how it turns."""
     inputs = LawInputs(effects, layout)
     turning = [inputs.state(name)[index] for name in ("y", "ya", "yb") for index in (2, 5)]
-    path = [*_path(effects, inputs), *_pair_force(effects, inputs)]
+    path = [*_motion(effects, inputs)[3:5], *_kicks(effects, inputs), *_pair_force(effects, inputs)]
     return any(depends(path, one) for one in turning)
 
 
-def _path(effects: Sequence[Effect], inputs: LawInputs) -> list[Scalar]:
-    """What changes the velocity of a body that touches nothing, forces of other bodies apart."""
+def _kicks(effects: Sequence[Effect], inputs: LawInputs) -> list[Scalar]:
+    """Changes of a body's velocity by all kicks."""
     body = inputs.view(inputs.state("y"), inputs.constants("body"))
     kicks = [effect.kick(inputs.time, body, inputs.shared) for effect in with_kick(effects)]
-    return [*_motion(effects, inputs)[3:5], *(change for kick in kicks for change in kick[:2])]
+    return [change for kick in kicks for change in kick[:2]]
 
 
 def is_coupled(effects: Sequence[Effect]) -> bool:

@@ -23,9 +23,10 @@ from vrdp_prob.progress import Advance
 SHORTLIST_LEVEL = 0.01
 """Causes whose score chance makes as large more often are not refitted."""
 CLOSE = 0.5
-"""Share of the largest statistic below which a cause is refitted only if those above it leave something."""
+"""Share of the largest statistic (see `_shortlist`) below which a cause is refitted only if those above it leave
+something."""
 HOPEFUL = 0.2
-"""Share of the largest statistic below which a cause cannot be the best one, nor a rival of it."""
+"""Share of the largest statistic (see `_shortlist`) below which a cause cannot be the best one, nor a rival of it."""
 TRIFLE = 0.05
 """Share of any statistic, also of what happens once in a video, below which nothing is refitted."""
 MOST_REFITTED = 5
@@ -247,7 +248,7 @@ def _kicks(score: CauseScore) -> bool:
 
 
 def _shortlist(scores: Sequence[CauseScore], share: float = HOPEFUL) -> list[CauseScore]:
-    """Causes whose statistic is more than a share of the largest one.
+    """Causes whose statistic is more than a share of the largest one, that of lasting causes for those that last.
 
     What happens once mends the course of a lost video better than any law does from where the fit is; so it is no good
     measure of laws, as long as these are no mere trifle beside it.

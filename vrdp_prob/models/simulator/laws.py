@@ -206,7 +206,7 @@ def path_depends_on_mass(effects: Sequence[Effect], layout: Layout) -> bool:
 
 
 def path_depends_on_spin(effects: Sequence[Effect], layout: Layout) -> bool:
-    """Whether the path of a body that touches nothing depends on how it turns."""
+    """Whether the path of a body that touches nothing depends on its angle or spin."""
     inputs = LawInputs(effects, layout)
     turning = [inputs.state(name)[index] for name in ("y", "ya", "yb") for index in (2, 5)]
     path = [*_motion(effects, inputs)[3:5], *_kicks(effects, inputs), *_pair_force(effects, inputs)]

@@ -1,5 +1,6 @@
 """What leaving a video out says, how models are weighed by it, and how far off forecasts are."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -11,7 +12,11 @@ from vrdp_prob.discovery.held_out import all_but_each, cavities, left_out
 from vrdp_prob.discovery.residual_model import ResidualModel
 from vrdp_prob.discovery.scores import score_causes
 from vrdp_prob.discovery.trials import Trial, gain, gains, weights
+from vrdp_prob.inference.map_fit import MapFit
+from vrdp_prob.inference.several_videos import fitting
+from vrdp_prob.inference.several_videos.agreement import following_ones
 from vrdp_prob.inference.several_videos.fitting import fit_together
+from vrdp_prob.inference.several_videos.joint_fit import expand
 from vrdp_prob.inference.several_videos.second_look import doubtful
 from vrdp_prob.models.effects.surface_tilt import SurfaceTilt
 
@@ -88,6 +93,30 @@ def test_a_new_search_of_a_video_never_makes_a_fit_worse() -> None:
     trial = Trial((), fit)
     assert trial.mended([], seed=0) is trial
     assert trial.mended([1], seed=0).fit.joint.log_density >= fit.joint.log_density
+
+
+def test_a_video_is_searched_beside_others_that_have_followed_what_they_agree_on(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    _, fit = fitted("surface_tilt", 3.0, seed=2)
+    joint = fit.joint
+    elsewhere = joint.gaussian.mean + 0.3 * (np.array(joint.numbers.names) == "sliding_friction")
+    points = [joint.point(index)[None] for index in range(len(fit.fits))]
+    followed = following_ones(joint.numbers, joint.videos, points, elsewhere)
+    locals_ = tuple(replace(one, centre=own) for one, own in zip(joint.gaussian.locals, followed, strict=True))
+    strayed = replace(fit, joint=replace(joint, gaussian=replace(joint.gaussian, mean=elsewhere, locals=locals_)))
+    handed: list[MapFit] = []
+
+    def looked(fits: Sequence[MapFit], *_: object, **__: object) -> list[MapFit]:
+        handed.extend(fits)
+        return list(fits)
+
+    monkeypatch.setattr(fitting, "look_again", looked)
+    assert strayed.mended([1], seed=0) is strayed
+    for index in (0, 2):
+        video = joint.videos[index]
+        assert expand(video, *video.split(handed[index].point), central=True).promised < 1.0
+    assert (handed[1].point == strayed.joint.point(1)).all()
 
 
 def test_gains_are_divided_by_the_overdispersion_of_each_video() -> None:

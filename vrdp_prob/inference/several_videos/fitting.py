@@ -152,15 +152,17 @@ class SharedFit:
         others = [index for index in range(len(self.fits)) if index not in lost]
         if not lost or not others:
             return self
-        agreed = climb(
+        rest = climb(
             joint.numbers,
             [joint.videos[index] for index in others],
             joint.gaussian.mean,
             [joint.gaussian.locals[index].centre for index in others],
-        ).gaussian.mean
+        )
+        agreed = rest.gaussian.mean
+        points = {index: rest.point(place) for place, index in enumerate(others)}
         settled = [
-            replace(fit, modes=(replace(fit.modes[0], point=video.points(agreed, local.centre)),))
-            for fit, video, local in zip(self.fits, joint.videos, joint.gaussian.locals, strict=True)
+            replace(fit, modes=(replace(fit.modes[0], point=points.get(index, joint.point(index))),))
+            for index, fit in enumerate(self.fits)
         ]
         fits = look_again(settled, lost, self.model, self.shared, seed=seed, looks=MENDING_LOOKS)
         changed = [index for index in lost if fits[index] is not settled[index]]

@@ -94,7 +94,7 @@ def learned_from(size: int, keep: Path) -> Concepts:
     """Concepts learned from so many videos."""
     progress = progress_display(quiet=False)
     shown = films(DATA / "videos", DATA / "questions.json", scenes=(FIRST, FIRST + size))
-    kept = Checkpoint(keep / f"networks-{size}", facts(shown, seed=0))
+    kept = Checkpoint(keep / f"networks-{size}", facts(shown, seed=0, device="cpu"))
     videos = look_at(shown, checkpoint=keep / "videos", progress=progress)
     learned = learn(videos, seed=0, checkpoint=kept, progress=progress)
     print("\n".join(learned.lines), file=sys.stderr)

@@ -64,6 +64,9 @@ def learn_concepts(
     ] = None,
     processes: Processes = None,
     camera: CameraOption = None,
+    device: Annotated[
+        str, typer.Option(metavar="cpu|cuda", help="Where the networks learn: processor, or GPU.")
+    ] = "cpu",
     seed: Seed = 0,
     quiet: Quiet = False,
 ) -> None:
@@ -75,6 +78,7 @@ def learn_concepts(
         scenes=None if scenes is None else scene_range(scenes),
         camera=camera,
         seed=seed,
+        device=device,
         checkpoint=checkpoint or out.with_name(f"{out.name}-checkpoint"),
         processes=processes,
         progress=progress_display(quiet=quiet),

@@ -66,7 +66,8 @@ def test_what_is_wrong_is_told_before_any_video_is_looked_at(
     assert "no question has a word for a color" in refused(capsys, *learn, questions(tmp_path, COUNT))
     words = COUNT | {"question": "How many red metal cubes are there?"}
     asked = questions(tmp_path, words)
-    own = facts(films(tmp_path, asked, camera="clevrer"), seed=1)
+    assert "device 'abacus': torch finds none of this name here" in refused(capsys, *learn, asked, "--device", "abacus")
+    own = facts(films(tmp_path, asked, camera="clevrer"), seed=1, device="cpu")
     Checkpoint(tmp_path / "x.concepts-checkpoint" / "networks", own).keep("part", {"a": np.ones(2)})
     assert "belongs to another run (other seed)" in refused(capsys, *learn, asked)
     assert "belongs to another run (other videos and answers)" in refused(

@@ -185,19 +185,6 @@ def test_single_precision_in_and_out() -> None:
     assert torch.allclose(rollout.trajectory.double(), simulate(exact, FRAMES).trajectory, atol=1e-5)
 
 
-@pytest.mark.skipif(not torch.cuda.is_available(), reason="torch finds no GPU")
-def test_tensors_on_a_gpu_stay_there() -> None:
-    scene = world([[0, 0], [1, 0]], [[1, 0], [0, 0]])
-    names = ("position", "velocity", "angle", "spin", "release_time", "mass", "restitution", "radius", "present")
-    fields = {name: getattr(scene, name).cuda() for name in names}
-    parameters = {name: values.cuda() for name, values in scene.parameters.items()}
-    velocity = fields["velocity"].requires_grad_()
-    rollout = simulate(replace(scene, **fields, parameters=parameters), FRAMES.cuda())
-    rollout.trajectory.sum().backward()
-    assert rollout.trajectory.is_cuda
-    assert velocity.grad.is_cuda
-
-
 def test_times_of_each_world() -> None:
     scene = world([[0, 0]], [[1.0, 0]])
     times = torch.stack([tensor([0.0, 1.0]), tensor([0.5, 2.0])]).requires_grad_()

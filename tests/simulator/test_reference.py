@@ -5,6 +5,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import torch
+from torch import Tensor
 
 from tests.simulator.comparison import Comparison, compare, scenes
 from tests.simulator.scenes import CUBE, DISC, FRAMES, SPHERE, tensor
@@ -13,6 +15,7 @@ from vrdp_prob.models.effects.linear_drag import LinearDrag
 from vrdp_prob.models.effects.slip_to_roll import SlipToRoll
 from vrdp_prob.models.effects.surface_tilt import SurfaceTilt
 from vrdp_prob.models.physics import PhysicsModel
+from vrdp_prob.models.simulator.rollout import simulate
 from vrdp_prob.models.simulator.worlds import Worlds
 
 Record = Callable[[str, object], None]
@@ -70,6 +73,27 @@ def _check(found: Comparison, record: Record) -> None:
 @pytest.mark.parametrize("model", MODELS)
 def test_against_the_reference(mix: str, model: str, record_property: Record) -> None:
     _check(_compared(12, MIXES[mix], 21, MODELS[model]), record_property)
+
+
+@pytest.mark.skipif(not torch.cuda.is_available(), reason="torch finds no GPU")
+@pytest.mark.parametrize("model", MODELS)
+def test_worlds_on_a_gpu_are_simulated_alike_and_stay_there(model: str) -> None:
+    worlds = random_strengths(scenes(4, MIXES["mixed"], 21, walls=True, late=True), MODELS[model], 21)
+    found = {device: _velocity_slope(worlds, device, MODELS[model]) for device in ("cpu", "cuda")}
+    assert torch.equal(found["cpu"], found["cuda"].cpu())
+
+
+def _velocity_slope(worlds: Worlds, device: str, model: PhysicsModel) -> Tensor:
+    """Derivative of all positions by the velocities at the start, with every tensor on a device."""
+    fields = {name: value.to(device) for name, value in vars(worlds).items() if isinstance(value, Tensor)}
+    parameters = {name: value.to(device) for name, value in worlds.parameters.items()}
+    velocity = fields["velocity"] = fields["velocity"].clone().requires_grad_()
+    here = replace(worlds, **fields, parameters=parameters)
+    rollout = simulate(here, FRAMES.to(device), model)
+    rollout.trajectory.sum().backward()
+    for result in (rollout.trajectory, rollout.velocity, rollout.exists, velocity.grad, here.moment_of_inertia):
+        assert result.device.type == device
+    return velocity.grad
 
 
 @pytest.mark.slow

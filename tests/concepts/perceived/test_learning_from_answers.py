@@ -177,6 +177,27 @@ def test_what_was_learned_is_told(monkeypatch: pytest.MonkeyPatch, tmp_path: Pat
     np.testing.assert_array_equal(weights(again.concepts.networks[1]), weights(learned.concepts.networks[1]))
 
 
+@pytest.mark.skipif(not torch.cuda.is_available(), reason="torch finds no GPU")
+def test_a_gpu_learns_where_it_is_asked(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setattr(learning, "LESSONS", tuple(replace(lesson, epochs=12) for lesson in LESSONS))
+    monkeypatch.setattr(learning, "NETWORKS", 2)
+    named = {str(place): one for place, one in enumerate(TAUGHT)}
+    kept = Checkpoint(tmp_path, {"seed": "1"})
+    torch.cuda.reset_peak_memory_stats()
+    learned = learn(named, seed=1, device="cuda", checkpoint=kept)
+    assert torch.cuda.max_memory_allocated() > 0
+    assert learned.concepts.lessons.attributes_right > 0.9
+    again = learn(named, seed=1, device="cuda", checkpoint=kept)
+    for one, other in zip(learned.concepts.networks, again.concepts.networks, strict=True):
+        np.testing.assert_array_equal(weights(one), weights(other))  # weights on the processor: numpy refuses others
+
+
+@pytest.mark.parametrize("device", ["abacus", "", "cuda:99"])
+def test_a_device_that_is_not_here(device: str) -> None:
+    with pytest.raises(InputError, match=f"device '{device}': torch finds none of this name here; give cpu, or cuda"):
+        learn({"a": TAUGHT[0]}, device=device)
+
+
 def test_answers_that_no_concept_explains_are_told(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(learning, "LESSONS", SHORT)
     monkeypatch.setattr(learning, "NETWORKS", 2)

@@ -11,7 +11,7 @@ from pathlib import Path
 import torch
 
 from vrdp_prob.concepts.perceived.examples import Example, examples_of
-from vrdp_prob.concepts.perceived.learning import Learned, learn, vocabulary_of
+from vrdp_prob.concepts.perceived.learning import Learned, check_device, learn, vocabulary_of
 from vrdp_prob.concepts.perceived.lessons import Taught
 from vrdp_prob.concepts.perceived.observation import Observation
 from vrdp_prob.datasets import check_scenes, find_camera, questions_about, video_files
@@ -47,6 +47,7 @@ def learn_from_files(
     scenes: tuple[int, int] | None = None,
     camera: CameraChoice = None,
     seed: int = 0,
+    device: str = "cpu",
     checkpoint: Path | None = None,
     processes: int | None = None,
     progress: ProgressDisplay | None = None,
@@ -59,6 +60,8 @@ def learn_from_files(
         See `films`.
     seed
         Seed of everything random in it.
+    device
+        See `learn`.
     checkpoint
         Folder that keeps what was seen and learned. The same call again, after an interruption, goes on from there and
         ends with the same numbers.
@@ -70,15 +73,16 @@ def learn_from_files(
     Raises
     ------
     InputError
-        If `films` refuses the input, no word of an attribute occurs in the questions, a video is unusable, or
-        `checkpoint` belongs to another call.
+        If `films` refuses the input, torch finds no such device, no word of an attribute occurs in the questions, a
+        video is unusable, or `checkpoint` belongs to another call.
     """
+    check_device(device)
     shown = films(folder, questions, scenes=scenes, camera=camera)
     vocabulary_of(chain.from_iterable(film.examples for film in shown.values()))
-    kept = None if checkpoint is None else Checkpoint(checkpoint / "networks", facts(shown, seed))
+    kept = None if checkpoint is None else Checkpoint(checkpoint / "networks", facts(shown, seed, device))
     seen = None if checkpoint is None else checkpoint / "videos"
     videos = look_at(shown, checkpoint=seen, processes=processes, progress=progress)
-    return learn(videos, seed=seed, checkpoint=kept, progress=progress)
+    return learn(videos, seed=seed, device=device, checkpoint=kept, progress=progress)
 
 
 def films(
@@ -157,13 +161,13 @@ def look_at(
     return {name: Taught(Observation.of_arrays(seen[name]), film.examples) for name, film in shown.items()}
 
 
-def facts(shown: Mapping[str, Film], seed: int) -> dict[str, str]:
+def facts(shown: Mapping[str, Film], seed: int, device: str) -> dict[str, str]:
     """What the concepts depend on that videos teach."""
     taught = sha256()
     for name, film in shown.items():
         asked = [(example.program.tokens, example.answer) for example in film.examples]
         taught.update(repr((name, film.facts, asked)).encode())
-    return {"videos and answers": taught.hexdigest(), "seed": str(seed), **program_facts()}
+    return {"videos and answers": taught.hexdigest(), "seed": str(seed), "device": device, **program_facts()}
 
 
 def _files(folder: Path, questions: Path, names: list[str]) -> Mapping[str, Path]:

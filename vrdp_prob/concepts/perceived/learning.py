@@ -67,6 +67,7 @@ def learn(
     videos: Mapping[str, Taught],
     *,
     seed: int = 0,
+    device: str = "cpu",
     checkpoint: Checkpoint | None = None,
     progress: ProgressDisplay | None = None,
 ) -> Learned:
@@ -78,6 +79,9 @@ def learn(
         Videos with answers about them, by name.
     seed
         Seed of everything random in it.
+    device
+        Where the networks learn, as torch calls it: `cpu`, or a GPU as `cuda`. The same seed gives the same numbers on
+        one device, and slightly other ones on another.
     checkpoint
         Keeps the state of the training; the same call, after an interruption, goes on from there and ends with the
         same numbers.
@@ -87,13 +91,15 @@ def learn(
     Raises
     ------
     InputError
-        If no word of an attribute occurs in the questions.
+        If no word of an attribute occurs in the questions, or torch finds no such device.
     """
+    check_device(device)
     examples = [example for one in videos.values() for example in one.examples]
     vocabulary = vocabulary_of(examples)
     taught, display = list(videos.values()), progress or SilentProgress()
     trained = [
-        _trained(vocabulary, taught, place, seed=seed, kept=checkpoint, progress=display) for place in range(NETWORKS)
+        _trained(vocabulary, taught, place, seed=seed, device=device, kept=checkpoint, progress=display)
+        for place in range(NETWORKS)
     ]
     # with few videos some networks hold out none, and stand where they do by what they learned
     right = [
@@ -103,6 +109,22 @@ def learn(
     lessons = Lessons(len(videos), len(examples), seed, _guessed(examples), attributes, events)
     concepts = Concepts(tuple(network for network, _ in trained), lessons)
     return Learned(concepts, _notes(concepts))
+
+
+def check_device(device: str) -> None:
+    """Refuse a device that torch does not know or does not find here.
+
+    Raises
+    ------
+    InputError
+        In these cases.
+    """
+    try:
+        torch.empty(0, device=device)
+    except (RuntimeError, AssertionError) as error:  # torch asserts that it was built for a GPU
+        raise InputError(
+            f"device '{device}': torch finds none of this name here; give cpu, or cuda for a GPU."
+        ) from error
 
 
 def vocabulary_of(examples: Iterable[Example]) -> Vocabulary:
@@ -128,6 +150,7 @@ def _trained(
     place: int,
     *,
     seed: int,
+    device: str,
     kept: Checkpoint | None,
     progress: ProgressDisplay,
 ) -> tuple[ConceptNetwork, list[Standing]]:
@@ -139,7 +162,7 @@ def _trained(
         torch.manual_seed(own_seed)
         network = ConceptNetwork(vocabulary)
     network.measure([one.observation for one in taught])
-    network.to("cuda" if torch.cuda.is_available() else "cpu")
+    network.to(device)
     standings = []
     for lesson in LESSONS:
         file = None if kept is None else kept.path(f"network-{place}-{lesson.name}.pt")

@@ -102,7 +102,7 @@ def simulate(
     model = model if model is not None else PhysicsModel.base()
     rows = times[None] if times.ndim == 1 else times
     _check(rows.detach(), len(worlds))
-    arrays = kernel_arrays(worlds, model.effects, model.layout, float(rows.detach().min()))
+    arrays = kernel_arrays(worlds.on_processor(), model.effects, model.layout, float(rows.detach().min()))
     flat = (arrays.bodies, arrays.shared, arrays.start, rows.to(torch.float64))
     run = _Run(model.kernel, arrays, len(worlds.shapes), event_limit)
     # torch does not annotate Function.apply.

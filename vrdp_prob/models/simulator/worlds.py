@@ -100,6 +100,14 @@ class Worlds:
         from_shape = factors.to(self.mass.device) * self.mass * self.radius**2
         return from_shape if self.inertia is None else torch.where(self.inertia.isnan(), from_shape, self.inertia)
 
+    def on_processor(self) -> "Worlds":
+        """The same worlds with every tensor in the processor's memory; themselves where it is there."""
+        names = [name for name in _TENSORS if getattr(self, name) is not None]
+        if all(tensor.is_cpu for tensor in (*(getattr(self, name) for name in names), *self.parameters.values())):
+            return self
+        parameters = {name: values.cpu() for name, values in self.parameters.items()}
+        return replace(self, **{name: getattr(self, name).cpu() for name in names}, parameters=parameters)
+
     def without(self, body: int) -> "Worlds":
         """The same worlds after a body was removed."""
         present = self.present.clone()
@@ -141,3 +149,4 @@ _BATCHED = (
     "present",
     "wall_restitution",
 )
+_TENSORS = (*_BATCHED, "walls", "inertia", "rolling")

@@ -36,6 +36,14 @@ STEEP = 5.0
 taken to be at an edge: where two orders of events meet, or a contact just happens."""
 
 
+FELL = 2.0
+"""Nats that a video may lose on the way along its ridge before it is taken to have left it over an edge."""
+CLOUD, SPREADS = 64, (0.1, 0.3)
+"""Own numbers that are tried on either side of an edge, for each of these shares of their standard deviations..."""
+FINISHED = 3
+"""...and how many of them, the best ones, go on from there."""
+
+
 class ImpossibleStartError(Exception):
     """A search was to begin where the world of some video cannot be simulated, or where it is not worth its while."""
 
@@ -116,6 +124,9 @@ def climb(
             trial = _improved(numbers, videos, own, smooth.shared_step)
             if trial is own:
                 refused = own.total(numbers)
+        if trial.total(numbers) - state.total(numbers) < TOLERANCE:
+            own = _across_edges(videos, trial, slopes.videos)
+            trial = _improved(numbers, videos, own, smooth.shared_step, around=slopes.videos)
         gain = trial.total(numbers) - state.total(numbers)
         if gain > 0:
             state = trial
@@ -157,26 +168,67 @@ def _improved(
     videos: Sequence[LinkedVideo],
     state: _State,
     step: Float[np.ndarray, "shared"],
+    *,
+    around: Sequence[Expansion] | None = None,
 ) -> _State:
     """The first share of a common step that brings something; where none does, the state itself."""
     before = state.total(numbers)
     for share in SHARES:
         target = state.shared + share * step
-        trial = _with_best_noise(numbers, videos, _followed(videos, state, target))
+        trial = _with_best_noise(numbers, videos, _followed(videos, state, target, around))
         if trial.total(numbers) > before:
             return trial
     return state
 
 
-def _followed(videos: Sequence[LinkedVideo], state: _State, target: Float[np.ndarray, "shared"]) -> _State:
-    """The state at other shared numbers, every video on its ridge."""
+def _followed(
+    videos: Sequence[LinkedVideo],
+    state: _State,
+    target: Float[np.ndarray, "shared"],
+    around: Sequence[Expansion] | None,
+) -> _State:
+    """The state at other shared numbers, every video on its ridge.
+
+    A video whose best own numbers are at an edge, where a contact just happens, leaves its ridge with the first step;
+    where the expansions `around` the state are given, the ridge is looked for on both sides of where they say it is.
+    """
 
     def found(index: int) -> Float[np.ndarray, "_"]:
         video, own = videos[index], state.locals[index]
         one = follow(video, state.shared, own, target, steps=STEPS)
-        return one.local if one.arrived else settle(video, target, [own, one.local])
+        found = one.local if one.arrived else settle(video, target, [own, one.local])
+        if around is None or video.value(target, found) > state.values[index] - FELL:
+            return found
+        expected = own + around[index].slope @ (target - state.shared)
+        return _best_of_cloud(video, target, expected, around[index].local_root, found)
 
     return _State.at(videos, target, in_parallel(found, range(len(videos))))
+
+
+def _across_edges(videos: Sequence[LinkedVideo], state: _State, expansions: Sequence[Expansion]) -> _State:
+    """Each video that gained nothing though its own Newton step promised it, at the best of a cloud around it."""
+    locals_ = [
+        local if one.promised < EXPECTED else _best_of_cloud(video, state.shared, local, one.local_root, local)
+        for video, local, one in zip(videos, state.locals, expansions, strict=True)
+    ]
+    found = _State.at(videos, state.shared, locals_)
+    pairs = zip(found.locals, found.values, state.locals, state.values, strict=True)
+    better = [(own, value) if value > before else (old, before) for own, value, old, before in pairs]
+    return _State(state.shared, tuple(own for own, _ in better), tuple(value for _, value in better))
+
+
+def _best_of_cloud(
+    video: LinkedVideo,
+    shared: Float[np.ndarray, "shared"],
+    centre: Float[np.ndarray, "local"],
+    root: Float[np.ndarray, "local local"],
+    known: Float[np.ndarray, "local"],
+) -> Float[np.ndarray, "local"]:
+    """Own numbers that are the best of those known and of what becomes of a cloud around a centre."""
+    directions = np.random.default_rng(0).standard_normal((CLOUD, len(centre))) @ root.T
+    cloud = np.concatenate([centre + share * directions for share in SPREADS])
+    promising = np.argsort(-_values(video, shared, cloud))[:FINISHED]
+    return settle(video, shared, [known, *cloud[promising]])
 
 
 def _settled(videos: Sequence[LinkedVideo], state: _State, expansions: Sequence[Expansion]) -> _State:

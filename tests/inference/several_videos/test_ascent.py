@@ -1,0 +1,78 @@
+"""The climb of several videos where the best own numbers of one are at an edge."""
+
+from dataclasses import dataclass
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from tests.inference.several_videos.videos import sliding
+from vrdp_prob.inference.least_squares import jacobian
+from vrdp_prob.inference.several_videos import ascent
+from vrdp_prob.inference.several_videos.arrow import Expansion
+from vrdp_prob.inference.several_videos.linking import LinkedVideo, SharedNumbers
+from vrdp_prob.models.coordinates import Coordinate, Coordinates
+from vrdp_prob.models.likelihood import Likelihood
+from vrdp_prob.models.parameters import Prior, Transform
+from vrdp_prob.models.physics import PhysicsModel
+
+BELIEVED = Prior(2.0, 0.3)
+"""Of the shared number."""
+BEST = (2 / 0.3**2 - 1 / 2) / (1 / 0.3**2 + 1 / 2)
+"""Most probable shared number: (shared - 2)^2 / (2 0.3^2) + (shared + 1)^2 / 4 is least there."""
+
+
+@dataclass(frozen=True)
+class Grazing(LinkedVideo):
+    """Two bodies that meet if `second > shared + first`; they did, and all else would rather have `second` at -1."""
+
+    @property
+    def data(self) -> Any:
+        return SimpleNamespace(residuals=self._residuals, coordinates=self.likelihood.coordinates)
+
+    def _residuals(self, points: np.ndarray) -> np.ndarray:
+        shared, first, second = points.T
+        missed = 100.0 * (second <= shared + first)
+        return np.stack([first, second + 1, missed], axis=1)
+
+    def log_density(self, shared: np.ndarray, local: np.ndarray) -> np.ndarray:
+        values: np.ndarray = -(self._residuals(self.points(shared, local)) ** 2).sum(axis=1) / 2
+        return values
+
+
+def expand(video: LinkedVideo, shared: np.ndarray, local: np.ndarray, *, central: bool) -> Expansion:
+    """That of residuals, on the side of the edge where the point is."""
+    point = video.points(shared, local)
+    residuals, derivative = jacobian(video.data.residuals, point, np.ones(3), central=central)
+    derivative[-1], residuals = 0.0, residuals[:-1]
+    gradient = derivative[:-1].T @ residuals
+    return Expansion(gradient[:1], gradient[1:], derivative[:, :1], derivative[:, 1:])
+
+
+def climbed(monkeypatch: pytest.MonkeyPatch) -> ascent.JointFit:
+    monkeypatch.setattr(ascent, "expand", expand)
+    entries = (Coordinate("shared", None, Transform.IDENTITY, BELIEVED),)
+    own = tuple(Coordinate(name, 0, Transform.IDENTITY, Prior(0.0, 1.0)) for name in ("first", "second"))
+    likelihood = Likelihood(sliding(0), PhysicsModel.base(), Coordinates(entries + own, {}))
+    place = np.zeros(1, dtype=np.int64)
+    video = Grazing(likelihood, place, place, np.zeros(1))
+    numbers = SharedNumbers((("shared", ()),), entries, None)
+    return ascent.climb(numbers, [video], np.zeros(1), [np.array([-0.52, -0.48])])
+
+
+def test_a_ridge_is_followed_along_an_edge(monkeypatch: pytest.MonkeyPatch) -> None:
+    found = climbed(monkeypatch)
+    assert found.gaussian.mean[0] == pytest.approx(BEST, abs=0.2)
+    most = -((BEST - 2) ** 2) / (2 * 0.3**2) - (BEST + 1) ** 2 / 4
+    assert found.log_density > most - 0.5
+    assert not found.converged  # at an edge the density is no Gaussian
+
+
+def test_without_looking_on_both_sides_the_climb_ends_there(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(ascent, "_best_of_cloud", lambda video, shared, centre, root, known: known)
+    assert climbed(monkeypatch).gaussian.mean[0] < 0.5
+
+
+def test_the_same_cloud_is_drawn_each_time(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert climbed(monkeypatch).log_density == climbed(monkeypatch).log_density

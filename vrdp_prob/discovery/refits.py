@@ -203,23 +203,28 @@ class Refits:
     def made_of(self, trial: Trial, scores: Sequence[CauseScore]) -> list[Trial]:
         """Fits with one cause more, the best first.
 
-        Where the score of a cause promises more than any refit has brought, and its own brought far less, videos have
-        lost their course of events on the way to it, and are searched anew.
+        Where the score of a cause promises more than any refit has brought, and its own brought far less, that goes on
+        if it broke off on a long way; and where videos have lost their course of events on it, they are searched anew.
+        So it is with the cause whose score promises most, whatever others have brought.
         """
         found = self._all(trial.with_cause, scores)
         promised = {one.effect.name: one.size / 2 for one in scores if not happens_once(one.effect)}
         for _ in range(MENDINGS):
             most = max((one.brought(trial) for one in found), default=0.0)
+            highest = max(promised.values(), default=0.0)
             short = [
                 one
                 for one in found
-                if promised.get(one.causes[-1].name, 0.0) > max(most, one.brought(trial) / SHORT, 0.0)
-                and one.fallen_from(trial)
+                if (told := promised.get(one.causes[-1].name, 0.0)) > max(most, one.brought(trial) / SHORT, 0.0)
+                or told == highest > one.brought(trial)
             ]
+            short = [one for one in short if not one.fit.joint.converged or one.fallen_from(trial)]
             if not short:
                 break
             hopeful = max(short, key=lambda one: promised[one.causes[-1].name])
-            mended = hopeful.mended(hopeful.fallen_from(trial), seed=self.seed)
+            mended = hopeful.continued()
+            if fallen := mended.fallen_from(trial):
+                mended = mended.mended(fallen, seed=self.seed)
             if mended is hopeful:
                 promised.pop(hopeful.causes[-1].name)
             found = [mended if one is hopeful else one for one in found]

@@ -230,6 +230,29 @@ def test_a_course_for_which_another_video_loses_its_own_is_a_wrong_one(monkeypat
     tilt.mended.assert_called_once_with([2], seed=0)
 
 
+@pytest.mark.parametrize(("brought", "followed"), [(200.0, True), (500.0, False)], ids=["less", "as promised"])
+def test_the_most_promising_cause_is_followed_whatever_others_have_brought(
+    brought: float, *, followed: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(refits, "happens_once", lambda _cause: False)
+    effects = {name: Mock() for name in ("wind", "patch")}
+    names = ("wind", "wind", "wind", "patch")
+    wind, further, found, patch = all_ = [
+        _refit(name, gained) for name, gained in zip(names, (1, 2, 9, 3), strict=True)
+    ]
+    for one, name, gained in zip(all_, names, (brought, 400.0, 2000.0, 1000.0), strict=True):
+        effects[name].name = name
+        one.causes, one.brought.return_value = (effects[name],), gained
+        one.fallen_from.return_value = [1] if one is further else []
+        one.fit.joint.converged = one is not wind
+    wind.continued.return_value, further.mended.return_value = further, found
+    nothing = _refit("", 0.0)
+    nothing.with_cause = lambda score: wind if score.effect is effects["wind"] else patch
+    sizes = {"wind": 900.0, "patch": 600.0}
+    scores = [Mock(spec=CauseScore, effect=effects[name], size=size) for name, size in sizes.items()]
+    assert _refits().made_of(nothing, scores)[0] is (found if followed else patch)
+
+
 def test_kicks_are_no_measure_of_laws(monkeypatch: pytest.MonkeyPatch) -> None:
     sizes = {"kicks": 1000.0, "patch": 150.0, "drag": 100.0, "curl": 20.0, "wind": 45.0, "a jump of the clock": 90.0}
     scores = [Mock(spec=CauseScore, effect=cause, size=size, p_value=1e-9) for cause, size in sizes.items()]

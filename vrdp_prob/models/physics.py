@@ -16,7 +16,14 @@ from vrdp_prob.models.effects.effect import Effect
 from vrdp_prob.models.effects.normal_impact import NormalImpact
 from vrdp_prob.models.parameters import MATTER, Parameter
 from vrdp_prob.models.simulator.kernel import Kernel, load
-from vrdp_prob.models.simulator.laws import CONSTANTS, STATE, Layout, path_depends_on_mass, path_depends_on_spin
+from vrdp_prob.models.simulator.laws import (
+    CONSTANTS,
+    STATE,
+    Layout,
+    is_coupled,
+    path_depends_on_mass,
+    path_depends_on_spin,
+)
 
 
 @dataclass(frozen=True)
@@ -142,6 +149,11 @@ class PhysicsModel:
     def layout(self) -> Layout:
         """Order of the numbers that the compiled kernel takes."""
         return Layout.of(self.parameters)
+
+    @cached_property
+    def is_coupled(self) -> bool:
+        """Whether bodies that are apart act on each other."""
+        return is_coupled(self.effects)
 
     @cached_property
     def path_depends_on_mass(self) -> bool:

@@ -141,13 +141,14 @@ class Batch:
     def simulated(self, change: Change, body: int) -> WorldDraws:
         """The same, simulated anew and not kept."""
         model, own = self._extended[1], self.seen.on_own_course
-        intervention = Intervention(change, body, self._acting, self.meanings(change))
+        felt, taken = model.path_depends_on_mass, self.meanings(change)
+        intervention = Intervention(change, body, self._acting, taken, mass_moves=felt)
         kept = Counterfactual(
             self.seen, self._acting, model, self.turning, self.scattering, intervention=intervention
         ).run()
         if not own.any():
             return kept
-        intervention = Intervention(change, body, self._extended[0], self.meanings(change))
+        intervention = Intervention(change, body, self._extended[0], taken, mass_moves=felt)
         return kept.with_draws(own, changed_course(self.common.sight, intervention, model, own, self.seen.events))
 
     def meanings(self, change: Change) -> Int[np.ndarray, "draw"]:

@@ -40,8 +40,8 @@ def with_defaults(
     statuses
         Status of mass and restitution of each body.
     defaults
-        `fixed` leaves the defaults, `prior` draws from the prior: the mass around its default, by the prior's spread;
-        the restitution where it is at most 1.
+        `fixed` leaves the defaults, `prior` draws from the prior: the mass around its default, by the prior's spread
+        (one that was drawn already, since a motion depends on it, has that); the restitution where it is at most 1.
     generator
         Source of the draws.
 
@@ -56,7 +56,7 @@ def with_defaults(
         return worlds
     mass, restitution = worlds.mass.clone(), worlds.restitution.clone()
     for body, (of_mass, of_restitution) in enumerate(statuses):
-        if of_mass == DEFAULT:
+        if of_mass == DEFAULT and bool((mass[:, body] == mass[0, body]).all()):
             spread = model.believed(MASS).prior.sd * generator.standard_normal(len(worlds))
             mass[:, body] *= MASS.transform.from_coordinate(torch.from_numpy(spread)).to(mass)
         if of_restitution == DEFAULT:

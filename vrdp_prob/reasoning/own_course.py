@@ -5,7 +5,8 @@ of the model cannot grow in it, but the states from which the simulation is resu
 draw of the posterior is simulated as it is: then all of it fits together, but a draw in which something else happened
 than was seen tells of another video. Both err, in different ways; so half of those draws whose own course of events is
 the one that was seen follow it, in doubtful contacts, in changes and after the video, and the other draws keep what was
-seen.
+seen. Where bodies act on each other from afar, no body's motion can be smoothed by itself, and all draws whose course
+is the one that was seen follow it.
 """
 
 from dataclasses import dataclass
@@ -28,7 +29,7 @@ from vrdp_prob.reasoning.stretch import State, advance
 from vrdp_prob.reasoning.timeline import Timeline, WorldDraws
 
 SHARE = 0.5
-"""Share of the draws that can follow their own course which do."""
+"""Share of the draws that can follow their own course which do, where each body moves by itself."""
 SAME_TIME = 0.2
 """Time in s by which a simulated contact may differ from the one that was seen."""
 SURE = 0.9
@@ -49,6 +50,11 @@ class OwnCourses:
 
     sight: Sight
     released: Released
+
+    @property
+    def share(self) -> float:
+        """Share of the draws that can follow their own course which do."""
+        return 1.0 if self.released.model.is_coupled else SHARE
 
     @cached_property
     def met(self) -> Bool[np.ndarray, "draw contact"]:

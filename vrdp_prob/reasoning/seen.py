@@ -10,7 +10,7 @@ from vrdp_prob.reasoning.chance import Chance, Purpose, Seeded
 from vrdp_prob.reasoning.contacts import Contact, SeenMotion
 from vrdp_prob.reasoning.events import EventTable, EventUniverse
 from vrdp_prob.reasoning.facts import MOVING_SPEED, Motion
-from vrdp_prob.reasoning.own_course import SHARE, SURE, OwnCourses
+from vrdp_prob.reasoning.own_course import SURE, OwnCourses
 from vrdp_prob.reasoning.rest import DrawnMotion
 from vrdp_prob.reasoning.sight import Sight
 from vrdp_prob.scene import Tracks
@@ -79,7 +79,7 @@ class SeenVideo:
         """Draws that follow their own course."""
         if self.own is None:
             return np.zeros(self.draws, dtype=bool)
-        return self.own.as_seen & (self.chance.numbers(Purpose.COURSES).random((self.draws,)) < SHARE)
+        return self.own.as_seen & (self.chance.numbers(Purpose.COURSES).random((self.draws,)) < self.own.share)
 
     @cached_property
     def contact_times(self) -> Float[np.ndarray, "draw contact"]:

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import torch
 
 from tests.discovery.laws import Laws
 from tests.discovery.measurement import Measurement, measure
@@ -11,6 +12,7 @@ from tests.discovery.videos import Video
 from vrdp_prob import infer
 from vrdp_prob.inference.posterior import Posterior
 from vrdp_prob.models.effects.pair_force import PairForce
+from vrdp_prob.models.parameters import MASS
 from vrdp_prob.models.physics import PhysicsModel
 from vrdp_prob.reasoning.changes import Change
 from vrdp_prob.reasoning.defaults import with_defaults
@@ -65,8 +67,11 @@ def test_bodies_feel_from_afar_that_another_is_missing_or_has_another_mass(
 
 
 def test_a_mass_that_was_drawn_is_not_drawn_again_from_the_prior(posterior: Posterior) -> None:
-    worlds = posterior.worlds(40)
+    """What little the tracks tell of it, they tell together with the force, so that another draw would not fit that."""
+    worlds, generator = posterior.worlds(40), np.random.default_rng(0)
+    drawn = worlds.mass.clone()
+    drawn[:, :2] *= torch.from_numpy(np.exp(MASS.prior.sd * generator.standard_normal((40, 2))))
     unsaid = [("default", "identified")] * 3
-    found = with_defaults(worlds, posterior.model, unsaid, "prior", np.random.default_rng(0))
-    assert (found.mass[:, :2] == worlds.mass[:, :2]).all()
+    found = with_defaults(replace(worlds, mass=drawn), posterior.model, unsaid, "prior", generator)
+    assert (found.mass[:, :2] == drawn[:, :2]).all()
     assert found.mass[:, 2].std() > 0.1  # that one was held

@@ -20,6 +20,8 @@ from vrdp_prob.models.simulator.worlds import Worlds
 Defaults = Literal["fixed", "prior"]
 
 DEFAULT = "default"
+HELD = 0.5
+"""Share of the prior's standard deviation below which draws of a mass are taken for a value that was held."""
 
 
 def with_defaults(
@@ -55,9 +57,10 @@ def with_defaults(
     if defaults == "fixed":
         return worlds
     mass, restitution = worlds.mass.clone(), worlds.restitution.clone()
+    believed = model.believed(MASS).prior.sd
     for body, (of_mass, of_restitution) in enumerate(statuses):
-        if of_mass == DEFAULT and bool((mass[:, body] == mass[0, body]).all()):
-            spread = model.believed(MASS).prior.sd * generator.standard_normal(len(worlds))
+        if of_mass == DEFAULT and float(mass[:, body].log().std(correction=0)) < HELD * believed:
+            spread = believed * generator.standard_normal(len(worlds))
             mass[:, body] *= MASS.transform.from_coordinate(torch.from_numpy(spread)).to(mass)
         if of_restitution == DEFAULT:
             restitution[:, body] = prior_restitutions(model, len(worlds), generator).to(restitution)

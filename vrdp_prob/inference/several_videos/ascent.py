@@ -1,7 +1,8 @@
 """The way up to the most probable values of several videos at once.
 
 Each video is expanded by itself, its own numbers are eliminated, the shared numbers take one common step, and every
-video follows them along its own ridge. So memory holds one batch of worlds per processor at a time.
+video follows them along its own ridge. So memory holds one batch of worlds per processor at a time. A ridge may run
+along an edge, where a contact just happens, and is then looked for on both sides of it.
 """
 
 from collections.abc import Sequence
@@ -34,8 +35,6 @@ the videos by themselves have gained as much."""
 STEEP = 5.0
 """Gain (nats) that its own step promises a video which has just looked for its best own numbers, from which on it is
 taken to be at an edge: where two orders of events meet, or a contact just happens."""
-
-
 FELL = 2.0
 """Nats that a video may lose on the way along its ridge before it is taken to have left it over an edge."""
 CLOUD, SPREADS = 64, (0.1, 0.3)

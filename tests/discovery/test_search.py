@@ -253,6 +253,19 @@ def test_the_most_promising_cause_is_followed_whatever_others_have_brought(
     assert _refits().made_of(nothing, scores)[0] is (found if followed else patch)
 
 
+@pytest.mark.parametrize("once", [True, False], ids=["kicks", "a law"])
+def test_a_refit_that_brings_nothing_is_followed_once_at_most(*, once: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(refits, "happens_once", lambda _cause: once)
+    refit, effect = _refit("kicks", -1.0), Mock()
+    effect.name, refit.causes, refit.fit.joint.converged = "kicks", (effect,), False
+    refit.brought.return_value, refit.fallen_from.return_value = -3.0, [1]
+    refit.continued.return_value = refit.mended.return_value = refit
+    nothing = _refit("", 0.0)
+    nothing.with_cause = lambda _score: refit
+    assert _refits(needed=6.0).made_of(nothing, [Mock(spec=CauseScore, effect=effect, size=20.0)]) == [refit]
+    assert refit.mended.call_count == (0 if once else 1)
+
+
 def test_kicks_are_no_measure_of_laws(monkeypatch: pytest.MonkeyPatch) -> None:
     sizes = {"kicks": 1000.0, "patch": 150.0, "drag": 100.0, "curl": 20.0, "wind": 45.0, "a jump of the clock": 90.0}
     scores = [Mock(spec=CauseScore, effect=cause, size=size, p_value=1e-9) for cause, size in sizes.items()]

@@ -119,6 +119,8 @@ class KnownPosterior:
         def spread(size_of_it: float) -> torch.Tensor:
             return torch.from_numpy(np.exp(size_of_it * random.standard_normal((number, size))))
 
+        mass_spread = self.spread if self.mass_spread is None else self.mass_spread
+        held = torch.tensor([one.mass.status is Status.DEFAULT for one in self.status.values()])
         zero = torch.zeros(number, size, dtype=torch.float64)
         shared = {"sliding_friction": FRICTION, "rolling_resistance": 0.01, "air_drag": 1e-6, "angular_drag": 0.1}
         chosen = np.linspace(0, number - 1, min(count or number, number)).round().astype(int)
@@ -129,7 +131,7 @@ class KnownPosterior:
             angle=zero,
             spin=zero,
             release_time=values("release"),
-            mass=values("mass") * spread(self.spread if self.mass_spread is None else self.mass_spread),
+            mass=values("mass") * torch.where(held, 1.0, spread(mass_spread)),
             restitution=torch.clamp(values("restitution") * spread(self.spread), max=1.0),
             radius=torch.full_like(zero, RADIUS),
             present=torch.ones(number, size, dtype=torch.bool),

@@ -4,18 +4,17 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-import torch
 
 from tests.discovery.laws import Laws
 from tests.discovery.measurement import Measurement, measure
 from tests.discovery.videos import Video
 from vrdp_prob import infer
+from vrdp_prob.inference.identifiability import BodyStatus, ParameterStatus, Status
 from vrdp_prob.inference.posterior import Posterior
 from vrdp_prob.models.effects.pair_force import PairForce
-from vrdp_prob.models.parameters import MASS
 from vrdp_prob.models.physics import PhysicsModel
 from vrdp_prob.reasoning.changes import Change
-from vrdp_prob.reasoning.defaults import with_defaults
+from vrdp_prob.reasoning.stock import Stock
 from vrdp_prob.reasoning.worlds import PosteriorWorlds
 from vrdp_prob.scene import Shape
 
@@ -51,27 +50,28 @@ def posterior() -> Posterior:
     return infer(replace(tracks, bodies=bodies), model=model, sampler="laplace", seed=1, hand_on=False)
 
 
+@pytest.mark.parametrize("own_courses", [True, False])
 @pytest.mark.parametrize("change", [Change.REMOVED, Change.HEAVIER])
 def test_bodies_feel_from_afar_that_another_is_missing_or_has_another_mass(
-    posterior: Posterior, change: Change
+    posterior: Posterior, change: Change, *, own_courses: bool
 ) -> None:
     factor = np.array([HEAVIER, 1.0, 1.0])
     other = _video(MASSES, without=0) if change.removes else _video(factor * MASSES)
     expected = other.motion.states[-1, :, :2]
     seen = _video(MASSES).motion.states[-1, :, :2]
-    worlds = PosteriorWorlds(posterior, draws=60)
+    worlds = PosteriorWorlds(posterior, draws=60, own_courses=own_courses)
     found = worlds.counterfactual(change, 0).trajectory[:, -1, :, :2].mean(axis=0)
     kept = slice(1, None) if change.removes else slice(None)
     assert np.abs(expected - seen[kept]).max() > 0.1
     np.testing.assert_allclose(found[kept], expected, atol=0.02)
 
 
-def test_a_mass_that_was_drawn_is_not_drawn_again_from_the_prior(posterior: Posterior) -> None:
+def test_a_mass_that_was_drawn_is_not_drawn_again_from_the_prior(
+    posterior: Posterior, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """What little the tracks tell of it, they tell together with the force, so that another draw would not fit that."""
-    worlds, generator = posterior.worlds(40), np.random.default_rng(0)
-    drawn = worlds.mass.clone()
-    drawn[:, :2] *= torch.from_numpy(np.exp(MASS.prior.sd * generator.standard_normal((40, 2))))
-    unsaid = [("default", "identified")] * 3
-    found = with_defaults(replace(worlds, mass=drawn), posterior.model, unsaid, "prior", generator)
-    assert (found.mass[:, :2] == drawn[:, :2]).all()
-    assert found.mass[:, 2].std() > 0.1  # that one was held
+    unsaid = BodyStatus(ParameterStatus(Status.DEFAULT), ParameterStatus(Status.DEFAULT))
+    monkeypatch.setattr(Stock, "_status", lambda _self, _body: unsaid)
+    (batch,) = PosteriorWorlds(posterior, draws=40, defaults="prior").batches
+    assert (batch.drawn.mass[:, :2] == posterior.worlds(40).mass[:, :2]).all()
+    assert batch.drawn.mass[:, 2].std() > 0.1  # that one was weighed, and is held

@@ -209,25 +209,26 @@ class Refits:
         """
         found = self._all(trial.with_cause, scores)
         promised = {one.effect.name: one.size / 2 for one in scores if not happens_once(one.effect)}
+        leader = max(promised, key=lambda name: promised[name], default="")
         for _ in range(MENDINGS):
             most = max((one.brought(trial) for one in found), default=0.0)
-            highest = max(promised.values(), default=0.0)
             short = [
                 one
                 for one in found
-                if (told := promised.get(one.causes[-1].name, 0.0)) > max(most, one.brought(trial) / SHORT, 0.0)
-                or told == highest > one.brought(trial)
+                if (told := promised.get(name := one.causes[-1].name, 0.0)) > max(one.brought(trial), 0.0)
+                and (name == leader or told > max(most, one.brought(trial) / SHORT))
+                and (not one.fit.joint.converged or one.fallen_from(trial))
             ]
-            short = [one for one in short if not one.fit.joint.converged or one.fallen_from(trial)]
             if not short:
                 break
             hopeful = max(short, key=lambda one: promised[one.causes[-1].name])
-            mended = hopeful.continued()
-            if fallen := mended.fallen_from(trial):
-                mended = mended.mended(fallen, seed=self.seed)
-            if mended is hopeful:
+            further = hopeful.continued()
+            if fallen := further.fallen_from(trial):
+                further = further.mended(fallen, seed=self.seed)
+            if further.brought(trial) < hopeful.brought(trial) + self.needed:
                 promised.pop(hopeful.causes[-1].name)
-            found = [mended if one is hopeful else one for one in found]
+            else:
+                found = [further if one is hopeful else one for one in found]
         most = max((one.brought(trial) for one in found), default=0.0)
         close = [one for one in found if one.brought(trial) > SHORT * most > 0]
         rest = [one for one in found if one not in close]

@@ -47,7 +47,8 @@ class Common:
     deviating
         How motion deviates from the model; None where it follows it exactly.
     own_courses
-        Whether draws that show what was seen may follow their own course.
+        Whether draws that show what was seen may follow their own course; they do in any case where bodies act on each
+        other from afar.
     """
 
     sight: Sight
@@ -78,7 +79,7 @@ class Batch:
 
     def __init__(self, common: Common, released: Released, chance: Chance) -> None:
         self.common, self.released, self.chance = common, released, chance
-        own = OwnCourses(common.sight, released) if common.own_courses else None
+        own = OwnCourses(common.sight, released) if common.own_courses or common.model.is_coupled else None
         self.seen = SeenVideo(common.sight, len(released.worlds), chance, own)
         self._extended = with_friction_ratio(self.drawn, common.model) or (self.drawn, common.model)
         self._changed: dict[tuple[Change, int], WorldDraws] = {}
@@ -141,15 +142,16 @@ class Batch:
     def simulated(self, change: Change, body: int) -> WorldDraws:
         """The same, simulated anew and not kept."""
         model, own = self._extended[1], self.seen.on_own_course
-        felt, taken = model.path_depends_on_mass, self.meanings(change)
-        intervention = Intervention(change, body, self._acting, taken, mass_moves=felt)
+        whole = Intervention(change, body, self._extended[0], self.meanings(change))
+        if own.all():
+            return changed_course(self.common.sight, whole, model, own, self.seen.events)
+        intervention = Intervention(change, body, self._acting, self.meanings(change))
         kept = Counterfactual(
             self.seen, self._acting, model, self.turning, self.scattering, intervention=intervention
         ).run()
         if not own.any():
             return kept
-        intervention = Intervention(change, body, self._extended[0], taken, mass_moves=felt)
-        return kept.with_draws(own, changed_course(self.common.sight, intervention, model, own, self.seen.events))
+        return kept.with_draws(own, changed_course(self.common.sight, whole, model, own, self.seen.events))
 
     def meanings(self, change: Change) -> Int[np.ndarray, "draw"]:
         """Which of the meanings of its word each draw takes."""

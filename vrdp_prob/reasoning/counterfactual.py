@@ -3,10 +3,9 @@
 Abduction, action, prediction. Until the changed object first touches another, nothing differs from what was seen; where
 its speed or its friction changes, its own course differs from its release on. From then on a body is *reached* once it
 touches, or fails to touch, one that is reached (or the changed one); a reached body is simulated from its last
-observed state, every other body keeps its observed course and its observed events. Where bodies act on each other from
-afar, all are reached as soon as the change is felt, and a removed object is missed from its release on. Time is cut at
-the observed contacts and at regular steps; at each cut the bodies that are not reached are put back on their observed
-course, so that no error of the model grows in them.
+observed state, every other body keeps its observed course and its observed events. Time is cut at the observed contacts
+and at regular steps; at each cut the bodies that are not reached are put back on their observed course, so that no
+error of the model grows in them.
 
 At the first contact of an object that became heavier, lighter or bouncier the geometry is what it was: the observed
 velocity changes are kept and scaled as the impulse of the pair scales, which carries over the part of the contact that
@@ -116,20 +115,14 @@ class Counterfactual:
     @property
     def _release(self) -> float | None:
         """When the change is felt before any contact, in s; None where that is in no draw."""
-        missed = self._change.removes and self._model.is_coupled
-        return float(self._first[self._body]) if missed or self._intervention.felt_at_release.any() else None
+        return float(self._first[self._body]) if self._intervention.felt_at_release.any() else None
 
     def _at_release(self, state: State) -> None:
-        """Another speed or friction reaches its body as soon as it moves; the others, where they feel it from afar."""
-        if self._change.removes:
-            self._reached[:, np.arange(self._reached.shape[1]) != self._body] = True
-            return
+        """Another speed or friction reaches its body as soon as it moves."""
         velocity, felt = self._intervention.released(state.velocity[:, self._body])
         state.velocity[:, self._body] = velocity
         state.rolling[felt, self._body] = state.velocity[felt, self._body]
         self._reached[felt, self._body] = True
-        if self._model.is_coupled:
-            self._reached[felt] = True
 
     def _time(self, contact: Contact) -> float:
         return float(np.clip(contact.time, self._seen.tracks.times[0], self._seen.tracks.times[-1]))

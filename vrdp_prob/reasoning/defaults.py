@@ -19,9 +19,7 @@ from vrdp_prob.models.simulator.worlds import Worlds
 
 Defaults = Literal["fixed", "prior"]
 
-DEFAULT = "default"
-HELD = 0.5
-"""Share of the prior's standard deviation below which draws of a mass are taken for a value that was held."""
+DEFAULT, DRAWN = "default", "drawn"
 
 
 def with_defaults(
@@ -40,10 +38,11 @@ def with_defaults(
     model
         The physics, with what it believes of masses and restitutions.
     statuses
-        Status of mass and restitution of each body.
+        Status of mass and restitution of each body; `drawn` for a mass that is an unknown, of which the tracks say next
+        to nothing.
     defaults
-        `fixed` leaves the defaults, `prior` draws from the prior: the mass around its default, by the prior's spread
-        (one that was drawn already, since a motion depends on it, has that); the restitution where it is at most 1.
+        `fixed` leaves the defaults, `prior` draws from the prior: the mass around its default, by the prior's spread;
+        the restitution where it is at most 1.
     generator
         Source of the draws.
 
@@ -57,10 +56,9 @@ def with_defaults(
     if defaults == "fixed":
         return worlds
     mass, restitution = worlds.mass.clone(), worlds.restitution.clone()
-    believed = model.believed(MASS).prior.sd
     for body, (of_mass, of_restitution) in enumerate(statuses):
-        if of_mass == DEFAULT and float(mass[:, body].log().std(correction=0)) < HELD * believed:
-            spread = believed * generator.standard_normal(len(worlds))
+        if of_mass == DEFAULT:
+            spread = model.believed(MASS).prior.sd * generator.standard_normal(len(worlds))
             mass[:, body] *= MASS.transform.from_coordinate(torch.from_numpy(spread)).to(mass)
         if of_restitution == DEFAULT:
             restitution[:, body] = prior_restitutions(model, len(worlds), generator).to(restitution)

@@ -27,9 +27,8 @@ def drawn_meanings(change: Change, draws: int, numbers: Random) -> Int[np.ndarra
 class Intervention:
     """A change of one body, in all draws.
 
-    A changed speed is felt from the release on, a changed restitution from the first contact. So is a changed mass, but
-    where the path of a body depends on it by itself: then it is felt from the release of a body that moves on, as a
-    changed friction is.
+    A changed speed is felt from the release on, a changed mass or restitution from the first contact, and a changed
+    friction from the release of a body that moves, else from the first contact.
 
     Parameters
     ----------
@@ -39,21 +38,10 @@ class Intervention:
         The draws before it.
     taken
         Which of the meanings of its word each draw takes.
-    mass_moves
-        Whether the path of a body that touches nothing depends on its mass.
     """
 
-    def __init__(
-        self,
-        change: Change,
-        body: int,
-        worlds: Worlds,
-        taken: Int[np.ndarray, "draw"],
-        *,
-        mass_moves: bool = False,
-    ) -> None:
+    def __init__(self, change: Change, body: int, worlds: Worlds, taken: Int[np.ndarray, "draw"]) -> None:
         self.change, self.body, self._before, self._taken = change, body, worlds, taken
-        self._mass_moves = mass_moves
 
     @cached_property
     def worlds(self) -> Worlds:
@@ -74,7 +62,7 @@ class Intervention:
     @property
     def felt_at_release(self) -> Bool[np.ndarray, "draw"]:
         """Draws in which the course of a moving body differs from its release on."""
-        return self._changes(SPEED) | self._changes(FRICTION) | (self._changes(MASS) & self._mass_moves)
+        return self._changes(SPEED) | self._changes(FRICTION)
 
     @property
     def felt_at_contact(self) -> Bool[np.ndarray, "draw"]:

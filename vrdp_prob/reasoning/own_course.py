@@ -5,8 +5,8 @@ of the model cannot grow in it, but the states from which the simulation is resu
 draw of the posterior is simulated as it is: then all of it fits together, but a draw in which something else happened
 than was seen tells of another video. Both err, in different ways; so half of those draws whose own course of events is
 the one that was seen follow it, in doubtful contacts, in changes and after the video, and the other draws keep what was
-seen. Where bodies act on each other from afar, no body's motion can be smoothed by itself, and all draws whose course
-is the one that was seen follow it.
+seen. Where bodies act on each other from afar, no body's motion can be smoothed by itself, and a change reaches all of
+them at once; then all draws follow their own course.
 """
 
 from dataclasses import dataclass
@@ -19,6 +19,7 @@ from vrdp_prob.models.physics import PhysicsModel
 from vrdp_prob.models.simulator.events import EventTable as RolloutEvents
 from vrdp_prob.models.simulator.events import RolloutEventKind
 from vrdp_prob.models.simulator.worlds import Worlds
+from vrdp_prob.reasoning.chance import Random
 from vrdp_prob.reasoning.contacts import EDGE, Contact
 from vrdp_prob.reasoning.events import EventTable
 from vrdp_prob.reasoning.future import after_the_video, future_times
@@ -51,10 +52,12 @@ class OwnCourses:
     sight: Sight
     released: Released
 
-    @property
-    def share(self) -> float:
-        """Share of the draws that can follow their own course which do."""
-        return 1.0 if self.released.model.is_coupled else SHARE
+    def chosen(self, numbers: Random) -> Bool[np.ndarray, "draw"]:
+        """Draws that follow their own course, by lot where some keep what was seen."""
+        count = len(self.released.worlds)
+        if self.released.model.is_coupled:
+            return np.ones(count, dtype=bool)
+        return self.as_seen & (numbers.random((count,)) < SHARE)
 
     @cached_property
     def met(self) -> Bool[np.ndarray, "draw contact"]:

@@ -79,7 +79,7 @@ class SeenVideo:
         """Draws that follow their own course."""
         if self.own is None:
             return np.zeros(self.draws, dtype=bool)
-        return self.own.as_seen & (self.chance.numbers(Purpose.COURSES).random((self.draws,)) < self.own.share)
+        return self.own.chosen(self.chance.numbers(Purpose.COURSES))
 
     @cached_property
     def contact_times(self) -> Float[np.ndarray, "draw contact"]:

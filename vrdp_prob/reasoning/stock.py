@@ -1,5 +1,7 @@
 """Where the draws of a video come from, batch by batch, and how many are worth taking."""
 
+from functools import cached_property
+
 import numpy as np
 from jaxtyping import Int
 
@@ -7,7 +9,7 @@ from vrdp_prob.inference.identifiability import BodyStatus
 from vrdp_prob.models.simulator.worlds import Worlds
 from vrdp_prob.reasoning.batch import Batch, Common
 from vrdp_prob.reasoning.chance import Chance, Purpose, Seeded
-from vrdp_prob.reasoning.defaults import Defaults, with_defaults
+from vrdp_prob.reasoning.defaults import DRAWN, Defaults, with_defaults
 from vrdp_prob.reasoning.deviations import DeviationModel
 from vrdp_prob.reasoning.posterior_like import PosteriorLike
 from vrdp_prob.reasoning.released import Released
@@ -84,10 +86,20 @@ class Stock:
     def _batch(self, drawn: Worlds, number: int) -> Batch:
         generator = Seeded(self.posterior.seed, number).numbers(Purpose.DEFAULTS)
         statuses = [self._status(body.id) for body in self.posterior.tracks.bodies]
-        known = [(str(status.mass.status), str(status.restitution.status)) for status in statuses]
+        known = [
+            (str(status.mass.status) if held else DRAWN, str(status.restitution.status))
+            for status, held in zip(statuses, self._held_masses, strict=True)
+        ]
         drawn = with_defaults(drawn, self.posterior.model, known, self._defaults, generator)
         released = Released(drawn, self.posterior.tracks.times, self.posterior.model)
         return Batch(self._common, released, self._chance.another(number))
+
+    @cached_property
+    def _held_masses(self) -> list[bool]:
+        """Whether the mass of each body is the same in all draws; else it is an unknown, whatever is said of it."""
+        mass = self.posterior.worlds().mass
+        held: list[bool] = (mass == mass[0]).all(dim=0).tolist()
+        return held
 
     def _status(self, body: str) -> BodyStatus:
         return self.posterior.status[body]

@@ -192,7 +192,7 @@ def test_a_gpu_learns_where_it_is_asked(monkeypatch: pytest.MonkeyPatch, tmp_pat
         np.testing.assert_array_equal(weights(one), weights(other))  # weights on the processor: numpy refuses others
 
 
-@pytest.mark.parametrize("device", ["abacus", "", "cuda:99"])
+@pytest.mark.parametrize("device", ["abacus", "", "cuda:99", "meta", "hpu", "cpu:x"])
 def test_a_device_that_is_not_here(device: str) -> None:
     with pytest.raises(InputError, match=f"device '{device}': torch finds none of this name here; give cpu, or cuda"):
         learn({"a": TAUGHT[0]}, device=device)

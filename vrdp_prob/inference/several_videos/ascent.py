@@ -125,7 +125,7 @@ def climb(
                 refused = own.total(numbers)
         if trial.total(numbers) - state.total(numbers) < TOLERANCE:
             own = _across_edges(videos, trial, slopes.videos)
-            trial = _improved(numbers, videos, own, smooth.shared_step, around=slopes.videos)
+            trial, refused = _improved(numbers, videos, own, smooth.shared_step, around=slopes.videos), -np.inf
         gain = trial.total(numbers) - state.total(numbers)
         if gain > 0:
             state = trial
@@ -205,12 +205,15 @@ def _followed(
 
 
 def _across_edges(videos: Sequence[LinkedVideo], state: _State, expansions: Sequence[Expansion]) -> _State:
-    """Each video that gained nothing though its own Newton step promised it, at the best of a cloud around it."""
-    locals_ = [
-        local if one.promised < EXPECTED else _best_of_cloud(video, state.shared, local, one.local_root, local)
-        for video, local, one in zip(videos, state.locals, expansions, strict=True)
-    ]
-    found = _State.at(videos, state.shared, locals_)
+    """The state with each video whose own Newton step promised something at the best of a cloud around it."""
+
+    def best(index: int) -> Float[np.ndarray, "_"]:
+        own, expansion = state.locals[index], expansions[index]
+        if expansion.promised < EXPECTED:
+            return own
+        return _best_of_cloud(videos[index], state.shared, own, expansion.local_root, own)
+
+    found = _State.at(videos, state.shared, in_parallel(best, range(len(videos))))
     pairs = zip(found.locals, found.values, state.locals, state.values, strict=True)
     better = [(own, value) if value > before else (old, before) for own, value, old, before in pairs]
     return _State(state.shared, tuple(own for own, _ in better), tuple(value for _, value in better))

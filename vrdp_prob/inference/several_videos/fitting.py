@@ -164,7 +164,7 @@ class SharedFit:
             replace(fit, modes=(replace(fit.modes[0], point=points.get(index, joint.point(index))),))
             for index, fit in enumerate(self.fits)
         ]
-        fits = look_again(settled, lost, self.model, self.shared, seed=seed, looks=MENDING_LOOKS)
+        fits = look_again(settled, lost, self.model, self.shared, seed=seed, looks=MENDING_LOOKS, asked=others)
         changed = [index for index in lost if fits[index] is not settled[index]]
         if not changed:
             return self

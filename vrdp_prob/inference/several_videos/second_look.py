@@ -86,6 +86,7 @@ def look_again(
     seed: int,
     looks: int = LOOKS,
     islands: bool = False,
+    asked: Collection[int] | None = None,
 ) -> list[MapFit]:
     """The fits of single videos, with some of them searched anew, and improved where that is better.
 
@@ -105,13 +106,16 @@ def look_again(
         Fits that are made anew of one video, at most.
     islands
         See `consensus`.
+    asked
+        Videos that say something of the shared parameters, as far as they are trusted; all where None.
     """
     if not chosen:
         return list(fits)
     excess = _excess(fits)
     goal = WORSE * float(np.median([one.misfit.residual_sd for one in fits]))
     ways = [(look % 2 == 0, IN_DOUBT) for look in range(looks)] + ([(True, TURNING)] if explained(fits) else [])
-    look = _Look(model, _told(fits, model, shared, islands=islands), goal, seed, tuple(ways))
+    among = range(len(fits)) if asked is None else asked
+    look = _Look(model, _told(fits, model, shared, among, islands=islands), goal, seed, tuple(ways))
     doubted = [(fits[index], bool(excess[index] >= FAR_WORSE)) for index in chosen]
     improved = dict(zip(chosen, in_processes(look, doubted), strict=True))
     return [improved.get(index) or fit for index, fit in enumerate(fits)]
@@ -169,11 +173,19 @@ def _excess(fits: Sequence[MapFit]) -> np.ndarray:
     return ratios / np.median(ratios)
 
 
-def _told(fits: Sequence[MapFit], model: PhysicsModel, shared: Sequence[str] | None, *, islands: bool) -> PhysicsModel:
-    """The model with what the trusted videos say of shared parameters as their prior."""
+def _told(
+    fits: Sequence[MapFit],
+    model: PhysicsModel,
+    shared: Sequence[str] | None,
+    asked: Collection[int],
+    *,
+    islands: bool,
+) -> PhysicsModel:
+    """The model with what those videos that are asked, and trusted, say of shared parameters as their prior."""
     numbers, videos = link_fits(fits, model, shared)
     points = [starts[0] for starts in carried_starts(fits, videos)]
-    found = consensus(numbers, videos, points, trusted(fits).tolist(), islands=islands)
+    believed = [bool(one) and index in asked for index, one in enumerate(trusted(fits))]
+    found = consensus(numbers, videos, points, believed, islands=islands)
     known = dict(zip(numbers.keys, zip(found.mean, found.sd, strict=True), strict=True))
     beliefs = {}
     for parameter in model.parameters:

@@ -115,7 +115,9 @@ class Batch:
     @cached_property
     def future(self) -> WorldDraws:
         """What happens after the video, at frames after its last one."""
-        seen, (worlds, model) = self.seen, self._extended
+        seen, (worlds, model), own = self.seen, self._extended, self.seen.on_own_course
+        if own.all():
+            return continued_course(self.common.sight, worlds, model, own, seen.events)
         state, log_ratio = self.end
         state = state.copy()
         if self.friction is not None:
@@ -128,7 +130,6 @@ class Batch:
         state.release[:, here] = end
         stretch = advance_scattered(worlds, state, np.append(end, times), model, self.scattering)
         refitted = after_the_video(self.common.sight, stretch, seen.events)
-        own = seen.on_own_course
         if not own.any():
             return refitted
         return refitted.with_draws(own, continued_course(self.common.sight, self._extended[0], model, own, seen.events))

@@ -9,7 +9,7 @@ from vrdp_prob.inference.identifiability import BodyStatus
 from vrdp_prob.models.simulator.worlds import Worlds
 from vrdp_prob.reasoning.batch import Batch, Common
 from vrdp_prob.reasoning.chance import Chance, Purpose, Seeded
-from vrdp_prob.reasoning.defaults import DRAWN, Defaults, with_defaults
+from vrdp_prob.reasoning.defaults import DEFAULT, DRAWN, Defaults, with_defaults
 from vrdp_prob.reasoning.deviations import DeviationModel
 from vrdp_prob.reasoning.posterior_like import PosteriorLike
 from vrdp_prob.reasoning.released import Released
@@ -54,7 +54,6 @@ class Stock:
         )
         self._common = common
         self._batches = [self._batch(drawn, 0)]
-        self._left: tuple[Worlds, Int[np.ndarray, "left"]] | None = None
 
     @property
     def worth(self) -> float:
@@ -65,41 +64,41 @@ class Stock:
     def batch(self, number: int) -> Batch | None:
         """A batch by its number; None where the posterior has no draws left for it."""
         while len(self._batches) <= number:
-            everything, left = self._remaining()
             start = (len(self._batches) - 1) * self._size
-            chosen = left[start : start + self._size]
+            chosen = self._left[start : start + self._size]
             if not len(chosen):
                 return None
-            self._batches.append(self._batch(everything.select(chosen.tolist()), len(self._batches)))
+            self._batches.append(self._batch(self._everything.select(chosen.tolist()), len(self._batches)))
         return self._batches[number]
 
-    def _remaining(self) -> tuple[Worlds, Int[np.ndarray, "left"]]:
-        """All draws, and which of them are not in the first batch, in random order."""
-        if self._left is None:
-            everything = self.posterior.worlds()
-            # as `Posterior.worlds` chooses them
-            first = np.linspace(0, len(everything) - 1, len(self._batches[0])).round().astype(int)
-            left = np.setdiff1d(np.arange(len(everything)), first)
-            self._left = everything, Seeded(self.posterior.seed).numbers(Purpose.ORDER).permutation(left)
-        return self._left
+    @cached_property
+    def _everything(self) -> Worlds:
+        """All draws."""
+        return self.posterior.worlds()
+
+    @cached_property
+    def _left(self) -> Int[np.ndarray, "left"]:
+        """Which of all draws are not in the first batch, in random order."""
+        total = len(self._everything)
+        # as `Posterior.worlds` chooses them
+        first = np.linspace(0, total - 1, len(self._batches[0])).round().astype(int)
+        return Seeded(self.posterior.seed).numbers(Purpose.ORDER).permutation(np.setdiff1d(np.arange(total), first))
 
     def _batch(self, drawn: Worlds, number: int) -> Batch:
         generator = Seeded(self.posterior.seed, number).numbers(Purpose.DEFAULTS)
-        statuses = [self._status(body.id) for body in self.posterior.tracks.bodies]
-        known = [
-            (str(status.mass.status) if held else DRAWN, str(status.restitution.status))
-            for status, held in zip(statuses, self._held_masses, strict=True)
-        ]
+        known = [self._known(place) for place in range(len(self.posterior.tracks.bodies))]
         drawn = with_defaults(drawn, self.posterior.model, known, self._defaults, generator)
         released = Released(drawn, self.posterior.tracks.times, self.posterior.model)
         return Batch(self._common, released, self._chance.another(number))
 
-    @cached_property
-    def _held_masses(self) -> list[bool]:
-        """Whether the mass of each body is the same in all draws; else it is an unknown, whatever is said of it."""
-        mass = self.posterior.worlds().mass
-        held: list[bool] = (mass == mass[0]).all(dim=0).tolist()
-        return held
+    def _known(self, place: int) -> tuple[str, str]:
+        """Status of mass and restitution of a body; a default mass that differs between draws is an unknown."""
+        status = self._status(self.posterior.tracks.bodies[place].id)
+        mass = str(status.mass.status)
+        if self._defaults == "prior" and mass == DEFAULT:
+            drawn = self._everything.mass[:, place]
+            mass = mass if bool((drawn == drawn[0]).all()) else DRAWN
+        return mass, str(status.restitution.status)
 
     def _status(self, body: str) -> BodyStatus:
         return self.posterior.status[body]

@@ -208,15 +208,13 @@ def _across_edges(videos: Sequence[LinkedVideo], state: _State, expansions: Sequ
     """The state with each video whose own Newton step promised something at the best of a cloud around it."""
 
     def best(index: int) -> Float[np.ndarray, "_"]:
-        own, expansion = state.locals[index], expansions[index]
+        video, own, expansion = videos[index], state.locals[index], expansions[index]
         if expansion.promised < EXPECTED:
             return own
-        return _best_of_cloud(videos[index], state.shared, own, expansion.local_root, own)
+        found = _best_of_cloud(video, state.shared, own, expansion.local_root, own)
+        return found if video.value(state.shared, found) > state.values[index] else own
 
-    found = _State.at(videos, state.shared, in_parallel(best, range(len(videos))))
-    pairs = zip(found.locals, found.values, state.locals, state.values, strict=True)
-    better = [(own, value) if value > before else (old, before) for own, value, old, before in pairs]
-    return _State(state.shared, tuple(own for own, _ in better), tuple(value for _, value in better))
+    return _State.at(videos, state.shared, in_parallel(best, range(len(videos))))
 
 
 def _best_of_cloud(

@@ -8,12 +8,14 @@ from tests.discovery.scenes import Setting
 from vrdp_prob.discovery import discover as module
 from vrdp_prob.discovery.body_checks import REBOUND
 from vrdp_prob.discovery.checks import run_checks
+from vrdp_prob.discovery.contact_checks import KICK
 from vrdp_prob.discovery.describe import describe
 from vrdp_prob.discovery.doubts import OWN_CHECKS, Doubt, doubts
 from vrdp_prob.discovery.finding import Check, Verdict
 from vrdp_prob.discovery.trials import Trial
 from vrdp_prob.inference.several_videos.fitting import SharedFit
 from vrdp_prob.models.effects.effect import Effect
+from vrdp_prob.models.effects.external_impulse import ExternalImpulse
 from vrdp_prob.models.effects.linear_drag import LinearDrag
 from vrdp_prob.models.effects.speed_dependent_restitution import SpeedDependentRestitution
 from vrdp_prob.models.effects.surface_tilt import SurfaceTilt
@@ -48,6 +50,12 @@ def test_what_is_left_of_the_very_thing_that_a_cause_does_speaks_against_it(tria
     (doubt,) = doubts(trial, SpeedDependentRestitution(), left(REBOUND, 5e-4))
     assert doubt.credible == pytest.approx(0.05)
     assert REBOUND in doubt.sentence
+
+
+def test_a_kick_that_leaves_sudden_changes_is_not_the_only_one_or_none(trial: Trial) -> None:
+    (doubt,) = doubts(trial, ExternalImpulse(), left(KICK, 1e-4))
+    assert doubt.credible == pytest.approx(0.01)
+    assert "more often than once in a video" in doubt.sentence
 
 
 def test_checks_and_causes_go_by_their_names(trial: Trial) -> None:

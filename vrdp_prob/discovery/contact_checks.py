@@ -24,6 +24,7 @@ from vrdp_prob.discovery.words import number, opposite
 
 RUBBING = "tangential against normal impulse"
 DISTANCE = "centre distance at contact"
+KICK = "sudden change of velocity without a partner"
 FEWEST_FRAMES = 4
 """Frames of a body before and after a kick without which it does not show."""
 
@@ -244,7 +245,7 @@ def _kick_without_partner(model: ResidualModel, replicas: Sequence[Float[np.ndar
         if p_value < SEEN
         else f"Nothing seen; the strongest was {number(size)} m/s {where}."
     )
-    yield Check("sudden change of velocity without a partner", size, p_value, False, sentence)
+    yield Check(KICK, size, p_value, False, sentence)
 
 
 def _kick_places(motion: FittedMotion) -> tuple[np.ndarray, np.ndarray]:

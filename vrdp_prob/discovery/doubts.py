@@ -4,14 +4,16 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from vrdp_prob.discovery.body_checks import REBOUND, friction_against
-from vrdp_prob.discovery.contact_checks import DISTANCE, RUBBING
+from vrdp_prob.discovery.contact_checks import DISTANCE, KICK, RUBBING
 from vrdp_prob.discovery.estimates import surprise
 from vrdp_prob.discovery.finding import Check
 from vrdp_prob.discovery.measurement_checks import DISTORTION
+from vrdp_prob.discovery.scores import happens_once
 from vrdp_prob.discovery.trials import Trial
 from vrdp_prob.models.effects.contact_friction import ContactFriction
 from vrdp_prob.models.effects.contact_radius_error import ContactRadiusError
 from vrdp_prob.models.effects.effect import Effect
+from vrdp_prob.models.effects.external_impulse import ExternalImpulse
 from vrdp_prob.models.effects.lens_distortion import LensDistortion
 from vrdp_prob.models.effects.mass_dependent_friction import MassDependentFriction
 from vrdp_prob.models.effects.material_friction import MaterialFriction
@@ -23,6 +25,7 @@ OWN_CHECKS = {
     SpeedDependentRestitution.name: REBOUND,
     ContactFriction.name: RUBBING,
     ContactRadiusError.name: DISTANCE,
+    ExternalImpulse.name: KICK,
     LensDistortion.name: DISTORTION,
     MassDependentFriction.name: friction_against("mass"),
     MaterialFriction.name: friction_against("material"),
@@ -67,8 +70,9 @@ def doubts(trial: Trial, cause: Effect, left: Sequence[Check] = ()) -> Iterator[
         )
     own = next((one for one in left if one.name == OWN_CHECKS.get(cause.name)), None)
     if own is not None and own.p_value < SURPRISING:
+        otherwise = ", or it happens more often than once in a video" if happens_once(cause) else ""
         yield Doubt(
             own.p_value / SURPRISING,
             f"With '{cause.name}' the check of {own.name} fails still, which asks for just what this cause does: its "
-            "law is another one, and its probability counts that.",
+            f"law is another one{otherwise}, and its probability counts that.",
         )

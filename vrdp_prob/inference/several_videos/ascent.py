@@ -6,7 +6,7 @@ along an edge, where a contact just happens, and is then looked for on both side
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import torch
@@ -69,6 +69,37 @@ class _State:
         return float(numbers.log_prior(self.shared[None])[0]) + sum(self.values)
 
 
+@dataclass(frozen=True)
+class _Ridges:
+    """Where videos come that follow a change of the shared numbers; each way is gone once.
+
+    Parameters
+    ----------
+    videos
+        The videos.
+    ends
+        Where each way that was gone has led.
+    """
+
+    videos: Sequence[LinkedVideo]
+    ends: dict[tuple[int, bytes, bytes, bytes], Float[np.ndarray, "_"]] = field(default_factory=dict)
+
+    def end(
+        self,
+        index: int,
+        shared: Float[np.ndarray, "shared"],
+        own: Float[np.ndarray, "local"],
+        target: Float[np.ndarray, "shared"],
+    ) -> Float[np.ndarray, "local"]:
+        """Best own numbers of a video at other shared numbers."""
+        way = (index, shared.tobytes(), own.tobytes(), target.tobytes())
+        if way not in self.ends:
+            video = self.videos[index]
+            one = follow(video, shared, own, target, steps=STEPS)
+            self.ends[way] = one.local if one.arrived else settle(video, target, [own, one.local])
+        return self.ends[way]
+
+
 def climb(
     numbers: SharedNumbers,
     videos: Sequence[LinkedVideo],
@@ -107,7 +138,7 @@ def climb(
     slopes = _expanded(numbers, videos, state)
     if towards is not None and not np.array_equal(towards, shared):
         settled = _settled(videos, state, slopes.videos)
-        state = _improved(numbers, videos, settled, towards - shared)
+        state = _improved(numbers, _Ridges(videos), settled, towards - shared)
         slopes = _expanded(numbers, videos, state)
     refused = -np.inf
     for _ in range(rounds):
@@ -117,15 +148,15 @@ def climb(
         converged = expected < TOLERANCE
         if converged:
             break
-        trial = _settled(videos, state, slopes.videos)
+        trial, ridges = _settled(videos, state, slopes.videos), _Ridges(videos)
         if _gained(trial, state, ~inside) < EXPECTED and trial.total(numbers) > refused + EXPECTED:
             own = trial
-            trial = _improved(numbers, videos, own, smooth.shared_step)
+            trial = _improved(numbers, ridges, own, smooth.shared_step)
             if trial is own:
                 refused = own.total(numbers)
         if trial.total(numbers) - state.total(numbers) < TOLERANCE:
             own = _across_edges(videos, trial, slopes.videos)
-            trial, refused = _improved(numbers, videos, own, smooth.shared_step, around=slopes.videos), -np.inf
+            trial, refused = _improved(numbers, ridges, own, smooth.shared_step, around=slopes.videos), -np.inf
         gain = trial.total(numbers) - state.total(numbers)
         if gain > 0:
             state = trial
@@ -164,7 +195,7 @@ def _expanded(numbers: SharedNumbers, videos: Sequence[LinkedVideo], state: _Sta
 
 def _improved(
     numbers: SharedNumbers,
-    videos: Sequence[LinkedVideo],
+    ridges: _Ridges,
     state: _State,
     step: Float[np.ndarray, "shared"],
     *,
@@ -174,14 +205,14 @@ def _improved(
     before = state.total(numbers)
     for share in SHARES:
         target = state.shared + share * step
-        trial = _with_best_noise(numbers, videos, _followed(videos, state, target, around))
+        trial = _with_best_noise(numbers, ridges.videos, _followed(ridges, state, target, around))
         if trial.total(numbers) > before:
             return trial
     return state
 
 
 def _followed(
-    videos: Sequence[LinkedVideo],
+    ridges: _Ridges,
     state: _State,
     target: Float[np.ndarray, "shared"],
     around: Sequence[Expansion] | None,
@@ -193,15 +224,14 @@ def _followed(
     """
 
     def found(index: int) -> Float[np.ndarray, "_"]:
-        video, own = videos[index], state.locals[index]
-        one = follow(video, state.shared, own, target, steps=STEPS)
-        found = one.local if one.arrived else settle(video, target, [own, one.local])
+        video, own = ridges.videos[index], state.locals[index]
+        found = ridges.end(index, state.shared, own, target)
         if around is None or video.value(target, found) > state.values[index] - FELL:
             return found
         expected = own + around[index].slope @ (target - state.shared)
         return _best_of_cloud(video, target, expected, around[index].local_root, found)
 
-    return _State.at(videos, target, in_parallel(found, range(len(videos))))
+    return _State.at(ridges.videos, target, in_parallel(found, range(len(ridges.videos))))
 
 
 def _across_edges(videos: Sequence[LinkedVideo], state: _State, expansions: Sequence[Expansion]) -> _State:

@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 SETUP := $(VENV)/.complete
 OUT ?= out
-LONG := calibration discovery concepts new_words practice
+LONG := agreement calibration discovery concepts new_words practice
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
 .PHONY: help setup demo test test-slow test-discovery lint types bench calibrate clean

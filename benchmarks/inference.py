@@ -1,14 +1,12 @@
-"""Time, effective sample size per second and gradient count of each sampler, and whether all samplers agree.
+"""Time, effective sample size per second and gradient count of each sampler.
 
     python benchmarks/inference.py [--json FILE] [--scenes 0,2,3] [--samplers emcee,nuts,laplace] [--peer GRADIENTS]
-                                   [--agreement SCENES]
 
 Videos are those of ../shared/data/clevrer_bullet (tracks); without them no sampler is timed. Times are those of the
 processor over all threads and processes, so that they say the same on a busy machine; on two cores emcee and NUTS take
 about half of it. The peer is Pyro's NUTS on the fixed-step simulator in torch, on three discs: it is stopped after so
 many gradients, since it takes hours to converge, and its time to 400 effective draws is that of its gradients times as
-many as NUTS needs on our simulator for the same posterior. `--agreement` compares means and standard deviations of all
-reported quantities between samplers, on synthetic scenes of an integrator that is not the simulator.
+many as NUTS needs on our simulator for the same posterior. Whether samplers agree is asked by `agreement.py`.
 """
 
 import argparse
@@ -22,7 +20,6 @@ import torch
 
 sys.path.insert(0, str(Path(__file__).parents[1]))  # the scenes of the tests
 
-from _agreement import Compared, agreement, start_of
 from _clock import processor_seconds
 from _fixed_step_posterior import FixedStepPosterior
 
@@ -33,7 +30,9 @@ from vrdp_prob.inference.diagnostics import Reported
 from vrdp_prob.inference.infer import sampled
 from vrdp_prob.inference.map_fit import fit_map
 from vrdp_prob.inference.nuts_chain import Task, make
+from vrdp_prob.inference.proposals import proposals
 from vrdp_prob.inference.samples import ESS_GOAL, assess
+from vrdp_prob.inference.straightening import Rates
 from vrdp_prob.models.physics import PhysicsModel
 from vrdp_prob.models.simulator.rollout import compile_model
 from vrdp_prob.scene import Tracks
@@ -42,8 +41,6 @@ DATA = Path(__file__).parents[2] / "shared" / "data" / "clevrer_bullet"
 GOALS = {"emcee": 120.0, "nuts": 120.0, "laplace": 20.0}
 """Processor seconds: twice the seconds on two cores."""
 DRAWS = 1000
-FAR, TOO_FAR = 3.0, 5.0
-"""Standard errors by which at most 1 % of the quantities, and by which none may differ."""
 Check = dict[str, object]
 
 
@@ -53,7 +50,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--scenes", default="0,2,3", help="practice videos to sample, for example 0,2,3")
     parser.add_argument("--samplers", default="emcee,nuts,laplace")
     parser.add_argument("--peer", type=int, default=300, metavar="GRADIENTS", help="gradients of the peer; 0: no peer")
-    parser.add_argument("--agreement", type=int, default=0, metavar="SCENES", help="synthetic scenes to compare on")
     options = parser.parse_args(arguments)
     torch.set_num_threads(1)
     compile_model(default_model())
@@ -67,8 +63,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
         checks += [check(f"{key}: processor seconds, median", None, goal, met=False) for key, goal in GOALS.items()]
     if options.peer:
         checks += peer(options.peer)
-    if options.agreement:
-        checks += agree(options.agreement, options.samplers.split(","))
     if options.json:
         options.json.write_text(json.dumps({"checks": checks}, indent=1) + "\n", encoding="utf-8")
     return 0
@@ -120,7 +114,8 @@ def peer(most_gradients: int) -> list[Check]:
     """Pyro's NUTS on our simulator and on the fixed-step one, for the same tracks of three discs."""
     scene = random_scene(np.random.default_rng(500), bodies=3, squares=False)
     fit = fit_map(observe(scene, noise=0.01, seed=0), PhysicsModel.base(), np.random.default_rng(0))
-    reported, start = Reported.of(fit.likelihood.coordinates, fit.contacts, fit.likelihood.tracks.bodies), start_of(fit)
+    reported = Reported.of(fit.likelihood.coordinates, fit.contacts, fit.likelihood.tracks.bodies)
+    start = proposals(fit.modes, fit.likelihood.residuals, Rates.of(fit.likelihood.tracks, fit.likelihood.coordinates))
     begin = processor_seconds()
     generator = np.random.default_rng(1)
     samples = SAMPLERS["nuts"](
@@ -142,37 +137,6 @@ def peer(most_gradients: int) -> list[Check]:
     print(f"fixed steps in torch     {1e3 * theirs:15.1f}  {theirs * needed:10.0f}  (from {gradients} gradients)")
     ratio = theirs / ours
     return [check("NUTS: fixed-step over event-driven seconds per gradient", ratio, 10.0, met=ratio >= 10)]
-
-
-def agree(count: int, names: Sequence[str]) -> list[Check]:
-    """Compare the samplers' means and standard deviations of every quantity."""
-    every: list[Compared] = []
-    converged: dict[str, int] = dict.fromkeys(names, 0)
-    print("scene  " + "  ".join(f"{name:>24s}" for name in names) + "  compared  beyond 3  largest")
-    for scene in agreement(count, names):
-        every += scene.compared
-        sizes = np.abs([one.difference for one in scene.compared] or [0.0])
-        said = []
-        for name, verdict in scene.verdicts.items():
-            converged[name] += verdict.converged
-            state = "converged" if verdict.converged else "not converged"
-            said.append(f"{scene.seconds[name]:7.1f} s, {state:13s}")
-        beyond = int((sizes > FAR).sum())
-        print(
-            f"{scene.seed:5d}  {'  '.join(said)}  {len(scene.compared):8d}  {beyond:8d}  {sizes.max():7.2f}", flush=True
-        )
-        for verdict in (verdict for verdict in scene.verdicts.values() if not verdict.converged):
-            print(f"       {verdict.sentence}")
-        for one in (one for one in scene.compared if abs(one.difference) > FAR):
-            print(f"       {one.what} of {one.quantity}, {' and '.join(one.samplers)}: {one.difference:.1f}")
-    print("say that they have converged: " + ", ".join(f"{name} {number}" for name, number in converged.items()))
-    sizes = np.abs([one.difference for one in every])
-    share, largest = float((sizes > FAR).mean()), float(sizes.max())
-    print(f"all: {len(sizes)} compared, {100 * share:.2f} % beyond {FAR:g} standard errors, largest {largest:.2f}")
-    return [
-        check("share of quantities beyond 3 standard errors", share, 0.01, met=share <= 0.01),
-        check("largest difference in standard errors", largest, TOO_FAR, met=largest <= TOO_FAR),
-    ]
 
 
 if __name__ == "__main__":

@@ -8,6 +8,7 @@ import numpy as np
 import torch
 
 from vrdp_prob.inference import BodyStatus, Convergence, ParameterStatus, Status
+from vrdp_prob.models.effects.mass_dependent_friction import MASS_EXPONENT, MassDependentFriction
 from vrdp_prob.models.physics import PhysicsModel
 from vrdp_prob.models.simulator.worlds import Worlds
 from vrdp_prob.scene import Body, Camera, Shape, Tracks
@@ -90,10 +91,13 @@ class KnownPosterior:
     statuses: tuple[Status, ...] = ()
     total: int = 400
     effective: float | None = None
+    mass_exponent: float | None = None
+    """Power of the mass with which friction grows beside each disc's own, for a model with that effect."""
 
     @property
     def model(self) -> PhysicsModel:
-        return PhysicsModel.base()
+        base = PhysicsModel.base()
+        return base if self.mass_exponent is None else base.with_effect(MassDependentFriction())
 
     @property
     def convergence(self) -> Convergence:
@@ -123,6 +127,8 @@ class KnownPosterior:
         held = torch.tensor([one.mass.status is Status.DEFAULT for one in self.status.values()])
         zero = torch.zeros(number, size, dtype=torch.float64)
         shared = {"sliding_friction": FRICTION, "rolling_resistance": 0.01, "air_drag": 1e-6, "angular_drag": 0.1}
+        if self.mass_exponent is not None:
+            shared |= {MASS_EXPONENT.name: self.mass_exponent}
         chosen = np.linspace(0, number - 1, min(count or number, number)).round().astype(int)
         everything = Worlds(
             shapes=(Shape.CYLINDER,) * size,

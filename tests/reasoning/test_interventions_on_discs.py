@@ -71,6 +71,26 @@ def test_a_change_follows_the_same_run_with_that_change(place: int, shift: Shift
             assert when == pytest.approx(happening[pair], abs=0.15)
 
 
+@pytest.mark.parametrize("own_courses", [True, False])
+@pytest.mark.parametrize("change", [Change.HEAVIER, Change.LIGHTER], ids=str)
+def test_a_mass_that_friction_follows_is_felt_before_anything_is_touched(change: Change, *, own_courses: bool) -> None:
+    exponent, discs = 0.5, (Disc((-1.5, 0.0), (1.6, 0.0)), Disc((0.0, 2.0)))
+    (meaning,) = change.meanings
+    assert meaning.shift is not None
+    same = Shift(FRICTION, Rule.FACTOR, meaning.shift.amount**exponent)
+
+    def ends(mass_exponent: float | None, change: Change) -> np.ndarray:
+        posterior = KnownPosterior(tracks_of(discs, 60), discs, spread=0.0, mass_exponent=mass_exponent)
+        worlds = PosteriorWorlds(posterior, draws=DRAWS, own_courses=own_courses)
+        return worlds.counterfactual(change, 0).trajectory[:, -1, 0, 0]
+
+    found = ends(exponent, change)
+    np.testing.assert_allclose(found, ends(None, Change("other", (Meaning(1.0, same),))), atol=1e-6)
+    expected = path((changed(discs[0], same), discs[1]), 60)[0][-1, 0, 0]
+    assert abs(path(discs, 60)[0][-1, 0, 0] - expected) > 3 * found.std()
+    assert abs(found.mean() - expected) < found.std()
+
+
 def test_each_change_of_the_row_changes_its_contacts_or_its_times() -> None:
     _, before = path(ROW, 128)
     assert [pair[1:] for pair in before] == [(0, 1)]

@@ -23,6 +23,7 @@ from vrdp_prob.models.simulator.laws import (
     is_coupled,
     path_depends_on_mass,
     path_depends_on_spin,
+    path_follows_mass,
 )
 
 
@@ -159,6 +160,11 @@ class PhysicsModel:
     def path_depends_on_mass(self) -> bool:
         """Whether what accelerates or kicks a body depends on its mass."""
         return path_depends_on_mass(self.effects, self.layout)
+
+    @cached_property
+    def path_follows_mass(self) -> bool:
+        """Whether a body that touches nothing would move otherwise with another mass, be it by its friction alone."""
+        return path_follows_mass(self.effects, self.layout)
 
     @cached_property
     def path_depends_on_spin(self) -> bool:

@@ -1,7 +1,7 @@
 """A batch of draws with its worlds: as it was, as it goes on, and with one object changed; each simulated once."""
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -143,12 +143,14 @@ class Batch:
     def simulated(self, change: Change, body: int) -> WorldDraws:
         """The same, simulated anew and not kept."""
         model, own = self._extended[1], self.seen.on_own_course
-        whole = Intervention(change, body, self._extended[0], self.meanings(change))
+        done = partial(
+            Intervention, change, body, taken=self.meanings(change), path_follows_mass=model.path_follows_mass
+        )
+        whole = done(self._extended[0])
         if own.all():
             return changed_course(self.common.sight, whole, model, own, self.seen.events)
-        intervention = Intervention(change, body, self._acting, self.meanings(change))
         kept = Counterfactual(
-            self.seen, self._acting, model, self.turning, self.scattering, intervention=intervention
+            self.seen, self._acting, model, self.turning, self.scattering, intervention=done(self._acting)
         ).run()
         if not own.any():
             return kept

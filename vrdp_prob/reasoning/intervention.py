@@ -27,8 +27,8 @@ def drawn_meanings(change: Change, draws: int, numbers: Random) -> Int[np.ndarra
 class Intervention:
     """A change of one body, in all draws.
 
-    A changed speed is felt from the release on, a changed mass or restitution from the first contact, and a changed
-    friction from the release of a body that moves, else from the first contact.
+    A changed speed is felt from the release on, a changed restitution from the first contact, and a changed friction,
+    or a mass that a body's path follows, from the release of a body that moves, else from the first contact.
 
     Parameters
     ----------
@@ -38,10 +38,21 @@ class Intervention:
         The draws before it.
     taken
         Which of the meanings of its word each draw takes.
+    path_follows_mass
+        Whether a body moves otherwise with another mass before it touches anything.
     """
 
-    def __init__(self, change: Change, body: int, worlds: Worlds, taken: Int[np.ndarray, "draw"]) -> None:
+    def __init__(
+        self,
+        change: Change,
+        body: int,
+        worlds: Worlds,
+        taken: Int[np.ndarray, "draw"],
+        *,
+        path_follows_mass: bool = False,
+    ) -> None:
         self.change, self.body, self._before, self._taken = change, body, worlds, taken
+        self._path_follows_mass = path_follows_mass
 
     @cached_property
     def worlds(self) -> Worlds:
@@ -62,7 +73,8 @@ class Intervention:
     @property
     def felt_at_release(self) -> Bool[np.ndarray, "draw"]:
         """Draws in which the course of a moving body differs from its release on."""
-        return self._changes(SPEED) | self._changes(FRICTION)
+        felt = self._changes(SPEED) | self._changes(FRICTION)
+        return felt | self._changes(MASS) if self._path_follows_mass else felt
 
     @property
     def felt_at_contact(self) -> Bool[np.ndarray, "draw"]:

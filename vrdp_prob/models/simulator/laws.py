@@ -199,10 +199,20 @@ def path_depends_on_mass(effects: Sequence[Effect], layout: Layout) -> bool:
     A friction that follows the mass is apart: a body may have a friction of its own, which tells no mass.
     """
     inputs = LawInputs(effects, layout)
-    constants = dict(zip(layout.constants, inputs.constants("body"), strict=True))
     pushes = [*_external(effects, inputs)[:2], *_kicks(effects, inputs)]
-    felt = ("mass", "inverse_mass", "inverse_inertia")
-    return is_coupled(effects) or any(depends(pushes, constants[name]) for name in felt)
+    return is_coupled(effects) or _depends_on_mass(pushes, inputs)
+
+
+def path_follows_mass(effects: Sequence[Effect], layout: Layout) -> bool:
+    """Whether a body that touches nothing would move otherwise with another mass and the same friction of its own."""
+    inputs = LawInputs(effects, layout)
+    path = [*_motion(effects, inputs)[3:5], *_kicks(effects, inputs)]
+    return is_coupled(effects) or _depends_on_mass(path, inputs)
+
+
+def _depends_on_mass(path: Sequence[Scalar], inputs: LawInputs) -> bool:
+    constants = dict(zip(inputs.layout.constants, inputs.constants("body"), strict=True))
+    return any(depends(path, constants[name]) for name in ("mass", "inverse_mass", "inverse_inertia"))
 
 
 def path_depends_on_spin(effects: Sequence[Effect], layout: Layout) -> bool:

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from tests.inference.repelling_discs import MASSES, inferred
-from vrdp_prob.inference.identifiability import Status
+from vrdp_prob.inference import assembly
+from vrdp_prob.inference.identifiability import BodyStatus, ParameterStatus, Status
 from vrdp_prob.inference.posterior import Posterior
 
 
@@ -25,3 +26,14 @@ def test_only_the_restitution_of_bodies_that_never_collide_is_called_a_default(p
     assert [one.restitution.status for one in posterior.status.values()] == [Status.DEFAULT] * 3
     told = [sentence for sentence in posterior.warnings if "default" in sentence]
     assert told == ["Objects a, b, c never collide in view: restitution is a default value, not measured."]
+
+
+def test_a_mass_that_is_drawn_though_nothing_tells_it_is_not_called_a_default(monkeypatch: pytest.MonkeyPatch) -> None:
+    nothing = ParameterStatus(Status.DEFAULT)
+    told = dict(zip("abc", [BodyStatus(nothing, nothing)] * 3, strict=True))
+    monkeypatch.setattr(assembly, "identifiability", lambda *_given: told)
+    assert inferred().warnings[-2:] == (
+        "Objects a, b never collide in view: mass is drawn from the prior and restitution is a default value, not "
+        "measured.",
+        "Object c never collides in view: mass and restitution are default values, not measured.",
+    )

@@ -40,7 +40,7 @@ def test_page_says_everything(content, page):
         assert all(choice.choice in text for choice in answer.choices)
     for warning in content.warnings:
         assert warning in text
-    assert "Never collided in the video: a default value, the data say nothing." in text
+    assert "Drawn from the prior: no collision tells it, and the data say nothing." in text
     assert "Only its ratio to the gray cylinder and the cyan sphere is known" in text
     assert "Rests on default values of the cyan cube and the yellow sphere" in text
     assert "sliding friction, rolling resistance and air drag" in text

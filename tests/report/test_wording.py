@@ -119,6 +119,8 @@ def test_status_in_words():
     assert mass_status(ratio, body("0"), name) == "Only its ratio to the cyan cube is known, not the mass itself."
     product = ParameterSummary(some, "product_only", ("1", "2"))
     assert "product with that of the cyan cube and the red sphere" in restitution_status(product, name)
-    default = ParameterSummary(some, "default")
-    assert "the data say nothing" in mass_status(default, body("0"), name)
+    default, drawn = ParameterSummary(Summary(1.0, 0.0, 1.0, 1.0), "default"), ParameterSummary(some, "default")
+    assert mass_status(default, body("0"), name) == restitution_status(default, name)
+    assert restitution_status(default, name).startswith("A default value: no collision tells it")
+    assert mass_status(drawn, body("0"), name).startswith("Drawn from the prior: no collision tells it")
     assert mass_status(default, body("0", mass=0.03), name) == "Weighed: given with the input."

@@ -1,6 +1,6 @@
 """A posterior out of a fit and its draws: what can be told from the data, what limits it, and every draw by name."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -26,14 +26,10 @@ FASTEST = 100.0
 """Speed in m/s that nothing on a table has: positions are in other units."""
 BATCH = 500
 """Worlds simulated at once when the draws are looked at again."""
-BOTH = ("mass and restitution are default values", "mass and restitution are drawn from the prior")
-MASS_ALONE = ("mass is a default value", "mass is drawn from the prior")
-RESTITUTION_ALONE = ("restitution is a default value", "restitution is drawn from the prior")
-ALONE = ("never collides in view", "never collide in view", BOTH)
-LATE = ("collides too late or too weakly to tell", "collide too late or too weakly to tell", BOTH)
-FELT = ("never collides in view", "never collide in view", RESTITUTION_ALONE)
-BOUNCED = ("tells something only where it meets walls", "tell something only where they meet walls", MASS_ALONE)
-"""Why the tracks do not tell (of one object, of several), and what stands in for what they do not tell."""
+ALONE = ("never collides in view", "never collide in view")
+LATE = ("collides too late or too weakly to tell", "collide too late or too weakly to tell")
+BOUNCED = ("tells something only where it meets walls", "tell something only where they meet walls")
+"""Why the tracks do not tell, of one object and of several."""
 
 
 def posterior_from(
@@ -178,16 +174,28 @@ def _fastest(tracks: Tracks) -> float:
 
 
 def _untold(fit: MapFit, status: dict[str, BodyStatus], *, drawn: bool) -> Iterator[str]:
-    """What the tracks say nothing about."""
+    """What the tracks say nothing about, why, and what stands in for it."""
     names = [body.id for body in fit.likelihood.tracks.bodies]
     met = {names[body] for pair in fit.contacts for body in pair}
-    groups: dict[tuple[str, str, tuple[str, str]], list[str]] = {ALONE: [], LATE: [], FELT: [], BOUNCED: []}
-    for name, one in status.items():
-        if one.mass.status is Status.DEFAULT:
-            bounced = one.restitution.status is not Status.DEFAULT
-            groups[BOUNCED if bounced else LATE if name in met else ALONE].append(name)
-        elif one.restitution.status is Status.DEFAULT and name not in met:
-            groups[FELT].append(name)
-    for (one_does, several_do, values), group in groups.items():
-        if group:
-            yield f"{_named(group, one_does, several_do)}: {values[drawn]}, not measured."
+    unknowns = fit.likelihood.coordinates.places
+    groups: dict[tuple[tuple[str, str], str], list[str]] = {}
+    for index, (name, one) in enumerate(status.items()):
+        untold = {
+            key: drawn or (key, index) in unknowns
+            for key, parameter in ((MASS.name, one.mass), (RESTITUTION.name, one.restitution))
+            if parameter.status is Status.DEFAULT
+        }
+        if untold:
+            why = LATE if name in met else BOUNCED if RESTITUTION.name not in untold else ALONE
+            groups.setdefault((why, _stand_in(untold)), []).append(name)
+    for ((one_does, several_do), values), group in groups.items():
+        yield f"{_named(group, one_does, several_do)}: {values}, not measured."
+
+
+def _stand_in(untold: Mapping[str, bool]) -> str:
+    """What stands in for parameters, by whether they are drawn."""
+    if len(untold) > 1 and len(set(untold.values())) == 1:
+        return f"{' and '.join(untold)} are {'drawn from the prior' if all(untold.values()) else 'default values'}"
+    return " and ".join(
+        f"{name} is {'drawn from the prior' if drawn else 'a default value'}" for name, drawn in untold.items()
+    )

@@ -139,19 +139,25 @@ def mass_status(parameter: ParameterSummary, body: Body, name: Mapping[str, str]
     if body.mass is not None:
         return "Weighed: given with the input."
     if parameter.status == "default":
-        return "Never collided with another object in the video: a default value, the data say nothing."
+        return _untold(parameter)
     if parameter.status == "identified":
-        return "Known from its collisions."
+        return "Known from its motion and its collisions."
     return f"Only its ratio to {_the(parameter.partners, name)} is known, not the mass itself."
 
 
 def restitution_status(parameter: ParameterSummary, name: Mapping[str, str]) -> str:
     """What the data say about a restitution factor, in words."""
     if parameter.status == "default":
-        return "Never collided in the video: a default value, the data say nothing."
+        return _untold(parameter)
     if parameter.status == "identified":
         return "Known from its collisions."
     return f"Only its product with that of {_the(parameter.partners, name)} is known."
+
+
+def _untold(parameter: ParameterSummary) -> str:
+    """What stands in for a parameter of which the data say nothing."""
+    value = "A default value" if parameter.summary.q05 == parameter.summary.q95 else "Drawn from the prior"
+    return f"{value}: no collision tells it, and the data say nothing."
 
 
 def _the(partners: Sequence[str], name: Mapping[str, str]) -> str:

@@ -92,12 +92,15 @@ class Refits:
 
     def of(self, trial: Trial) -> list[Trial]:
         """Refits of a model, the best first."""
-        if trial not in self._made:
-            self._made[trial] = self._new(trial)
+        return self._made[trial] if trial in self._made else self._keep(trial, self._new(trial))
+
+    def _keep(self, trial: Trial, found: Sequence[Trial]) -> list[Trial]:
+        """Refits of a model, the best first, as which they count from now on."""
+        self._made[trial] = sorted(found, key=merit, reverse=True)
         return self._made[trial]
 
     def _new(self, trial: Trial) -> list[Trial]:
-        """Hidden things are tried only where nothing explains the videos better than kicks do."""
+        """Refits in any order; hidden things are tried only where nothing explains the videos better than kicks do."""
         scores = self.left(trial).scores
         likely = _shortlist(scores)
         close = _shortlist(scores, CLOSE)
@@ -108,14 +111,14 @@ class Refits:
         kicks = next((one for one in scores if _kicks(one) and one.sites), None)
         if kicks is not None and (not found or found[0].causes[-1].name == kicks.effect.name):
             found += self._hidden(trial, found, kicks)
-        return sorted(found, key=merit, reverse=True)
+        return found
 
     def with_lost(self, trial: Trial) -> list[Trial]:
         """The refits, and where they leave something fits from the beginning, which count among them from then on."""
         found = self.of(trial)
         if trial not in self._searched and not self.settled(trial, found):
             self._searched.add(trial)
-            found = self._made[trial] = sorted([*found, *self._lost(trial, found)], key=merit, reverse=True)
+            return self._keep(trial, [*found, *self._lost(trial, found)])
         return found
 
     def with_lost_found(self, trial: Trial, one: Trial) -> Trial:
@@ -132,8 +135,7 @@ class Refits:
             if found is before:
                 break
         if found is not one:
-            refits = [found if old is one else old for old in self.of(trial)]
-            self._made[trial] = sorted(refits, key=merit, reverse=True)
+            self._keep(trial, [found if old is one else old for old in self.of(trial)])
         return found
 
     def searched_anew(self, trial: Trial, videos: Sequence[int]) -> Trial:

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from vrdp_prob.errors import InputError
-from vrdp_prob.files import write_atomically
+from vrdp_prob.files import check_writable, own_folders, write_atomically
 
 
 def test_the_file_appears_when_the_block_ends(tmp_path: Path) -> None:
@@ -30,6 +30,18 @@ def test_an_interruption_leaves_what_was_there(tmp_path: Path, interruption: typ
         write()
     assert [path.name for path in tmp_path.iterdir()] == ["a.txt"]
     assert (tmp_path / "a.txt").read_text() == "before"
+
+
+def test_a_video_has_a_folder_of_its_own_whatever_it_is_called() -> None:
+    assert own_folders(["a", "b c.mp4"]) == {"a": "a", "b c.mp4": "b c.mp4"}
+    assert own_folders(["/x/y", "..", "."]) == {"/x/y": "_x_y", "..": "__", ".": "_"}
+    with pytest.raises(InputError, match="video 'a_b': another one would be written to the folder 'a_b' too"):
+        own_folders(["a/b", "a_b"])
+
+
+def test_a_folder_whose_name_cannot_be_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="the folder cannot be written"):
+        check_writable(tmp_path / ("a" * 300))
 
 
 def test_a_folder_that_cannot_be_made(tmp_path: Path) -> None:

@@ -48,7 +48,7 @@ from vrdp_prob.errors import InputError
 from vrdp_prob.evaluation import evaluate
 from vrdp_prob.evaluation.compared_answers import with_answers
 from vrdp_prob.evaluation.document import table, to_document, write_evaluation
-from vrdp_prob.files import check_writable
+from vrdp_prob.files import check_writable, own_folders
 from vrdp_prob.inference import OPTIONS, check_options, default_model
 from vrdp_prob.learning_commands import learn_concepts, learn_word
 from vrdp_prob.models.simulator.rollout import compile_model
@@ -119,34 +119,35 @@ def report(
     """Write an uncertainty report: report.html, report.json and posterior.nc."""
     progress = progress_display(quiet=quiet)
     check_options(sampler=sampler, noise=noise, defaults=defaults)
-    check_writable(out)
-    if checkpoint is not None:
-        check_writable(checkpoint)
+    chosen = None if video is None else [video]
+    names = video_names(path, chosen)
+    own = {names[0]: ""} if len(names) == 1 else own_folders(names)
+    for folder in (out, *([] if checkpoint is None else [checkpoint])):
+        for name in names:
+            check_writable(folder / own[name])
     physics, learned, words = model_at(model), concepts_at(concepts), words_at(word)
-    names = [name for name in video_names(path) if video in (None, name)]
     asked = {name: [] for name in names} if questions is None else questions_of(questions, names, words)
     check_concepts(learned, [question for several in asked.values() for question in several], words)
     videos = load_all(
         path,
-        videos=None if video is None else [video],
+        videos=chosen,
         camera=camera,
         recognise=None if learned is None else learned.recognise,
         progress=progress,
     )
     files = video_files(path)
     for tracks in videos:
-        own = Path() if len(videos) == 1 else Path(tracks.video)
         written = write_report(
             tracks,
             questions=asked[tracks.video],
-            directory=out / own,
+            directory=out / own[tracks.video],
             video_file=files.get(tracks.video),
             model=physics,
             sampler=sampler,
             noise=noise,
             defaults=defaults,
             words=words,
-            checkpoint=None if checkpoint is None else checkpoint / own,
+            checkpoint=None if checkpoint is None else checkpoint / own[tracks.video],
             seed=seed,
             progress=progress,
         )

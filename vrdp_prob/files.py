@@ -1,6 +1,7 @@
 """Files that are there whole or not at all."""
 
-from collections.abc import Iterator
+import re
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryFile, mkstemp
@@ -16,8 +17,8 @@ def check_writable(folder: Path) -> None:
     InputError
         If the folder could not be made or written.
     """
-    existing = next(parent for parent in (folder, *folder.absolute().parents) if parent.exists())
     try:
+        existing = next(parent for parent in (folder, *folder.absolute().parents) if parent.exists())
         with TemporaryFile(dir=existing):
             return
     except OSError as error:
@@ -35,6 +36,24 @@ def check_file(path: Path) -> None:
     if path.is_dir():
         raise InputError(f"{path}: this is a folder; name the file to write.")
     check_writable(path.parent)
+
+
+def own_folders(videos: Sequence[str]) -> dict[str, str]:
+    """Names of folders for some videos, whose own names may hold what leads elsewhere.
+
+    Raises
+    ------
+    InputError
+        If two would have the same.
+    """
+    names: dict[str, str] = {}
+    for video in videos:
+        name = re.sub(r"[/\\\0]", "_", video)
+        name = name if name.strip(".") else "_" * len(name)
+        if name in names.values():
+            raise InputError(f"video '{video}': another one would be written to the folder '{name}' too; rename one.")
+        names[video] = name
+    return names
 
 
 @contextmanager

@@ -238,6 +238,26 @@ def test_an_output_folder_that_cannot_be_written(
     assert "taken" in line
 
 
+def test_a_video_that_is_not_there_is_refused_before_its_questions(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    line = refused(capsys, "report", folder, "--video", "w", "--questions", folder / "none.json")
+    assert "there is no video 'w'; the videos are v" in line
+
+
+def test_a_file_in_the_place_of_a_report_of_one_of_several_videos_is_refused_before_the_work(
+    folder: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name in ("tracks.csv", "objects.csv"):
+        header, *rows = (folder / name).read_text().splitlines()
+        other = [row.replace("v,", "../w,", 1) for row in rows]
+        (folder / name).write_text("\n".join([header, *rows, *other]) + "\n")
+    forbid(monkeypatch, "load_all")
+    (folder / "out").mkdir()
+    (folder / "out" / ".._w").write_text("a file is in the way")
+    assert ".._w: the folder cannot be written" in refused(capsys, "report", folder, "--out", folder / "out")
+
+
 def test_unusable_options(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert "sampler 'gibbs' is not known" in refused(capsys, "report", folder, "--sampler", "gibbs")
     assert "--seed" in refused(capsys, "report", folder, "--seed", "many")

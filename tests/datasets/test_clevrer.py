@@ -55,6 +55,9 @@ def test_only_what_is_in_view_is_measured(tmp_path: Path) -> None:
     [
         (lambda document: document.pop("motion_trajectory"), "not a CLEVRER annotation"),
         (lambda document: document["object_property"][0].update(shape="cone"), "object 0 has the unknown shape 'cone'"),
+        # types are checked under test, before the body says which field it is
+        (lambda document: document["object_property"][0].update(color=3), "its color is 3|a field is of another form"),
+        (lambda document: document["object_property"][1].update(object_id=0), "the object_id 0 is there twice"),
         (lambda document: document.update(object_property=[], motion_trajectory=[]), "there are 0 objects"),
     ],
 )

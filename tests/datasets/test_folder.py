@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from vrdp_prob.datasets import load, load_all, read_folder, write_folder
+from vrdp_prob.datasets import load, load_all, read_folder, video_names, write_folder
 from vrdp_prob.errors import InputError
 from vrdp_prob.scene import Body, Camera, Shape, Tracks, Wall
 
@@ -123,9 +123,31 @@ def test_a_folder_of_several_videos_needs_a_choice(folder: Path) -> None:
         load(folder, video="c")
 
 
+def test_a_table_without_rows_has_no_videos(folder: Path) -> None:
+    (folder / "tracks.csv").write_text(TRACKS.splitlines()[0] + "\n")
+    with pytest.raises(InputError, match=r"tracks\.csv: there are 0 objects"):
+        video_names(folder)
+
+
+def test_times_long_after_their_zero_are_told_apart(tmp_path: Path) -> None:
+    times = 1_700_000_000 + np.arange(4) / 25
+    positions = np.zeros((4, 1, 2))
+    write_folder(tmp_path, [Tracks.from_arrays("v", (Body("a", Shape.SPHERE, 0.1),), times, positions)])
+    np.testing.assert_allclose(np.diff(load(tmp_path).times), 0.04, atol=1e-6)
+
+
+def test_videos_of_one_name_are_told_apart(tmp_path: Path) -> None:
+    for suffix in ("avi", "mp4"):
+        (tmp_path / f"clip.{suffix}").write_bytes(b"")
+    with pytest.raises(InputError, match=r"clip\.mp4: video 'clip' is in clip\.avi as well; rename one"):
+        load_all(tmp_path)
+
+
 def test_paths_that_are_not_there(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="no such file or folder"):
         load(tmp_path / "nothing")
+    with pytest.raises(InputError, match="the path cannot be followed"):
+        load(tmp_path / ("a" * 300))
     with pytest.raises(InputError, match=r"holds no tracks\.csv, no video and no annotation"):
         load(tmp_path)
 

@@ -54,6 +54,10 @@ def test_write_then_read_gives_the_same(tmp_path: Path) -> None:
         ({"projection": [[1, 2, 3, float("nan")], [2, 4, 7, 8], [0, 1, 1, 5]]}, "not finite"),
         ({"width": 0}, "positive numbers of pixels"),
         ({"width": "wide"}, "not a camera file"),
+        ({"width": float("inf")}, "not a camera file"),
+        ({"fps": -25}, "'fps' is -25; give frames per second"),
+        ({"fps": float("nan")}, "'fps' is nan"),
+        ({"pixel_sd": float("nan")}, "'pixel_sd' is nan; give a number of pixels"),
     ],
 )
 def test_camera_file_mistakes(tmp_path: Path, change: dict[str, object], message: str) -> None:

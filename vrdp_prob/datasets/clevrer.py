@@ -69,6 +69,7 @@ def read_annotation(path: Path | str, *, camera: Camera | None = None) -> Tracks
         properties = document["object_property"]
         frames = document["motion_trajectory"]
         video = Path(document["video_filename"]).stem
+        check_ids(str(path), "object_id", [entry["object_id"] for entry in properties])
         index = {entry["object_id"]: number for number, entry in enumerate(properties)}
         positions = np.full((len(frames), len(properties), 2), np.nan)
         yaw = np.full((len(frames), len(properties)), np.nan)
@@ -208,7 +209,10 @@ def _body(path: Path | str, entry: Document) -> Body:
         raise InputError(
             f"{path}: object {identity} has the unknown shape '{entry['shape']}'; use sphere, cube or cylinder."
         ) from error
-    return Body(identity, shape, radius=REST_HEIGHT, material=entry.get("material"), color=entry.get("color"))
+    try:
+        return Body(identity, shape, radius=REST_HEIGHT, material=entry.get("material"), color=entry.get("color"))
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from error
 
 
 def _unwrapped(angles: np.ndarray) -> np.ndarray:

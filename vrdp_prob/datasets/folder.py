@@ -60,8 +60,6 @@ def read_folder(
     """
     folder = Path(folder)
     measurements = _read_measurements(folder / "tracks.csv")
-    if not measurements:
-        raise InputError(f"{folder / 'tracks.csv'}: there are 0 objects; give tracks of at least one.")
     bodies = _read_bodies(folder / "objects.csv")
     for video, object_id in bodies:
         if object_id not in measurements.get(video, {}):
@@ -72,10 +70,7 @@ def read_folder(
     walls = _read_walls(folder / "walls.csv", list(measurements))
     if camera is None and (folder / "camera.json").is_file():
         camera = Camera.read(folder / "camera.json")
-    names = list(measurements) if videos is None else list(videos)
-    for name in names:
-        if name not in measurements:
-            raise InputError(f"{folder}: there is no video '{name}'; the videos are {some(list(measurements))}.")
+    names = chosen(folder, list(measurements), videos)
     return [
         _tracks(folder, name, measurements[name], bodies, walls=walls[ALL_VIDEOS] + walls[name], camera=camera)
         for name in names
@@ -126,6 +121,8 @@ def _read_measurements(path: Path) -> dict[str, dict[str, _Measurements]]:
         measured.times.append(time)
         measured.positions.append((row.number_in("x"), row.number_in("y")))
         measured.angles.append(np.nan if angle is None else angle)
+    if not videos:
+        raise InputError(f"{path}: there are 0 objects; give tracks of at least one.")
     return {video: dict(objects) for video, objects in videos.items()}
 
 
@@ -217,7 +214,7 @@ def _track_rows(tracks: Tracks, *, with_angle: bool) -> list[Sequence[object]]:
     for index, body in enumerate(tracks.bodies):
         for frame in np.flatnonzero(tracks.seen[:, index]):
             x, y = tracks.positions[frame, index]
-            row: tuple[str, ...] = (tracks.video, body.id, f"{tracks.times[frame]:.9g}", f"{x:.9g}", f"{y:.9g}")
+            row: tuple[str, ...] = (tracks.video, body.id, _in_seconds(tracks.times[frame]), f"{x:.9g}", f"{y:.9g}")
             if with_angle:
                 angle = np.nan if angles is None else angles[frame, index]
                 row += (f"{angle:.9g}" if np.isfinite(angle) else "",)
@@ -225,9 +222,28 @@ def _track_rows(tracks: Tracks, *, with_angle: bool) -> list[Sequence[object]]:
     return rows
 
 
+def _in_seconds(time: float) -> str:
+    """A time as a table has it: to the nanosecond, however long ago its zero was."""
+    return np.format_float_positional(round(float(time), TIME_DECIMALS), trim="-")
+
+
 def _write_rows(path: Path, rows: Sequence[Sequence[object]]) -> None:
     with write_atomically(path) as temporary, temporary.open("w", newline="", encoding="utf-8") as file:
         csv.writer(file, lineterminator="\n").writerows(["" if cell is None else cell for cell in row] for row in rows)
+
+
+def chosen(source: Path | str, names: Sequence[str], asked: Sequence[str] | None) -> list[str]:
+    """Names of the videos that are asked for, all where None.
+
+    Raises
+    ------
+    InputError
+        If one of them is not there.
+    """
+    for name in asked or ():
+        if name not in names:
+            raise InputError(f"{source}: there is no video '{name}'; the videos are {some(names)}.")
+    return list(names if asked is None else asked)
 
 
 def some(names: Sequence[str]) -> str:

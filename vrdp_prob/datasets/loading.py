@@ -1,6 +1,6 @@
 """One door for every input: a video, a tracks folder, a CLEVRER annotation, or a folder of videos or annotations."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -76,19 +76,24 @@ def load_all(
         folder = source if source.is_dir() else source.parent
         return folders.read_folder(folder, videos=videos, camera=find_camera(folder, camera))
     files = _annotation_files(source) or video_files(source)
-    names = list(files) if videos is None else list(videos)
-    for name in names:
-        if name not in files:
-            raise InputError(f"{path}: there is no video '{name}'; the videos are {folders.some(list(files))}.")
+    names = folders.chosen(path, list(files), videos)
     return [_load_file(files[name], camera, recognise, progress) for name in names]
 
 
-def video_names(path: Path | str) -> list[str]:
-    """Names of the videos of an input, in the order in which `load_all` returns them."""
+def video_names(path: Path | str, videos: Sequence[str] | None = None) -> list[str]:
+    """Names of the named videos (all by default) of an input, in the order in which `load_all` returns them.
+
+    Raises
+    ------
+    InputError
+        If there is no input, or no such video in it.
+    """
     source = _existing(path)
     if _is_tracks_folder(source):
-        return folders.video_names(source if source.is_dir() else source.parent)
-    return list(_annotation_files(source) or video_files(source))
+        names = folders.video_names(source if source.is_dir() else source.parent)
+    else:
+        names = list(_annotation_files(source) or video_files(source))
+    return folders.chosen(path, names, videos)
 
 
 def has_tracks(path: Path | str) -> bool:
@@ -103,7 +108,7 @@ def video_files(path: Path | str) -> dict[str, Path]:
     if not source.is_dir():
         return {} if source.suffix.lower() in {".csv", ".json"} else {source.stem: source}
     candidates = sorted((source / "videos").glob("*")) or sorted(source.glob("*"))
-    return {file.stem: file for file in candidates if file.suffix.lower() in VIDEO_SUFFIXES}
+    return _by_name({file: file.stem for file in candidates if file.suffix.lower() in VIDEO_SUFFIXES})
 
 
 def find_camera(path: Path, camera: CameraChoice = None) -> Camera | None:
@@ -124,7 +129,11 @@ def find_camera(path: Path, camera: CameraChoice = None) -> Camera | None:
 
 def _existing(path: Path | str) -> Path:
     source = Path(path)
-    if not source.exists():
+    try:
+        there = source.exists()
+    except OSError as error:
+        raise InputError(f"{source}: the path cannot be followed ({error.strerror}); check it.") from error
+    if not there:
         raise InputError(f"{source}: there is no such file or folder; check the path.")
     if source.is_file() and source.suffix.lower() == ".csv" and not _is_tracks_folder(source):
         raise InputError(
@@ -141,7 +150,17 @@ def _is_tracks_folder(path: Path) -> bool:
 
 def _annotation_files(path: Path) -> dict[str, Path]:
     """CLEVRER annotation files by the name of their video, which each has to be read for."""
-    return {annotated_video(file): file for file in _annotation_paths(path)}
+    return _by_name({file: annotated_video(file) for file in _annotation_paths(path)})
+
+
+def _by_name(names: Mapping[Path, str]) -> dict[str, Path]:
+    """Files by the names of their videos, of which no two may be the same."""
+    files: dict[str, Path] = {}
+    for file, name in names.items():
+        if name in files:
+            raise InputError(f"{file}: video '{name}' is in {files[name].name} as well; rename one of them.")
+        files[name] = file
+    return files
 
 
 def _annotation_paths(path: Path) -> list[Path]:

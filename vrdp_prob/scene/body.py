@@ -68,8 +68,8 @@ class Body:
     Raises
     ------
     InputError
-        If the shape is none of `Shape`, a radius, mass or inertia is not a positive finite number, or probabilities do
-        not add up to 1.
+        If the shape is none of `Shape`, an id, material or color is no text, a radius, mass or inertia is no positive
+        finite number, or probabilities do not add up to 1.
     """
 
     id: str
@@ -82,6 +82,10 @@ class Body:
     attribute_probabilities: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
+        for name in ("id", "material", "color"):
+            value = getattr(self, name)
+            if not isinstance(value, str) and (name == "id" or value is not None):
+                raise InputError(f"object {self.id}: its {name} is {value!r}; give a text.")
         try:
             object.__setattr__(self, "shape", Shape.named(self.shape))  # a plain text is as good
         except InputError as error:

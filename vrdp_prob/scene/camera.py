@@ -38,7 +38,8 @@ class Camera:
     Raises
     ------
     InputError
-        If the matrix has another shape, is not finite, or is singular, or the picture has no size.
+        If the matrix has another shape, is not finite, or is singular, the picture has no size, or another number is
+        none that it can be.
     """
 
     projection: Float[np.ndarray, "3 4"]
@@ -59,6 +60,12 @@ class Camera:
             )
         if self.width <= 0 or self.height <= 0:
             raise InputError("camera: 'width' and 'height' must be positive numbers of pixels.")
+        if self.frame_rate is not None and not 0 < self.frame_rate < np.inf:
+            raise InputError(f"camera: 'fps' is {self.frame_rate:g}; give frames per second, or leave it out.")
+        if not 0 <= self.pixel_sd < np.inf:
+            raise InputError(
+                f"camera: 'pixel_sd' is {self.pixel_sd:g}; give a number of pixels from 0, or leave it out."
+            )
 
     @classmethod
     def clevrer(cls) -> "Camera":
@@ -82,7 +89,7 @@ class Camera:
             pixel_sd = float(document.get("pixel_sd", 0.0))
         except OSError as error:
             raise InputError(f"{path}: the camera file cannot be read ({error.strerror}); check the path.") from error
-        except (ValueError, KeyError, TypeError, AttributeError) as error:
+        except (ValueError, KeyError, TypeError, AttributeError, OverflowError, RecursionError) as error:
             raise InputError(
                 f"{path}: not a camera file ({error}); it needs 'projection' (3 rows of 4), 'width' and 'height'."
             ) from error

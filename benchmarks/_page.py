@@ -45,8 +45,8 @@ def page_parser(description: str | None, results: Path, *, document: str = "resu
 def publish(text: str, page: str, document: Mapping[str, object], options: argparse.Namespace) -> None:
     """Print tables, and write them into their page and a document to a file where `page_parser`'s options say so."""
     print(text)
-    if options.docs:
-        write_between(options.docs / page, text)
     if options.json:
         with write_atomically(options.json) as temporary:
             temporary.write_text(json.dumps(document, indent=1) + "\n", encoding="utf-8")
+    if options.docs:
+        write_between(options.docs / page, text)

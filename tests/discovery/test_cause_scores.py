@@ -6,11 +6,13 @@ from scipy.stats import chi2
 
 from tests.discovery.fitted import fitted
 from vrdp_prob.discovery.estimates import upper_bounds
+from vrdp_prob.discovery.finding import UpperBound
 from vrdp_prob.discovery.linear import Score
 from vrdp_prob.discovery.residual_model import ResidualModel
-from vrdp_prob.discovery.scores import CauseScore, _one_sided, happens_once, score_causes
+from vrdp_prob.discovery.scores import CauseScore, _largest, _one_sided, happens_once, score_causes
 from vrdp_prob.models.effects.clock_error import ClockError
 from vrdp_prob.models.effects.contact_friction import ContactFriction
+from vrdp_prob.models.effects.effect import Effect
 from vrdp_prob.models.effects.external_impulse import ExternalImpulse
 from vrdp_prob.models.effects.linear_drag import LinearDrag
 from vrdp_prob.models.effects.surface_tilt import SurfaceTilt
@@ -114,11 +116,32 @@ def test_a_cause_without_a_vanishing_strength_has_no_score() -> None:
 
 
 def test_bounds_lie_beyond_the_estimates() -> None:
-    for one in scored(None, seed=1, names=("surface_tilt", "linear_drag")).values():
-        for bound in upper_bounds(one):
-            assert bound.bound is not None
-            assert (
-                bound.bound >= abs(one.start[bound.parameter])
-                if one.effect.name != LinearDrag.name
-                else bound.bound > 0
-            )
+    scores = scored(None, seed=1)
+    for one in scores.values():
+        for bound in upper_bounds(one.effect, one):
+            values = [one.start, *(site.values for site in one.sites)]
+            estimates = [abs(some[bound.parameter]) for some in values if bound.parameter in some]
+            plain = bound.vanishes_at == 0.0 and one.effect.name != LinearDrag.name
+            assert bound.bound is None or bound.bound > (max(estimates, default=0.0) if plain else 0.0)
+
+
+def test_a_kick_may_be_as_large_as_where_it_would_fit_best() -> None:
+    scores = scored(None, seed=1, names=("external_impulse", "material_friction", "slip_to_roll"))
+    kick = scores["external_impulse"]
+    assert not kick.sites  # chance makes as large ones
+    assert all(bound.bound is not None and bound.bound > 0 for bound in upper_bounds(kick.effect, kick))
+    known = {bound.parameter: bound for one in scores.values() for bound in upper_bounds(one.effect, one)}
+    assert known["slip_friction"].vanishes_at == "rolling_resistance"
+
+
+@pytest.mark.parametrize(
+    ("cause", "strength"), [(Wall(), "hidden_wall_distance"), (ContactFriction(), "contact_friction")]
+)
+def test_what_has_no_score_has_no_bound(cause: Effect, strength: str) -> None:
+    unit = next(one.unit for one in cause.parameters if one.name == strength)
+    assert upper_bounds(cause, None)[0] == UpperBound(cause.name, strength, None, unit)
+
+
+def test_of_several_places_the_largest_bound_counts_and_what_says_nothing_does_not() -> None:
+    found = _largest([("a", -0.5, 0.1), ("b", 0.0, 0.0), ("a", 0.2, 0.3), ("c", 0.0, 0.0), ("c", 1.0, 1.0)])
+    assert found == {"a": pytest.approx(0.2 + 0.3 * 1.645, abs=1e-3), "b": None, "c": pytest.approx(2.645, abs=1e-3)}

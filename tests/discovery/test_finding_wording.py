@@ -78,6 +78,9 @@ def test_bounds_and_units() -> None:
     assert bound_words(UpperBound("bowl", "bowl_stiffness", 8.2e-7, "m")) == f"≤ 8.2{TIMES}10⁻⁷ m"
     assert bound_words(UpperBound("bowl", "bowl_stiffness", 0.0, "m")) == "≤ 0 m"
     assert bound_words(UpperBound("bowl", "bowl_stiffness", None, "m")) == "no bound"
+    assert bound_words(UpperBound("material_friction", "ratio", 0.04, "1", 1.0)) == "within 0.04 of 1"
+    slip = UpperBound("slip_to_roll", "slip_friction", 3e-4, "1", "rolling_resistance")
+    assert bound_words(slip) == "within 0.0003 of the rolling resistance"
     assert with_unit("3", "1") == "3"
 
 

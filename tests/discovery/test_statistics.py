@@ -79,6 +79,28 @@ def test_a_dependence_is_found_where_there_is_one_and_as_rarely_as_stated_where_
     assert np.mean([regression(generator, 0.2) < 1e-3 for _ in range(50)]) > 0.9
 
 
+def ring_regression(generator: np.random.Generator, slope: float = 0.0) -> float | None:
+    """The same of fitted factors of single bodies, which met along four trees and round a ring of four."""
+    trees = [(5 * k + i, 5 * k + j) for k in range(4) for i, j in ((0, 1), (1, 2), (1, 3), (3, 4))]
+    pairs = np.array([*trees, (20, 21), (21, 22), (22, 23), (23, 20)])
+    owners = np.zeros((len(pairs), 24))
+    owners[np.arange(len(pairs))[:, None], pairs] = 1.0
+    asked, sd = generator.normal(size=(len(pairs), 1)), 0.03
+    measured = owners @ generator.normal(-0.1, 0.05, 24) + slope * asked[:, 0] + sd * generator.normal(size=len(pairs))
+    inverse = np.linalg.pinv(owners)
+    fitted = owners @ (inverse @ measured)
+    covariance = owners @ (sd**2 * inverse @ inverse.T) @ owners.T
+    found = dependence(fitted, covariance, owners, np.ones((len(pairs), 1)), asked)
+    return None if found is None else found.p_value
+
+
+def test_numbers_that_follow_from_one_another_count_once() -> None:
+    generator = np.random.default_rng(5)
+    null = [ring_regression(generator) for _ in range(400)]
+    assert 0.02 < np.mean([p is not None and p < 0.05 for p in null]) < 0.09
+    assert np.mean([(ring_regression(generator, 0.2) or 1.0) < 1e-3 for _ in range(50)]) > 0.9
+
+
 def test_a_dependence_on_what_does_not_differ_is_none() -> None:
     values, ones = np.arange(5.0), np.ones((5, 1))
     assert dependence(values, np.eye(5), np.eye(5), ones, ones) is None

@@ -204,8 +204,10 @@ def _gain(before: Trial, after: Trial, overdispersion: Float[np.ndarray, "video"
 
 def _bounds(found: Search) -> list[UpperBound]:
     named = set(found.best.names)
+    scores = {score.effect.name: score for score in found.left.beside_chance}
+    left = sorted(found.refits.catalogue, key=lambda effect: effect.name not in scores)
     return [
-        bound for score in found.left.beside_chance if score.effect.name not in named for bound in upper_bounds(score)
+        bound for effect in left if effect.name not in named for bound in upper_bounds(effect, scores.get(effect.name))
     ]
 
 

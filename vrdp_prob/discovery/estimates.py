@@ -20,8 +20,6 @@ CERTAIN = 0.95
 """Probability of the intervals."""
 MIDDLE = 1.959964
 """Standard deviations from the middle of a normal distribution to the ends of its middle 95 %."""
-ONE_SIDED = 1.644854
-"""The same to the end of its lower 95 %."""
 
 
 def estimates(
@@ -136,13 +134,22 @@ def _unit(unit: str) -> str:
     return "" if unit == "1" else unit
 
 
-def upper_bounds(score: CauseScore) -> list[UpperBound]:
-    """How large the strengths of a cause may be (95 %), where it would fit best."""
-    units = {parameter.name: parameter.unit for parameter in score.effect.parameters}
-    values = dict(score.sites[0].values) if score.sites else dict(score.start)
-    vanishing = score.effect.vanishes_at
-    bounds = []
-    for name, sd in score.sd.items():
-        away = abs(values.get(name, vanishing.get(name, 0.0)) - vanishing.get(name, 0.0))
-        bounds.append(UpperBound(score.effect.name, name, away + ONE_SIDED * sd, units[name]))
-    return bounds
+def upper_bounds(effect: Effect, score: CauseScore | None) -> list[UpperBound]:
+    """How large the strengths of a cause may be (95 %), where it would fit best.
+
+    Parameters
+    ----------
+    effect
+        The cause.
+    score
+        What the residuals say of it; None where they say nothing, or it has no strength (a wall has none).
+    """
+    names = dict.fromkeys([*effect.vanishes_at, *effect.vanishes_like]) or [effect.parameters[0].name]
+    units = {parameter.name: parameter.unit for parameter in effect.parameters}
+    largest = {} if score is None else score.largest
+    return [UpperBound(effect.name, name, largest.get(name), units[name], _nothing(effect, name)) for name in names]
+
+
+def _nothing(effect: Effect, strength: str) -> float | str:
+    """Where a strength does nothing: a value, or the parameter that it is then like."""
+    return effect.vanishes_like.get(strength, effect.vanishes_at.get(strength, 0.0))

@@ -148,13 +148,16 @@ class UpperBound:
     name, parameter
         The cause and its parameter.
     bound, unit
-        The bound on the parameter's size; None where the data put no bound on it.
+        How far the parameter may be from where the cause does nothing; None where the data put no bound on it.
+    vanishes_at
+        Where that is: a value, or the name of the parameter that it is then equal to.
     """
 
     name: str
     parameter: str
     bound: float | None
     unit: str
+    vanishes_at: float | str = 0.0
 
 
 @dataclass(frozen=True)

@@ -160,7 +160,7 @@ def _bounds(finding: Finding) -> list[dict[str, Any]]:
                 "name": bound.parameter,
                 "words": sentence(parameter_words(bound.parameter, effect)),
                 "bound": bound_words(bound),
-                "is_known": bound_words(bound).startswith("≤"),
+                "is_known": bound.bound is not None,
             }
             for bound in finding.upper_bounds
             if bound.name == name

@@ -4,10 +4,15 @@ from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float
+from scipy.linalg import orth
 from scipy.stats import f as f_distribution
 
 LARGEST_SCATTER, SCATTERS = 2.0, 60
 """Largest standard deviation of the scatter that is considered, and number of trial values."""
+
+
+RANK = 1e-9
+"""Share of the largest variance below which a combination of numbers has none, but follows from the others."""
 
 
 @dataclass(frozen=True)
@@ -39,6 +44,9 @@ def dependence(
 ) -> Dependence | None:
     """Regress numbers on what is asked beside what is known to matter; None where they are too few, or do not differ.
 
+    Of numbers that follow from one another (sums of the same bodies' values round a ring of contacts) only as many
+    count as there are independent ones.
+
     Parameters
     ----------
     values, covariance
@@ -49,7 +57,10 @@ def dependence(
     known, asked
         Columns of the regression.
     """
-    design = np.concatenate([known, asked], axis=1)
+    independent = orth(covariance + owners @ owners.T, rcond=RANK)
+    values, owners = independent.T @ values, independent.T @ owners
+    covariance = independent.T @ covariance @ independent
+    design = independent.T @ np.concatenate([known, asked], axis=1)
     freedom = len(values) - design.shape[1]
     if freedom < 2 or np.linalg.matrix_rank(design) < design.shape[1]:
         return None

@@ -25,6 +25,8 @@ from vrdp_prob.models.parameters import Scope, Transform
 REPLICATIONS = 400
 TAIL = 0.05
 """Tail probability at which the number of independent places of a scan is read off its null distribution."""
+ONE_SIDED = 1.644854
+"""Standard deviations from the middle of a normal distribution to the end of its lower 95 %."""
 SITE_LEVEL = 1e-3
 """An effect that happens once in a video is there if chance makes a statistic as large, anywhere, less often."""
 LEAST_START = 0.01
@@ -70,8 +72,9 @@ class CauseScore:
         The largest statistic and its number of degrees of freedom.
     p_value
         Probability of a statistic as large anywhere if the cause is absent.
-    sd
-        Standard deviations of the strengths, by the name of the parameter.
+    largest
+        By the name of a strength: how far (95 %) it may be from where it vanishes, at the best place of each body or
+        video that it may belong to; None where the data say nothing of it.
     places
         Number of bodies or videos among which the sites were chosen.
     """
@@ -82,7 +85,7 @@ class CauseScore:
     chi_square: float
     degrees: int
     p_value: float
-    sd: Mapping[str, float]
+    largest: Mapping[str, float | None]
     places: int = 1
 
     @property
@@ -150,8 +153,18 @@ def _scan_shared(
     p_value = min(1.0, _independent(blocks, degrees, generator) * float(chi2.sf(statistics[best], degrees)))
     estimate = dict(zip(names, scores[best].estimate.tolist(), strict=True))
     start = dict(points[best]) | (_starting(effect, estimate) if len(estimate) == len(names) else {})
-    sd = dict(zip(names, scores[best].sd.tolist(), strict=True))
-    return CauseScore(effect, start, (), float(statistics[best]), degrees, p_value, sd)
+    largest = _largest(zip(names, scores[best].estimate, scores[best].sd, strict=True))
+    return CauseScore(effect, start, (), float(statistics[best]), degrees, p_value, largest)
+
+
+def _largest(strengths: Iterable[tuple[str, float, float]]) -> dict[str, float | None]:
+    """How far (95 %) strengths may be from where they vanish, by name, from estimates and standard deviations."""
+    found: dict[str, float | None] = {}
+    for name, estimate, sd in strengths:
+        bound = abs(float(estimate)) + ONE_SIDED * float(sd) if sd > 0 else None
+        known = [one for one in (found.get(name), bound) if one is not None]
+        found[name] = max(known, default=None)
+    return found
 
 
 def _name(probe: Probe, video: int) -> Key:
@@ -209,7 +222,8 @@ def _scan_once(
 ) -> CauseScore | None:
     """The largest scores of strengths of single videos, and where they are."""
     points, probed = _probed(fit, model, effect)
-    sites, all_degrees, sds = [], [], []
+    sites, all_degrees = [], []
+    strengths: list[tuple[str, float, float]] = []
     for index, video in enumerate(probed):
         for owner in sorted({probe.owner for probe in video}, key=str):
             mine = [probe for probe in video if probe.owner == owner]
@@ -224,11 +238,12 @@ def _scan_once(
             values = {**points[best], **dict(zip(fields, scores[best].estimate.tolist(), strict=True))}
             sites.append(Site(index, owner, values, statistic, p_value))
             all_degrees.append(degrees)
-            sds.append(dict(zip(fields, scores[best].sd.tolist(), strict=True)))
+            strengths += zip(fields, scores[best].estimate, scores[best].sd, strict=True)
     if not sites:
         return None
     order = sorted(range(len(sites)), key=lambda k: (sites[k].p_value, -sites[k].chi_square))
     first = sites[order[0]]
     p_value = min(1.0, first.p_value * len(sites))
     clear = tuple(sites[k] for k in order if sites[k].p_value * len(sites) < SITE_LEVEL)
-    return CauseScore(effect, {}, clear, first.chi_square, all_degrees[order[0]], p_value, sds[order[0]], len(sites))
+    degrees = all_degrees[order[0]]
+    return CauseScore(effect, {}, clear, first.chi_square, degrees, p_value, _largest(strengths), len(sites))

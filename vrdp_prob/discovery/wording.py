@@ -86,13 +86,16 @@ def difference_words(gain: Gain) -> str:
 
 
 def bound_words(bound: UpperBound) -> str:
-    """An upper bound with its unit, or that there is none."""
+    """An upper bound with its unit, from where it counts if that is not 0, or that there is none."""
     if bound.bound is None or not math.isfinite(bound.bound):
         return "no bound"
     digits, times, power = number(bound.bound, bound.bound / 10).partition(TIMES)
     if "." in digits:
         digits = digits.rstrip("0").rstrip(".")
-    return f"≤ {with_unit(digits + times + power, bound.unit)}"
+    size = with_unit(digits + times + power, bound.unit)
+    if isinstance(bound.vanishes_at, str):
+        return f"within {size} of the {title(bound.vanishes_at)}"
+    return f"within {size} of {bound.vanishes_at:g}" if bound.vanishes_at else f"≤ {size}"
 
 
 def chance(probability: float) -> str:

@@ -81,8 +81,9 @@ def test_a_mass_that_friction_follows_is_felt_before_anything_is_touched(change:
 
     def ends(mass_exponent: float | None, change: Change) -> np.ndarray:
         posterior = KnownPosterior(tracks_of(discs, 60), discs, spread=0.0, mass_exponent=mass_exponent)
-        worlds = PosteriorWorlds(posterior, draws=DRAWS, own_courses=own_courses)
-        return worlds.counterfactual(change, 0).trajectory[:, -1, 0, 0]
+        world = PosteriorWorlds(posterior, draws=DRAWS, own_courses=own_courses).counterfactual(change, 0)
+        assert not world.collided.any()
+        return world.trajectory[:, -1, 0, 0]
 
     found = ends(exponent, change)
     np.testing.assert_allclose(found, ends(None, Change("other", (Meaning(1.0, same),))), atol=1e-6)

@@ -216,16 +216,18 @@ def _friction_checks(fit: SharedFit, contacts: Sequence[FittedContacts]) -> Iter
             np.array([logarithm[one] for one in chosen]).reshape(-1, 1),
         )
     power = 0.0 if found is None else float(found.slope[0])
-    yield from _friction_check("mass", found, f"it goes with the mass to the power {number(power)}")
+    visible = "" if found is None else f"a power of {number(NORMAL_95 * float(found.sd[0]))} of the mass"
+    yield from _friction_check("mass", found, f"it goes with the mass to the power {number(power)}", visible)
 
 
-def _friction_check(name: str, found: Dependence | None, words: str) -> Iterator[Check]:
+def _friction_check(name: str, found: Dependence | None, words: str, visible: str = "") -> Iterator[Check]:
     if found is None:
         return
+    visible = visible or f"{number(100 * NORMAL_95 * float(found.sd.max()))} %"
     sentence = (
         f"The fitted friction of the bodies depends on their {name}: {words}."
         if found.p_value < SEEN
-        else f"Nothing seen; {number(100 * NORMAL_95 * float(found.sd.max()))} % would have shown."
+        else f"Nothing seen; {visible} would have shown."
     )
     yield Check(friction_against(name), float(found.slope[0]), found.p_value, False, sentence)
 

@@ -94,7 +94,7 @@ def discover(
             found = found.without(list(doubted))
             after = _checks_after(found, checks, seed)
         verdict = Verdict.UNKNOWN if unlisted is not None or reasons else _verdict(found, checks, after)
-        causes = [*_causes(found, {}, seed), *not_named]
+        causes = _each_once([*_causes(found, {}, seed), *not_named])
     return Finding(
         verdict=verdict,
         causes=tuple(causes),
@@ -167,6 +167,14 @@ def _causes(found: Search, doubted: Mapping[Effect, Sequence[Doubt]], seed: int)
                 others.append(_cause(rival, rival.causes[-1], lesser, found.overdispersion, probability, named=False))
     named.sort(key=lambda one: (not one.named, -one.probability))
     return named + sorted(others, key=lambda one: -one.probability)
+
+
+def _each_once(causes: Sequence[FoundCause]) -> list[FoundCause]:
+    """Causes without those that are there again, less probable: one may take the place of several."""
+    first: dict[str, FoundCause] = {}
+    for cause in sorted(causes, key=lambda one: (not one.named, -one.probability)):
+        first.setdefault(cause.name, cause)
+    return [cause for cause in causes if first[cause.name] is cause]
 
 
 def _cause(

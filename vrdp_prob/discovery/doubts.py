@@ -70,7 +70,7 @@ def doubts(trial: Trial, cause: Effect, left: Sequence[Check] = ()) -> Iterator[
         )
     own = next((one for one in left if one.name == OWN_CHECKS.get(cause.name)), None)
     if own is not None and own.p_value < SURPRISING:
-        otherwise = ", or it happens more often than once in a video" if happens_once(cause) else ""
+        otherwise = ", or it happened more often than was found" if happens_once(cause) else ""
         yield Doubt(
             own.p_value / SURPRISING,
             f"With '{cause.name}' the check of {own.name} fails still, which asks for just what this cause does: its "

@@ -256,7 +256,8 @@ class Finding:
     upper_bounds
         Of every cause that was not named.
     model, extended
-        The model that was given, and the same with the named causes (itself where none is).
+        The model that was given, and the same with the named causes, which believes of single bodies (masses,
+        restitutions, frictions) what the videos say of all of them, where these are enough.
     description
         Of what is left unexplained; None where nothing is.
     videos

@@ -27,6 +27,8 @@ AROUND = 2
 """Frames on each side over which it is averaged, and twice as many at the end."""
 HALF, NINE_TENTHS = 0.6745, 1.6449
 """Half widths of the middle 50 % and 90 % of a normal distribution."""
+FEWEST_SEEN = 2
+"""Times that a body must have been seen by then, for what comes next to be predicted."""
 ITERATIONS = 20
 
 
@@ -104,7 +106,8 @@ def _forecast(video: LinkedVideo, point: Float[np.ndarray, "dimension"], cavity:
     used = np.flatnonzero(world)
     covariance = np.linalg.pinv(precision[np.ix_(used, used)], rcond=1e-12, hermitian=True)
     count = len(observations.frame)
-    late = observations.frame >= frames
+    begun = np.bincount(observations.body[observations.frame < frames], minlength=len(tracks.bodies)) >= FEWEST_SEEN
+    late = (observations.frame >= frames) & begun[observations.body]
     rows = derivative[: 2 * count, used]
     variance = 1.0 + np.einsum("ri,ij,rj->r", rows, covariance, rows).reshape(count, 2)
     predicted = likelihood.predicted(torch.from_numpy(fitted[None]))[0, :, :, :2]

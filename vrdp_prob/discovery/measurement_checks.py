@@ -62,10 +62,11 @@ def _clock_checks(model: ResidualModel, replicas: Replicas) -> Iterator[Check]:
         jitter += float(single.statistic.sum())
         jitter_replicas += single.replicas.sum(axis=0)
         squares += float((single.gradient**2 - single.information).sum())
-        weights += float((single.information**2).sum())
+        weights += float((single.information**2).sum()) / model.dispersion
         if len(late.statistic) and late.statistic.max() > strongest[0]:
             best = int(late.statistic.argmax())
-            strongest = float(late.statistic[best]), float(late.gradient[best] / late.information[best])
+            size = np.sqrt(model.dispersion) * late.gradient[best] / late.information[best]
+            strongest = float(late.statistic[best]), float(size)
             where = f"video {video.linear.name} from {number(float(motion.times[late.frames[best]]))} s on"
     p_value = sum_p_value(lost, lost_replicas)
     sentence = (
@@ -86,7 +87,10 @@ def _clock_checks(model: ResidualModel, replicas: Replicas) -> Iterator[Check]:
 
 
 class _Scan:
-    """A pattern at each of some frames of one video: its statistic, that of replications, and what it is made of."""
+    """A pattern at each of some frames of one video: its statistic, that of replications, and what it is made of.
+
+    Gradients are those of residuals of unit variance.
+    """
 
     def __init__(
         self,

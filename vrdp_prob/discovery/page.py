@@ -1,7 +1,10 @@
 """finding.html: what was found, what it is worth, and what could have hidden, on one page that opens from disk."""
 
+import math
 import re
 from collections.abc import Sequence
+from dataclasses import replace
+from functools import partial
 from typing import Any
 
 from markupsafe import Markup
@@ -33,6 +36,7 @@ ALIKE = (
     "These leave nearly the same traces in such videos. Their probabilities say how well the videos tell them apart; "
     "other starts, speeds or places would tell more."
 )
+ASKED_LATER = "Only with the named causes is enough known to ask this."
 NOT_EXCLUDED = "The likeliest causes of the catalogue. None of them explains the videos well enough to be named."
 
 
@@ -122,7 +126,12 @@ def _checks(finding: Finding) -> dict[str, Any] | None:
     if not finding.checks:
         return None
     after = {check.name: check for check in finding.checks_after} if finding.named else {}
-    ordered = sorted(finding.checks, key=lambda check: (not check.significant, not check.p_value >= 0, check.p_value))
+    before = {check.name for check in finding.checks}
+    asked_later = partial(replace, p_value=math.nan, significant=False, sentence=ASKED_LATER)
+    new = [asked_later(check) for name, check in after.items() if name not in before]
+    ordered = sorted(
+        [*finding.checks, *new], key=lambda check: (not check.significant, not check.p_value >= 0, check.p_value)
+    )
     fails = [check for check in ordered if check.significant or _fails(after.get(check.name))]
     passes = [check for check in ordered if check not in fails]
     unremarkable = counted(len(passes), "check") + (" that shows" if len(passes) == 1 else " that show")
@@ -172,7 +181,7 @@ def _bounds(finding: Finding) -> list[dict[str, Any]]:
 def _description(description: Description) -> dict[str, Any]:
     return {
         "sentences": [typeset(one) for one in description.sentences],
-        "formula": description.formula,
+        "formula": description.formula if description.explained > 0 else "",
         "size": with_unit(number(description.size), "m/s^2"),
         "explained": _percent(description.explained),
     }
@@ -183,7 +192,9 @@ def _model(finding: Finding) -> dict[str, Any]:
     if added:
         words = f"The model that was given, with {listed(added)} added."
     else:
-        words = "The model that was given, unchanged: nothing is added to it that has no name."
+        words = "The model that was given: nothing is added to it that has no name."
+    if finding.extended.beliefs != finding.model.beliefs:
+        words += " What it believes of single bodies (masses, restitutions, frictions) is what these videos say of all."
     return {
         "model": finding.model.name,
         "model_words": words,

@@ -11,7 +11,7 @@ from vrdp_prob.discovery.overdispersion import overdispersion
 from vrdp_prob.discovery.proposals import hidden_things
 from vrdp_prob.discovery.scores import CauseScore, happens_once, score_causes
 from vrdp_prob.discovery.single_videos import causes_of_lost_videos, lost_videos
-from vrdp_prob.discovery.trials import Trial, gain, with_own_population
+from vrdp_prob.discovery.trials import Trial, gain
 from vrdp_prob.inference.parallel import in_processes
 from vrdp_prob.inference.several_videos.ascent import ImpossibleStartError
 from vrdp_prob.inference.several_videos.fitting import fit_together
@@ -184,7 +184,7 @@ class Refits:
             tracks = [part.clues.tracks for part in trial.fit.fits]
             try:
                 fit = fit_together(tracks, model=model, shared=trial.fit.shared, seed=self.seed, model_error=False)
-                return Trial((*trial.causes, effect), with_own_population(fit), trial.choices)
+                return trial.and_cause(effect, fit)
             except ImpossibleStartError:  # what single videos say of the cause fits no world of all of them
                 return None
             finally:

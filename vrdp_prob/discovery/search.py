@@ -122,7 +122,7 @@ def search(
     needed = float(np.log(len(catalogue) / FALSE_ALARM))
     with (progress or SilentProgress()).stage("Trying causes", total=None) as advance:
         searcher = _Searcher(Refits(tuple(catalogue), seed, needed, advance))
-        chain = [Trial((), with_own_population(fit)).continued()]
+        chain = [Trial((), with_own_population(fit), stated=fit.model.beliefs).continued()]
         steps = [searcher.untried(chain[0])]
         while len(chain) <= MOST_CAUSES:
             step = steps[-1] = searcher.tried(chain[-1])

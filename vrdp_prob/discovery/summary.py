@@ -45,7 +45,9 @@ def summary(finding: Finding) -> list[str]:
         told.append(_others(others, beside=finding.named))
     told += [f"{sentence(line)}." for line in _lines(finding) if line]
     if finding.verdict is Verdict.NONE:
-        told.append("No cause of the catalogue predicts videos that are left out better.")
+        told.append(
+            "No cause of the catalogue predicts videos that are left out so much better that it would be named."
+        )
     return told
 
 
@@ -69,6 +71,7 @@ def lines(finding: Finding) -> list[str]:
             told.append(f"      {title(name)} {mean} (95 %: {interval})")
     if finding.description is not None:
         told += [f"  {line}" for line in finding.description.sentences]
+    if finding.description is not None and finding.description.explained > 0:
         told.append(f"  a description, not a cause: {'; '.join(finding.description.formula.splitlines())}")
     told += summary(finding)[bool(finding.named) :]
     if finding.verdict is Verdict.NONE and finding.upper_bounds:
@@ -153,10 +156,13 @@ def _bounds(bounds: Sequence[UpperBound]) -> list[str]:
 
 
 def _rest(finding: Finding) -> str:
-    if finding.description is None:
+    description = finding.description
+    if description is None or description.size == 0:
         return ""
-    size = with_unit(number(finding.description.size), "m/s^2")
+    size = f"the missing acceleration is {with_unit(number(description.size), 'm/s^2')} on average (root mean square)"
+    if description.explained <= 0:
+        return size
     return (
-        f"the missing acceleration is {size} on average (root mean square); a formula that describes it, without "
-        f"saying why, explains {chance(finding.description.explained)} of it in videos that were left out"
+        f"{size}; a formula that describes it, without saying why, explains {chance(description.explained)} of it in "
+        "videos that were left out"
     )

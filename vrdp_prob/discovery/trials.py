@@ -18,7 +18,7 @@ from vrdp_prob.inference.several_videos.fitting import Owned, SharedFit
 from vrdp_prob.inference.several_videos.population import own_parameters, with_learned_population
 from vrdp_prob.inference.several_videos.second_look import MOST
 from vrdp_prob.models.effects.effect import Effect
-from vrdp_prob.models.parameters import Scope
+from vrdp_prob.models.parameters import Parameter, Scope
 from vrdp_prob.models.physics import PhysicsModel
 
 EACH_PARAMETER = 1.0
@@ -53,11 +53,14 @@ class Trial:
         Its fit.
     choices
         By the name of a cause: logarithm of the number of places among which its own were chosen, for each video.
+    stated
+        What the base model believed of parameters, by name, before anything was learned.
     """
 
     causes: tuple[Effect, ...]
     fit: SharedFit
     choices: Mapping[str, Float[np.ndarray, "video"]] = field(default_factory=dict)
+    stated: Mapping[str, Parameter] = field(default_factory=dict)
 
     @cached_property
     def cavities(self) -> dict[str, Cavity]:
@@ -132,7 +135,7 @@ class Trial:
             fit = self.fit.under(left, start=score.start, least=least, rounds=FIRST_ROUNDS, model_error=False)
         except ImpossibleStartError:
             return None
-        return Trial((*self.causes[:-1], score.effect), fit, choices)
+        return replace(self, causes=(*self.causes[:-1], score.effect), fit=fit, choices=choices)
 
     def _with_lasting(self, score: CauseScore) -> "Trial":
         """The fit with an effect that acts on all videos."""
@@ -145,7 +148,11 @@ class Trial:
         ]
         model = self.fit.model.with_effect(effect)
         fit = self.fit.under(model, start=score.start, own=starts, rounds=FIRST_ROUNDS, model_error=False)
-        return Trial((*self.causes, effect), with_own_population(fit), self.choices)
+        return self.and_cause(effect, fit)
+
+    def and_cause(self, effect: Effect, fit: SharedFit) -> "Trial":
+        """The trial of a fit with one more cause, which believes what that fit says of bodies."""
+        return replace(self, causes=(*self.causes, effect), fit=with_own_population(fit))
 
     def _with_single_events(self, score: CauseScore) -> "Trial":
         """The fit with an effect that happens at most once in each video, where its scan has found it."""
@@ -170,7 +177,7 @@ class Trial:
         choices = {**self.choices, effect.name: np.log(max(score.places, 1)) * acting}
         model = self.fit.model.with_effect(effect)
         fit = self.fit.under(model, own=own, held=held, rounds=FIRST_ROUNDS, model_error=False)
-        return Trial((*self.causes, effect), fit, choices)
+        return replace(self, causes=(*self.causes, effect), fit=fit, choices=choices)
 
     def continued(self) -> "Trial":
         """The fit after as many steps as it needs."""
@@ -212,12 +219,22 @@ class Trial:
 
     def without(self, cause: Effect) -> "Trial":
         """The fit without one of its causes."""
-        left = _with_stated_population(self.fit.model.without_effect(cause))
+        left = self._with_stated_population(self.fit.model.without_effect(cause))
         choices = {name: one for name, one in self.choices.items() if name != cause.name}
         gone = {parameter.name for parameter in cause.parameters}
         held = [{key: one.held[key] for key in one.held if key[0] not in gone} for one in self.fit.structures]
         fit = self.fit.under(left, held=held, rounds=FIRST_ROUNDS, model_error=False)
-        return Trial(tuple(one for one in self.causes if one is not cause), with_own_population(fit), choices)
+        causes = tuple(one for one in self.causes if one is not cause)
+        return replace(self, causes=causes, fit=with_own_population(fit), choices=choices)
+
+    def _with_stated_population(self, model: PhysicsModel) -> PhysicsModel:
+        """A model in which bodies may be what they may before anything is learned.
+
+        What a cause has explained, they have to explain by themselves without it, and would lose their way to it.
+        """
+        own = {one.name for one in own_parameters(model)}
+        learned = {name: one for name, one in model.beliefs.items() if name not in own}
+        return replace(model, beliefs=learned | {name: one for name, one in self.stated.items() if name in own})
 
 
 def with_own_population(fit: SharedFit) -> SharedFit:
@@ -232,15 +249,6 @@ def with_own_population(fit: SharedFit) -> SharedFit:
             break
         fit = fit.under(model, rounds=FIRST_ROUNDS, model_error=False)
     return fit
-
-
-def _with_stated_population(model: PhysicsModel) -> PhysicsModel:
-    """A model in which bodies may be what they may before anything is learned.
-
-    What a cause has explained, they have to explain by themselves without it, and would lose their way to it.
-    """
-    own = {one.name for one in own_parameters(model)}
-    return replace(model, beliefs={name: one for name, one in model.beliefs.items() if name not in own})
 
 
 def _believes_otherwise(model: PhysicsModel, before: PhysicsModel) -> bool:

@@ -76,6 +76,7 @@ class Counterfactual:
         self._first = np.array([float(s.track.times[0]) for s in seen.seen.smoothers])
         self._last = np.array([float(s.track.times[-1]) for s in seen.seen.smoothers])
         self._reached: Bool[np.ndarray, "draw body"] = np.zeros((seen.draws, count), dtype=bool)
+        self._scaled: Bool[np.ndarray, "draw"] = np.zeros(seen.draws, dtype=bool)
         self._timeline = Timeline(seen.universe, seen.draws, seen.tracks.camera)
         self._broke_off: Bool[np.ndarray, "draw"] = np.zeros(seen.draws, dtype=bool)
         self._trajectory, self._exists = self._observed_course()
@@ -106,10 +107,9 @@ class Counterfactual:
         )
 
     def _touched(self) -> Bool[np.ndarray, "draw body"]:
-        """The changed body, where its mass decided a contact."""
+        """The changed body, where its mass decided a contact that was seen."""
         touched = np.zeros_like(self._reached)
-        if not self._change.removes:
-            touched[:, self._body] = self._reached[:, self._body] & self._intervention.felt_at_contact
+        touched[:, self._body] = self._scaled
         return touched
 
     @property
@@ -206,6 +206,7 @@ class Counterfactual:
             felt = free & self._intervention.felt_at_contact
             self._scaled_kicks(state, pair, before, felt)
             self._reached[np.ix_(felt, list(pair))] = True
+            self._scaled |= felt
         reached = self._reached.copy()
         if self._change.removes:
             reached[:, self._body] = True

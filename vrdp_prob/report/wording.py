@@ -141,7 +141,7 @@ def mass_status(parameter: ParameterSummary, body: Body, name: Mapping[str, str]
     if parameter.status == "default":
         return _untold(parameter)
     if parameter.status == "identified":
-        return "Known from its motion and its collisions."
+        return "Known from how it moves and what it meets."
     return f"Only its ratio to {_the(parameter.partners, name)} is known, not the mass itself."
 
 

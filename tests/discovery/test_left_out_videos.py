@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from tests.discovery.fitted import fitted
-from vrdp_prob.discovery.forecast import held_out
+from vrdp_prob.discovery.forecast import SEEN_SHARE, _forecast, held_out
 from vrdp_prob.discovery.held_out import all_but_each, cavities, left_out
 from vrdp_prob.discovery.residual_model import ResidualModel
 from vrdp_prob.discovery.scores import score_causes
@@ -19,6 +19,7 @@ from vrdp_prob.inference.several_videos.fitting import fit_together
 from vrdp_prob.inference.several_videos.joint_fit import expand
 from vrdp_prob.inference.several_videos.second_look import doubtful
 from vrdp_prob.models.effects.surface_tilt import SurfaceTilt
+from vrdp_prob.scene import Tracks
 
 
 def test_a_video_is_as_probable_as_the_evidence_with_it_over_that_without_it() -> None:
@@ -86,6 +87,22 @@ def test_forecasts_of_a_null_are_as_far_off_as_they_say() -> None:
     assert found.rmse_end is not None
     assert found.coverage_50 < found.coverage_90
     assert found.coverage_90 > 0.6
+
+
+def test_a_body_that_comes_after_the_fitted_frames_is_not_predicted() -> None:
+    data, before = fitted(seed=1)
+    late = []
+    for tracks in data.tracks:
+        positions = tracks.positions.copy()
+        positions[: 3 * len(positions) // 4, 0] = np.nan
+        late.append(Tracks.from_arrays(tracks.video, tracks.bodies, tracks.times, positions))
+    fit = fit_together(late, model=before.model, model_error=False)
+    videos = fit.joint.videos
+    for index, cavity in enumerate(cavities(fit).values()):
+        frame = videos[index].likelihood.observations.frame
+        body = videos[index].likelihood.observations.body
+        predicted = (frame >= int(SEEN_SHARE * len(late[index].times))) & (body != 0)
+        assert len(_forecast(videos[index], fit.joint.point(index), cavity).squares) == predicted.sum()
 
 
 def test_a_new_search_of_a_video_never_makes_a_fit_worse() -> None:

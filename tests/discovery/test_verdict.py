@@ -1,9 +1,11 @@
 """When the causes that were found are the verdict, and when something else is left."""
 
+from dataclasses import replace
 from unittest.mock import Mock, create_autospec
 
 import pytest
 
+from tests.discovery.findings import TILT, WIND
 from vrdp_prob.discovery import discover
 from vrdp_prob.discovery.finding import Check, Verdict
 from vrdp_prob.discovery.search import Search
@@ -51,3 +53,9 @@ def test_the_verdict(
     found = _search(causes)
     monkeypatch.setattr(discover, "_excess", lambda trial: excess if trial is found.best else 3.0)
     assert discover._verdict(found, _checks(12), after) is verdict
+
+
+def test_a_cause_that_may_take_the_place_of_several_is_told_once() -> None:
+    other, rival = replace(WIND, named=False, probability=0.07), replace(WIND, named=False, probability=0.12)
+    assert discover._each_once([TILT, other, rival]) == [TILT, rival]
+    assert discover._each_once([TILT, replace(TILT, named=False, probability=1.0)]) == [TILT]

@@ -210,7 +210,8 @@ def ask_question(
     explanation = answer.explain() if explain else None
     if as_json:
         told = {} if explanation is None else {"explanation": explanation.to_document()}
-        print(json.dumps({**answer.to_document(), **told}, allow_nan=False))
+        limits = {"converged": posterior.convergence.converged, "warnings": list(posterior.warnings)}
+        print(json.dumps({**answer.to_document(), **limits, **told}, allow_nan=False))
     else:
         reasons = explanation.sentences if explanation is not None else ()
         lines = answer_lines(answer, tracks.bodies, posterior.warnings)

@@ -58,6 +58,7 @@ def test_ask_prints_exactly_one_document(folder: Path, capsys: pytest.CaptureFix
     assert document["answer"] == "blue"
     assert document["explanation"] == {"parts": [], "sentences": [document["explanation"]["sentences"][0]]}
     jsonschema.validate(document, schema("report")["properties"]["answers"]["items"])
+    assert document["converged"] is True or "has not converged" in " ".join(document["warnings"])
 
 
 def answer(**fields: object) -> Answer:
@@ -92,7 +93,7 @@ def answer(**fields: object) -> Answer:
             answer(probability=1.0, mc_error=0.0, distribution={"2": 1.0}, relies_on_default=("3", "4")),
             [
                 " 100 %         2",
-                "note: Rests on default values of objects 3 and 4, which this video does not determine.",
+                "note: Rests on mass or restitution of objects 3 and 4, which this video does not determine.",
             ],
         ),
     ],

@@ -101,6 +101,19 @@ def test_a_weighed_body_fixes_the_scale_of_its_group_only() -> None:
     assert [str(status[name].mass.status) for name in "01234"] == ["identified"] * 3 + ["ratio_only"] * 2
 
 
+def test_what_was_weighed_tells_nothing_of_those_that_it_reaches_by_a_graze_alone() -> None:
+    video, clear, graze = tracks(4, masses={2: 0.03}), [(0, 1), (2, 3)], (1, 2)
+    status = identifiability_of(video, [*clear, graze], [], information(video, clear, []))
+    assert [str(status[name].mass.status) for name in "0123"] == ["ratio_only"] * 2 + ["identified"] * 2
+    assert status["0"].mass.partners == ("1",)
+
+
+def test_a_ring_that_is_closed_by_a_graze_alone_separates_no_restitutions() -> None:
+    video, clear, graze = tracks(3), [(0, 1), (1, 2)], (0, 2)
+    status = identifiability_of(video, [*clear, graze], [], information(video, clear, []))
+    assert {status[name].restitution.status for name in "012"} == {Status.PRODUCT_ONLY}
+
+
 @pytest.mark.parametrize(("restitution", "expected"), [(0.8, Status.IDENTIFIED), (None, Status.PRODUCT_ONLY)])
 def test_a_wall_of_known_restitution_fixes_that_of_its_bodies(restitution: float | None, expected: Status) -> None:
     wall = Wall(-5, -5, 5, -5, restitution)

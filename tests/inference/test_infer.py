@@ -66,6 +66,14 @@ def test_a_body_that_enters_late_and_never_collides_keeps_the_defaults() -> None
     assert float(posterior.worlds(1).release_time[0, 3]) == pytest.approx(0.8)
 
 
+def test_pairs_of_which_nothing_is_told_are_marked() -> None:
+    _, posterior = chain_posterior()
+    assert all(pair.determined for pair in (*posterior.mass_ratios(), *posterior.restitution_pairs()))
+    unsaid = replace(posterior, groups=())
+    assert not any(pair.determined for pair in (*unsaid.mass_ratios(), *unsaid.restitution_pairs()))
+    assert unsaid.mass_ratios()[0].to_document()["determined"] is False
+
+
 def test_status_names_the_partners() -> None:
     _, posterior = chain_posterior()
     assert posterior.status["1"].mass.status is Status.RATIO_ONLY

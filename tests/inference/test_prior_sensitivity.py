@@ -1,5 +1,7 @@
 """Power-scaling sensitivity: the exact values of normal distributions, and verdicts on scenes."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.stats import norm
@@ -108,6 +110,15 @@ def test_a_clear_collision_is_fine_and_a_graze_rests_on_the_prior() -> None:
     assert graze["restitution"].prior > 1.5 * clear["restitution"].prior
     assert "rolling_resistance" not in clear
     assert clear["mass_ratio"].to_document()["verdict"] == "fine"
+
+
+def test_what_was_drawn_from_the_prior_afterwards_has_no_sensitivity() -> None:
+    known = collision(0.05, 0.002)
+    drawn = known.data.copy(deep=True)
+    drawn["log_prior"]["mass"].values[...] = 0.0
+    found = {one.quantity for one in prior_sensitivity(replace(known, data=drawn))}
+    assert "mass_ratio" not in found
+    assert "restitution" in found
 
 
 def test_many_numbers_that_have_nothing_to_do_with_a_quantity_do_not_make_a_conflict() -> None:

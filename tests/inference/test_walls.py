@@ -62,7 +62,7 @@ def test_a_stated_wall_tells_the_restitution_of_the_body() -> None:
 def test_an_unknown_wall_leaves_the_product() -> None:
     posterior = against_a_wall(None)
     status = posterior.status["disc"].restitution
-    assert (status.status, status.partners) == (Status.PRODUCT_ONLY, ("wall 0",))
+    assert (status.status, status.partners) == (Status.PRODUCT_ONLY, ("wall 1",))
     draws = posterior.data["posterior"]
     product = draws["restitution"].values[..., 0] * draws["wall_restitution"].values[..., 0]
     assert product.mean() == pytest.approx(PRODUCT, abs=4 * product.std())

@@ -42,7 +42,7 @@ def test_page_says_everything(content, page):
         assert warning in text
     assert "Drawn from the prior: no collision tells it, and the data say nothing." in text
     assert "Only its ratio to the gray cylinder and the cyan sphere is known" in text
-    assert "Rests on default values of the cyan cube and the yellow sphere" in text
+    assert "Rests on mass or restitution of the cyan cube and the yellow sphere" in text
     assert "sliding friction, rolling resistance and air drag" in text
     assert "seed 0" in text
 

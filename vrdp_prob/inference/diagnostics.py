@@ -15,6 +15,7 @@ from jaxtyping import Float
 from vrdp_prob.models.coordinates import Coordinate, Coordinates
 from vrdp_prob.models.parameters import MASS, RESTITUTION, WALL_RESTITUTION
 from vrdp_prob.scene import Body
+from vrdp_prob.scene.naming import wall_name
 
 RELEASE_WORDS = {
     "x": "place along x",
@@ -74,7 +75,7 @@ def _words(entry: Coordinate, bodies: Sequence[Body]) -> str:
     if entry.owner is None:
         return f"the {quantity}"
     if entry.field == WALL_RESTITUTION.name:
-        return f"the restitution of wall {entry.owner + 1}"
+        return f"the restitution of {wall_name(entry.owner)}"
     return f"the {quantity} of {entry.group or f'object {bodies[entry.owner].id}'}"
 
 

@@ -8,7 +8,7 @@ The graph says what contacts could tell under the base model; the curvature of t
 whether another law of the model (a force that depends on mass, say) tells the rest.
 """
 
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from itertools import combinations
@@ -16,11 +16,13 @@ from itertools import combinations
 from vrdp_prob.inference.information import Information, Weights
 from vrdp_prob.models.parameters import MASS, RESTITUTION, WALL_RESTITUTION
 from vrdp_prob.scene import Tracks
+from vrdp_prob.scene.naming import wall_name
 
 LEAST_CONTRACTION = 0.05
 """Below it the data are said to hold no information."""
 FIXED_SCALE = 0.5
-"""From this contraction of a group's common scale on, another law of the model is said to fix it."""
+"""From this contraction of a group's common scale on, another law of the model is said to fix it; and from this one of
+a ratio or product on, what is known of one of two that met is said to be known of the other."""
 
 
 class Status(StrEnum):
@@ -42,7 +44,7 @@ class ParameterStatus:
         `identified`, `ratio_only` (a mass, against its partners; the scale is the prior's), `product_only` (a
         restitution, times its partners'), or `default` (nothing; the default value is used).
     partners
-        Ids of the bodies that a ratio or product refers to; a wall is called `wall N`.
+        Ids of the bodies that a ratio or product refers to; the first wall is called `wall 1`.
     contraction
         Share of the prior variance (of the logarithm) that the data take away; 0 for a default, 1 for a known mass.
     """
@@ -186,15 +188,11 @@ def _graphs(tracks: Tracks, pairs: Pairs, walls: Pairs) -> tuple[Graph, Graph]:
     """Contacts between bodies, and the same with those of walls."""
     names = [body.id for body in tracks.bodies]
     contacts = _graph(names, ((names[i], names[j]) for i, j in pairs))
-    wall_names = [_wall_name(index) for index in range(len(tracks.walls))]
+    wall_names = [wall_name(index) for index in range(len(tracks.walls))]
     with_walls = _graph([*names, *wall_names], ((names[i], wall_names[k]) for i, k in walls))
     for name, partners in contacts.items():
         with_walls[name] |= partners
     return contacts, with_walls
-
-
-def _wall_name(index: int) -> str:
-    return f"wall {index}"
 
 
 def _graph(names: Iterable[str], edges: Iterable[tuple[str, str]]) -> Graph:
@@ -217,44 +215,61 @@ def _component(name: str, graph: Graph) -> dict[str, int]:
     return distance
 
 
+def _cluster(name: str, graph: Graph, known: Collection[str], told: Callable[[str, str], float]) -> Graph:
+    """What hangs together with something through clear contacts of unknowns: a graze carries nothing over.
+
+    A ratio to a weighed body is as sure as the mass itself, whatever has told that; so it is no link here.
+    """
+    clear: Graph = {
+        one: {other for other in partners if other not in known and told(one, other) >= FIXED_SCALE}
+        for one, partners in graph.items()
+        if one not in known
+    }
+    return {one: clear[one] for one in _component(name, clear)}
+
+
+def _least(cluster: Graph, graph: Graph, known: Collection[str]) -> float:
+    """Contraction from which on the common scale of a cluster counts as told: less where it touches something known."""
+    touches = any(partner in known for one in cluster for partner in graph[one])
+    return LEAST_CONTRACTION if touches else FIXED_SCALE
+
+
 def _mass_status(tracks: Tracks, name: str, graph: Graph, information: Information) -> ParameterStatus:
-    index = tracks.index(name)
-    if tracks.bodies[index].mass is not None:
+    weighed = {body.id for body in tracks.bodies if body.mass is not None}
+    if name in weighed:
         return ParameterStatus(Status.IDENTIFIED, contraction=1.0)
-    own = {(MASS.name, index): 1.0}
-    partners = tuple(
-        other
-        for other in sorted(graph[name])
-        if information.contraction({**own, (MASS.name, tracks.index(other)): -1.0}) >= LEAST_CONTRACTION
-    )
-    contraction = information.contraction(own)
+    keys = {body.id: (MASS.name, index) for index, body in enumerate(tracks.bodies)}
+
+    def of_ratio(one: str, other: str) -> float:
+        return information.contraction({keys[one]: 1.0, keys[other]: -1.0})
+
+    contraction = information.contraction({keys[name]: 1.0})
+    partners = tuple(other for other in sorted(graph[name]) if of_ratio(name, other) >= LEAST_CONTRACTION)
     if not partners and contraction < LEAST_CONTRACTION:
         return ParameterStatus(Status.DEFAULT)
-    members = _component(name, graph)
-    scale = {(MASS.name, tracks.index(member)): 1.0 for member in members}
-    weighed = any(body.id in members and body.mass is not None for body in tracks.bodies)
-    if weighed or information.contraction(scale) >= FIXED_SCALE:
+    cluster = _cluster(name, graph, weighed, of_ratio)
+    scale = {keys[member]: 1.0 for member in cluster}
+    if information.contraction(scale) >= _least(cluster, graph, weighed):
         return ParameterStatus(Status.IDENTIFIED, contraction=contraction)
-    return ParameterStatus(Status.RATIO_ONLY, partners, contraction)
+    return ParameterStatus(Status.RATIO_ONLY, tuple(one for one in partners if one not in weighed), contraction)
 
 
 def _restitution_status(tracks: Tracks, name: str, graph: Graph, information: Information) -> ParameterStatus:
     keys = {body.id: (RESTITUTION.name, index) for index, body in enumerate(tracks.bodies)}
-    keys |= {_wall_name(index): (WALL_RESTITUTION.name, index) for index in range(len(tracks.walls))}
+    keys |= {wall_name(index): (WALL_RESTITUTION.name, index) for index in range(len(tracks.walls))}
+    known = {wall_name(index) for index, wall in enumerate(tracks.walls) if wall.restitution is not None}
+
+    def of_product(one: str, other: str) -> float:
+        return information.contraction({keys[one]: 1.0, keys[other]: 1.0})
+
     contraction = information.contraction({keys[name]: 1.0})
-    partners = tuple(
-        other
-        for other in sorted(graph[name])
-        if information.contraction({keys[name]: 1.0, keys[other]: 1.0}) >= LEAST_CONTRACTION
-    )
+    partners = tuple(other for other in sorted(graph[name]) if of_product(name, other) >= LEAST_CONTRACTION)
     if not partners and contraction < LEAST_CONTRACTION:
         return ParameterStatus(Status.DEFAULT)
-    component = _component(name, graph)
-    odd_cycle = any(component[first] % 2 == component[second] % 2 for first in component for second in graph[first])
-    known = any(
-        _wall_name(index) in component and wall.restitution is not None for index, wall in enumerate(tracks.walls)
-    )
-    alternating = {keys[member]: 1.0 - 2.0 * (distance % 2) for member, distance in component.items()}
-    if odd_cycle or known or information.contraction(alternating) >= FIXED_SCALE:
+    cluster = _cluster(name, graph, known, of_product)
+    distance = _component(name, cluster)
+    odd_cycle = any(distance[first] % 2 == distance[second] % 2 for first in cluster for second in cluster[first])
+    alternating = {keys[member]: 1.0 - 2.0 * (distance[member] % 2) for member in cluster}
+    if odd_cycle or information.contraction(alternating) >= _least(cluster, graph, known):
         return ParameterStatus(Status.IDENTIFIED, contraction=contraction)
-    return ParameterStatus(Status.PRODUCT_ONLY, partners, contraction)
+    return ParameterStatus(Status.PRODUCT_ONLY, tuple(one for one in partners if one not in known), contraction)

@@ -116,12 +116,12 @@ class Posterior:
     def mass_ratios(self) -> tuple[PairSummary, ...]:
         """Mass of the first over mass of the second body of every pair that collides."""
         mass = self._draws("mass")
-        return tuple(self._pair_summary(pair, mass, np.divide) for pair in self.pairs)
+        return tuple(self._pair_summary("mass_ratio", pair, mass, np.divide) for pair in self.pairs)
 
     def restitution_pairs(self) -> tuple[PairSummary, ...]:
         """Restitution (product of both factors) of every pair that collides."""
         restitution = self._draws("restitution")
-        return tuple(self._pair_summary(pair, restitution, np.multiply) for pair in self.pairs)
+        return tuple(self._pair_summary("restitution_product", pair, restitution, np.multiply) for pair in self.pairs)
 
     def to_arviz(self) -> Any:
         """All groups as what the installed ArviZ works with: `InferenceData` before its version 1, else `DataTree`."""
@@ -164,9 +164,18 @@ class Posterior:
         values: np.ndarray = self.data["posterior"][name].transpose("chain", "draw", ...).values
         return values
 
-    def _pair_summary(self, pair: tuple[str, str], draws: np.ndarray, combine: PairFunction) -> PairSummary:
+    def _pair_summary(
+        self, quantity: str, pair: tuple[str, str], draws: np.ndarray, combine: PairFunction
+    ) -> PairSummary:
         first, second = (draws[..., self.tracks.index(body)] for body in pair)
-        return PairSummary(pair, Summary.of(combine(first, second)))
+        weighed = all(self.tracks.bodies[self.tracks.index(body)].mass is not None for body in pair)
+        told = any(
+            one.determined
+            for group in self.groups
+            for one in group.combinations
+            if one.quantity == quantity and set(one.objects) == set(pair)
+        )
+        return PairSummary(pair, Summary.of(combine(first, second)), told or (weighed and quantity == "mass_ratio"))
 
     def _worlds(self, draws: xr.Dataset) -> Worlds:
         return Scenery.of(self.tracks).worlds(self.model, quantities(draws))

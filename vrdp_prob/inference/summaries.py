@@ -62,11 +62,15 @@ class ObjectSummary:
 
 @dataclass(frozen=True)
 class PairSummary:
-    """A quantity of two bodies that collided: the mass of the first over that of the second, or their restitution."""
+    """A quantity of two bodies that collided: the mass of the first over that of the second, or their restitution.
+
+    `determined` is False where the data say no more of it than was believed before.
+    """
 
     objects: tuple[str, str]
     summary: Summary
+    determined: bool = True
 
     def to_document(self) -> dict[str, object]:
-        """The two ids and the numbers, as a report holds them."""
-        return {"objects": list(self.objects), **self.summary.to_document()}
+        """The two ids, the numbers, and whether the data tell them, as a report holds them."""
+        return {"objects": list(self.objects), **self.summary.to_document(), "determined": self.determined}

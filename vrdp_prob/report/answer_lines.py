@@ -29,7 +29,7 @@ def answer_lines(answer: Answer, bodies: Sequence[Body], limits: Sequence[str] =
     notes = [*answer.notes, *limits]
     if answer.relies_on_default:
         who = f"object{'s' * (len(answer.relies_on_default) > 1)} {listed(answer.relies_on_default)}"
-        notes.insert(0, f"Rests on default values of {who}, which this video does not determine.")
+        notes.insert(0, f"Rests on mass or restitution of {who}, which this video does not determine.")
     return lines + [f"note: {with_names(note, bodies)}" for note in notes]
 
 

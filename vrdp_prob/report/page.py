@@ -149,7 +149,7 @@ def _question(item: AnswerContent, content: ReportContent) -> dict[str, Any]:
     notes = list(answer.notes)
     if answer.relies_on_default:
         who = listed(f"the {name.get(body, body)}" for body in answer.relies_on_default)
-        notes.insert(0, f"Rests on default values of {who}, which this video does not determine.")
+        notes.insert(0, f"Rests on mass or restitution of {who}, which this video does not determine.")
     world = next((world for world in content.worlds if world.key == item.world), None)
     if world is not None and world.kind == FACTUAL:
         world = None  # the page opens with it
@@ -217,7 +217,8 @@ def _estimates(content: ReportContent) -> dict[str, Any]:
     pairs = content.restitution_pairs
     parameters = [parameter for _, learned in known for parameter in (learned.mass, learned.restitution)]
     return {
-        "has_defaults": any(parameter.status == "default" for parameter in parameters),
+        "has_defaults": any(parameter.status == "default" for parameter in parameters)
+        or not all(pair.determined for pair in (*pairs, *content.mass_ratios)),
         "mass_unit": "kg" if any(body.mass is not None for body, _ in known) else "relative to 1",
         "mass_axis": log_axis([learned.mass.summary for _, learned in known]),
         "masses": [
@@ -243,7 +244,8 @@ def _body_row(shown: dict[str, Any], parameter: ParameterSummary, words: str) ->
 
 def _pair_row(pair: PairSummary, objects: dict[str, dict[str, Any]], between: str) -> dict[str, Any]:
     row = _row([objects[body] for body in pair.objects], pair.summary)
-    return {**row, "words": "", "known": True, "between": between}
+    words = "" if pair.determined else "The data say no more of it than was believed before."
+    return {**row, "words": words, "known": pair.determined, "between": between}
 
 
 def _row(objects: list[dict[str, Any]], interval: Summary) -> dict[str, Any]:
@@ -290,10 +292,10 @@ def _diagnostics(content: ReportContent) -> list[tuple[str, str, str]]:
             ("R-hat, largest", f"{convergence.r_hat:.3f}", "1 where independent runs agree; below 1.01 is good")
         )
     if convergence.ess_bulk is not None and math.isfinite(convergence.ess_bulk):
-        meaning = "independent draws that the dependent ones are worth; above 400 is good"
+        meaning = f"independent draws that the dependent ones are worth; {convergence.ess_goal:g} or more are good"
         rows.append(("Effective sample size, smallest", f"{convergence.ess_bulk:.0f}", meaning))
     if convergence.ess_tail is not None and math.isfinite(convergence.ess_tail):
-        meaning = "the same for the ends of 90 % intervals; above 400 is good"
+        meaning = f"the same for the ends of 90 % intervals; {convergence.ess_goal:g} or more are good"
         rows.append(("... in the tails", f"{convergence.ess_tail:.0f}", meaning))
     if convergence.divergences is not None:
         rows.append(

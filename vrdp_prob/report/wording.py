@@ -11,6 +11,7 @@ from vrdp_prob.scene import Body, Tracks
 from vrdp_prob.scene.body import COLORS
 from vrdp_prob.scene.naming import names
 
+MOST_DECIMALS = 4
 NEUTRAL_COLORS = ("ink1", "ink2", "ink3", "ink4", "ink5", "ink6", "ink7")
 """Colours for objects whose own colour is not known; their values stand in the page's style sheet."""
 
@@ -114,18 +115,18 @@ def percent_error(probability: float, error: float) -> str:
 
 
 def decimals(interval: Summary) -> int:
-    """Decimal places that the width of an interval supports (two digits of its half width, between 0 and 3)."""
+    """Decimal places that the width of an interval supports (two digits of its half width, between 0 and 4)."""
     width = interval.q95 - interval.q05
     if width <= 0:
         return 2
-    return min(max(1 - math.floor(math.log10(width / 2)), 0), 3)
+    return min(max(1 - math.floor(math.log10(width / 2)), 0), MOST_DECIMALS)
 
 
 def interval_words(interval: Summary) -> tuple[str, str]:
     """The mean, and the 90 % interval, rounded to what the interval supports; a value without spread was held fixed."""
-    places = min(decimals(interval), 2) if interval.mean >= 0.1 else decimals(interval)
     if interval.q05 == interval.q95:
-        return f"{interval.mean:.{places}f}", "held fixed"
+        return f"{interval.mean:.2f}" if interval.mean >= 0.1 else f"{interval.mean:.3g}", "held fixed"
+    places = min(decimals(interval), 2) if interval.mean >= 0.1 else decimals(interval)
     return f"{interval.mean:.{places}f}", f"{interval.q05:.{places}f} to {interval.q95:.{places}f}"
 
 
@@ -161,4 +162,5 @@ def _untold(parameter: ParameterSummary) -> str:
 
 
 def _the(partners: Sequence[str], name: Mapping[str, str]) -> str:
-    return listed(f"the {name.get(partner, partner)}" for partner in partners) if partners else "its collision partners"
+    known = (f"the {name[partner]}" if partner in name else partner for partner in partners)
+    return listed(known) if partners else "its collision partners"

@@ -23,6 +23,11 @@ def names(bodies: Sequence[Body]) -> dict[str, str]:
     return {body.id: found.get(body.id, _by_id(body)) for body in bodies}
 
 
+def wall_name(index: int) -> str:
+    """Name in words of a wall by its place among those of a video: the first one is `wall 1`."""
+    return f"wall {index + 1}"
+
+
 def _by_id(body: Body) -> str:
     if body.id.isdigit():
         return " ".join(part for part in (body.color, str(body.shape), body.id) if part)

@@ -38,7 +38,7 @@ from vrdp_prob.command_options import (
     Video,
     Words,
 )
-from vrdp_prob.datasets import load, load_all, video_files, video_names
+from vrdp_prob.datasets import load, load_all, pictures, video_names
 from vrdp_prob.discovery.checking import check_video_count
 from vrdp_prob.discovery.discover import discover
 from vrdp_prob.discovery.document import to_document as finding_document
@@ -135,7 +135,7 @@ def report(
         recognise=None if learned is None else learned.recognise,
         progress=progress,
     )
-    files = video_files(path)
+    files = pictures(path)
     for tracks in videos:
         written = write_report(
             tracks,

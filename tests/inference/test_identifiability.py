@@ -101,17 +101,46 @@ def test_a_weighed_body_fixes_the_scale_of_its_group_only() -> None:
     assert [str(status[name].mass.status) for name in "01234"] == ["identified"] * 3 + ["ratio_only"] * 2
 
 
-def test_what_was_weighed_tells_nothing_of_those_that_it_reaches_by_a_graze_alone() -> None:
-    video, clear, graze = tracks(4, masses={2: 0.03}), [(0, 1), (2, 3)], (1, 2)
+GRAZES = {
+    "a body beside the weighed one": ({2: 0.03}, [(0, 1), (2, 3)], (1, 2)),
+    "a body that the weighed one has told": ({3: 0.03}, [(0, 1), (2, 3)], (1, 2)),
+}
+
+
+@pytest.mark.parametrize("layout", GRAZES)
+def test_a_graze_identifies_nothing(layout: str) -> None:
+    masses, clear, graze = GRAZES[layout]
+    video = tracks(4, masses=masses)
     status = identifiability_of(video, [*clear, graze], [], information(video, clear, []))
     assert [str(status[name].mass.status) for name in "0123"] == ["ratio_only"] * 2 + ["identified"] * 2
     assert status["0"].mass.partners == ("1",)
+    assert status["1"].mass.partners == ("0",)
 
 
-def test_a_ring_that_is_closed_by_a_graze_alone_separates_no_restitutions() -> None:
-    video, clear, graze = tracks(3), [(0, 1), (1, 2)], (0, 2)
+def test_a_graze_carries_no_restitution_of_a_wall_over() -> None:
+    wall = Wall(-5, -5, 5, -5, 0.8)
+    video, clear, graze = tracks(3, walls=(wall,)), [(0, 1)], (1, 2)
+    status = identifiability_of(video, [*clear, graze], [(2, 0)], information(video, clear, [(2, 0)]))
+    assert status["2"].restitution.status is Status.IDENTIFIED
+    assert {status[name].restitution.status for name in "01"} == {Status.PRODUCT_ONLY}
+
+
+@pytest.mark.parametrize(
+    ("clear", "graze"), [([(0, 1), (1, 2)], (0, 2)), ([(0, 1), (1, 2), (1, 3), (1, 4)], (0, 2))], ids=["chain", "star"]
+)
+def test_a_ring_that_is_closed_by_a_graze_alone_separates_no_restitutions(
+    clear: list[tuple[int, int]], graze: tuple[int, int]
+) -> None:
+    video = tracks(5)
     status = identifiability_of(video, [*clear, graze], [], information(video, clear, []))
     assert {status[name].restitution.status for name in "012"} == {Status.PRODUCT_ONLY}
+
+
+def test_a_body_that_a_known_one_only_grazed_keeps_the_defaults() -> None:
+    video, clear, graze = tracks(3), [(0, 1)], (1, 2)
+    status = identifiability_of(video, [*clear, graze], [], information(video, clear, []))
+    assert status["2"].mass.status is status["2"].restitution.status is Status.DEFAULT
+    assert status["1"].mass.partners == ("0",)
 
 
 @pytest.mark.parametrize(("restitution", "expected"), [(0.8, Status.IDENTIFIED), (None, Status.PRODUCT_ONLY)])

@@ -10,7 +10,7 @@ import xarray as xr
 
 from tests.inference.generator import Scene, observe
 from vrdp_prob.errors import InputError
-from vrdp_prob.inference import Posterior, Status, infer
+from vrdp_prob.inference import BodyStatus, ParameterStatus, Posterior, Status, infer
 from vrdp_prob.models.simulator.rollout import simulate
 from vrdp_prob.scene import Shape, Tracks
 
@@ -69,9 +69,10 @@ def test_a_body_that_enters_late_and_never_collides_keeps_the_defaults() -> None
 def test_pairs_of_which_nothing_is_told_are_marked() -> None:
     _, posterior = chain_posterior()
     assert all(pair.determined for pair in (*posterior.mass_ratios(), *posterior.restitution_pairs()))
-    unsaid = replace(posterior, groups=())
-    assert not any(pair.determined for pair in (*unsaid.mass_ratios(), *unsaid.restitution_pairs()))
-    assert unsaid.mass_ratios()[0].to_document()["determined"] is False
+    nothing = BodyStatus(ParameterStatus(Status.DEFAULT), ParameterStatus(Status.DEFAULT))
+    unsaid = replace(posterior, status={**posterior.status, "2": nothing})
+    assert [pair.determined for pair in unsaid.mass_ratios()] == [True, False]
+    assert unsaid.restitution_pairs()[1].to_document()["determined"] is False
 
 
 def test_status_names_the_partners() -> None:

@@ -4,10 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import xarray as xr
 from scipy.stats import norm
 
 from tests.inference.generator import Scene, observe
-from vrdp_prob.inference import Posterior, infer
+from vrdp_prob.inference import ParameterStatus, Posterior, Status, infer
 from vrdp_prob.inference.prior_sensitivity import (
     POWERS,
     THRESHOLD,
@@ -112,11 +113,13 @@ def test_a_clear_collision_is_fine_and_a_graze_rests_on_the_prior() -> None:
     assert clear["mass_ratio"].to_document()["verdict"] == "fine"
 
 
-def test_what_was_drawn_from_the_prior_afterwards_has_no_sensitivity() -> None:
+def test_what_the_data_say_nothing_of_has_no_sensitivity() -> None:
     known = collision(0.05, 0.002)
-    drawn = known.data.copy(deep=True)
-    drawn["log_prior"]["mass"].values[...] = 0.0
-    found = {one.quantity for one in prior_sensitivity(replace(known, data=drawn))}
+    nothing = ParameterStatus(Status.DEFAULT)
+    data = known.data.copy(deep=True)
+    data["log_prior"] = xr.DataTree(data["log_prior"].to_dataset().drop_vars("mass"))  # as where no mass is an unknown
+    status = {body: replace(one, mass=nothing) for body, one in known.status.items()}
+    found = {one.quantity for one in prior_sensitivity(replace(known, data=data, status=status))}
     assert "mass_ratio" not in found
     assert "restitution" in found
 

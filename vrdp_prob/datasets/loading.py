@@ -103,12 +103,20 @@ def has_tracks(path: Path | str) -> bool:
 
 
 def video_files(path: Path | str) -> dict[str, Path]:
-    """Video files by their stem: the file itself, or those of a folder or of its sub-folder `videos`."""
+    """Video files by their stem: the file itself, or those of a folder or of its sub-folder `videos`.
+
+    Raises
+    ------
+    InputError
+        If two have the same stem.
+    """
     source = Path(path)
-    if not source.is_dir():
-        return {} if source.suffix.lower() in {".csv", ".json"} else {source.stem: source}
-    candidates = sorted((source / "videos").glob("*")) or sorted(source.glob("*"))
-    return _by_name({file: file.stem for file in candidates if file.suffix.lower() in VIDEO_SUFFIXES})
+    return _by_name({file: file.stem for file in _video_paths(source)})
+
+
+def pictures(path: Path | str) -> dict[str, Path]:
+    """Video files to show beside what was measured, by their stem; of several with one stem any will do."""
+    return {file.stem: file for file in _video_paths(Path(path))}
 
 
 def find_camera(path: Path, camera: CameraChoice = None) -> Camera | None:
@@ -139,7 +147,7 @@ def _existing(path: Path | str) -> Path:
         raise InputError(
             f"{source}: a table of positions must be named {TRACKS_FILE} and have an objects.csv beside it; rename it."
         )
-    if source.is_dir() and not (_is_tracks_folder(source) or _annotation_paths(source) or video_files(source)):
+    if source.is_dir() and not (_is_tracks_folder(source) or _annotation_paths(source) or _video_paths(source)):
         raise InputError(f"{source}: the folder holds no tracks.csv, no video and no annotation; check the path.")
     return source
 
@@ -161,6 +169,13 @@ def _by_name(names: Mapping[Path, str]) -> dict[str, Path]:
             raise InputError(f"{file}: video '{name}' is in {files[name].name} as well; rename one of them.")
         files[name] = file
     return files
+
+
+def _video_paths(path: Path) -> list[Path]:
+    if not path.is_dir():
+        return [] if path.suffix.lower() in {".csv", ".json"} else [path]
+    candidates = sorted((path / "videos").glob("*")) or sorted(path.glob("*"))
+    return [file for file in candidates if file.suffix.lower() in VIDEO_SUFFIXES]
 
 
 def _annotation_paths(path: Path) -> list[Path]:

@@ -74,7 +74,7 @@ class CauseScore:
         Probability of a statistic as large anywhere if the cause is absent.
     largest
         By the name of a strength: how far (95 %) it may be from where it vanishes, at the best place of each body or
-        video that it may belong to; None where the data say nothing of it.
+        video that it may belong to and that tells anything of it; None where none does.
     places
         Number of bodies or videos among which the sites were chosen.
     """

@@ -8,7 +8,7 @@ The graph says what contacts could tell under the base model; the curvature of t
 whether another law of the model (a force that depends on mass, say) tells the rest.
 """
 
-from collections.abc import Callable, Collection, Iterable, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from itertools import combinations
@@ -132,14 +132,13 @@ def identifiability(
         their masses as collisions do.
     """
     _, with_walls = _graphs(tracks, pairs, walls)
-    names = [body.id for body in tracks.bodies]
     linked, _ = _graphs(tracks, [*pairs, *combinations(sorted(felt), 2)], ())
+    masses, restitutions = _Unknowns.masses(tracks, information), _Unknowns.restitutions(tracks, information)
     return {
-        name: BodyStatus(
-            _mass_status(tracks, name, linked, information),
-            _restitution_status(tracks, name, with_walls, information),
+        body.id: BodyStatus(
+            _mass_status(body.id, linked, masses), _restitution_status(body.id, with_walls, restitutions)
         )
-        for name in names
+        for body in tracks.bodies
     }
 
 
@@ -170,13 +169,13 @@ def uninformed(
     tracks: Tracks, pairs: Pairs, walls: Pairs, information: Information, felt: Collection[int] = ()
 ) -> frozenset[int]:
     """Bodies that collide, but of whose mass and restitution that says nothing, for example as it was too late."""
-    status = identifiability(tracks, pairs, walls, information)
-    weighed = {body.id for index, body in enumerate(tracks.bodies) if body.mass is not None or index in felt}
+    contacts, with_walls = _graphs(tracks, pairs, walls)
+    masses, restitutions = _Unknowns.masses(tracks, information), _Unknowns.restitutions(tracks, information)
     return frozenset(
         index
         for index, body in enumerate(tracks.bodies)
-        if status[body.id].restitution.status is Status.DEFAULT
-        and (body.id in weighed or status[body.id].mass.status is Status.DEFAULT)
+        if restitutions.says_nothing(body.id, with_walls[body.id])
+        and (body.mass is not None or index in felt or masses.says_nothing(body.id, contacts[body.id]))
     )
 
 
@@ -215,61 +214,99 @@ def _component(name: str, graph: Graph) -> dict[str, int]:
     return distance
 
 
-def _cluster(name: str, graph: Graph, known: Collection[str], told: Callable[[str, str], float]) -> Graph:
-    """What hangs together with something through clear contacts of unknowns: a graze carries nothing over.
+@dataclass(frozen=True)
+class _Unknowns:
+    """The masses of bodies, or the restitutions of bodies and walls, and what contacts say of two of them together.
 
-    A ratio to a weighed body is as sure as the mass itself, whatever has told that; so it is no link here.
+    Parameters
+    ----------
+    information
+        How much the data narrow the prior.
+    keys
+        Their names among the coordinates, by that of the body or wall.
+    sign
+        -1 where a contact tells a ratio, 1 where it tells a product.
+    known
+        Bodies or walls whose value was given.
     """
-    clear: Graph = {
-        one: {other for other in partners if other not in known and told(one, other) >= FIXED_SCALE}
-        for one, partners in graph.items()
-        if one not in known
-    }
-    return {one: clear[one] for one in _component(name, clear)}
+
+    information: Information
+    keys: Mapping[str, tuple[str, int]]
+    sign: float
+    known: frozenset[str]
+
+    @classmethod
+    def masses(cls, tracks: Tracks, information: Information) -> "_Unknowns":
+        keys = {body.id: (MASS.name, index) for index, body in enumerate(tracks.bodies)}
+        return cls(information, keys, -1.0, frozenset(body.id for body in tracks.bodies if body.mass is not None))
+
+    @classmethod
+    def restitutions(cls, tracks: Tracks, information: Information) -> "_Unknowns":
+        keys = {body.id: (RESTITUTION.name, index) for index, body in enumerate(tracks.bodies)}
+        keys |= {wall_name(index): (WALL_RESTITUTION.name, index) for index in range(len(tracks.walls))}
+        known = {wall_name(index) for index, wall in enumerate(tracks.walls) if wall.restitution is not None}
+        return cls(information, keys, 1.0, frozenset(known))
+
+    def contraction(self, *names: str) -> float:
+        """That of one, or of the ratio or product of two."""
+        weights = (1.0, self.sign)[: len(names)]
+        return self.information.contraction({self.keys[one]: w for one, w in zip(names, weights, strict=True)})
+
+    def says_nothing(self, name: str, partners: Collection[str]) -> bool:
+        """Whether the data say nothing of one, neither by itself nor together with one that it met."""
+        together = max((self.contraction(name, other) for other in partners), default=0.0)
+        return max(self.contraction(name), together) < LEAST_CONTRACTION
+
+    def link(self, name: str, other: str) -> float:
+        """How far a contact ties two together: the contraction that it would make of two equally unknown ones.
+
+        What is told of either by itself does not count, so a graze between two that are well known is no link. With
+        something known the tie is what is told of the other one, whoever has told that.
+        """
+        if other in self.known or name in self.known:
+            return self.contraction(name, other)
+        first, second = self.keys[name], self.keys[other]
+        apart = self.information.sd({first: 1.0}) ** 2 + self.information.sd({second: 1.0}) ** 2
+        share = 1 - self.information.sd({first: 1.0, second: self.sign}) ** 2 / apart if apart > 0 else 0.0
+        return 2 * share / (1 + share) if share > 0 else 0.0
+
+    def cluster(self, name: str, graph: Graph) -> Graph:
+        """What hangs together with one through clear contacts of unknowns."""
+        clear: Graph = {
+            one: {other for other in partners if other not in self.known and self.link(one, other) >= FIXED_SCALE}
+            for one, partners in graph.items()
+            if one not in self.known
+        }
+        return {one: clear[one] for one in _component(name, clear)}
+
+    def fixes(self, weights: Mapping[str, float], graph: Graph) -> bool:
+        """Whether the common scale of a cluster is told; less is enough where it touches something known."""
+        touches = any(partner in self.known for one in weights for partner in graph[one])
+        told = self.information.contraction({self.keys[one]: weight for one, weight in weights.items()})
+        return told >= (LEAST_CONTRACTION if touches else FIXED_SCALE)
 
 
-def _least(cluster: Graph, graph: Graph, known: Collection[str]) -> float:
-    """Contraction from which on the common scale of a cluster counts as told: less where it touches something known."""
-    touches = any(partner in known for one in cluster for partner in graph[one])
-    return LEAST_CONTRACTION if touches else FIXED_SCALE
-
-
-def _mass_status(tracks: Tracks, name: str, graph: Graph, information: Information) -> ParameterStatus:
-    weighed = {body.id for body in tracks.bodies if body.mass is not None}
-    if name in weighed:
+def _mass_status(name: str, graph: Graph, masses: _Unknowns) -> ParameterStatus:
+    if name in masses.known:
         return ParameterStatus(Status.IDENTIFIED, contraction=1.0)
-    keys = {body.id: (MASS.name, index) for index, body in enumerate(tracks.bodies)}
-
-    def of_ratio(one: str, other: str) -> float:
-        return information.contraction({keys[one]: 1.0, keys[other]: -1.0})
-
-    contraction = information.contraction({keys[name]: 1.0})
-    partners = tuple(other for other in sorted(graph[name]) if of_ratio(name, other) >= LEAST_CONTRACTION)
+    partners = [other for other in sorted(graph[name]) if masses.link(name, other) >= LEAST_CONTRACTION]
+    contraction = masses.contraction(name)
     if not partners and contraction < LEAST_CONTRACTION:
         return ParameterStatus(Status.DEFAULT)
-    cluster = _cluster(name, graph, weighed, of_ratio)
-    scale = {keys[member]: 1.0 for member in cluster}
-    if information.contraction(scale) >= _least(cluster, graph, weighed):
+    if masses.fixes(dict.fromkeys(masses.cluster(name, graph), 1.0), graph):
         return ParameterStatus(Status.IDENTIFIED, contraction=contraction)
-    return ParameterStatus(Status.RATIO_ONLY, tuple(one for one in partners if one not in weighed), contraction)
+    return ParameterStatus(Status.RATIO_ONLY, tuple(one for one in partners if one not in masses.known), contraction)
 
 
-def _restitution_status(tracks: Tracks, name: str, graph: Graph, information: Information) -> ParameterStatus:
-    keys = {body.id: (RESTITUTION.name, index) for index, body in enumerate(tracks.bodies)}
-    keys |= {wall_name(index): (WALL_RESTITUTION.name, index) for index in range(len(tracks.walls))}
-    known = {wall_name(index) for index, wall in enumerate(tracks.walls) if wall.restitution is not None}
-
-    def of_product(one: str, other: str) -> float:
-        return information.contraction({keys[one]: 1.0, keys[other]: 1.0})
-
-    contraction = information.contraction({keys[name]: 1.0})
-    partners = tuple(other for other in sorted(graph[name]) if of_product(name, other) >= LEAST_CONTRACTION)
+def _restitution_status(name: str, graph: Graph, restitutions: _Unknowns) -> ParameterStatus:
+    partners = [other for other in sorted(graph[name]) if restitutions.link(name, other) >= LEAST_CONTRACTION]
+    contraction = restitutions.contraction(name)
     if not partners and contraction < LEAST_CONTRACTION:
         return ParameterStatus(Status.DEFAULT)
-    cluster = _cluster(name, graph, known, of_product)
+    cluster = restitutions.cluster(name, graph)
     distance = _component(name, cluster)
     odd_cycle = any(distance[first] % 2 == distance[second] % 2 for first in cluster for second in cluster[first])
-    alternating = {keys[member]: 1.0 - 2.0 * (distance[member] % 2) for member in cluster}
-    if odd_cycle or information.contraction(alternating) >= _least(cluster, graph, known):
+    if odd_cycle or restitutions.fixes({one: 1.0 - 2.0 * (distance[one] % 2) for one in cluster}, graph):
         return ParameterStatus(Status.IDENTIFIED, contraction=contraction)
-    return ParameterStatus(Status.PRODUCT_ONLY, tuple(one for one in partners if one not in known), contraction)
+    others = tuple(one for one in partners if one not in restitutions.known)
+    return ParameterStatus(Status.PRODUCT_ONLY, others, contraction)

@@ -11,12 +11,12 @@ import xarray as xr
 from jaxtyping import Float
 from torch import Tensor
 
-from vrdp_prob.inference.identifiability import BodyStatus, CollisionGroup, ParameterStatus
+from vrdp_prob.inference.identifiability import BodyStatus, CollisionGroup, ParameterStatus, Status
 from vrdp_prob.inference.misfit import Misfit
 from vrdp_prob.inference.samples import Convergence
 from vrdp_prob.inference.summaries import ObjectSummary, PairSummary, ParameterSummary, Summary
 from vrdp_prob.inference.tree import for_arviz
-from vrdp_prob.models.parameters import WALL_RESTITUTION
+from vrdp_prob.models.parameters import MASS, RESTITUTION, WALL_RESTITUTION
 from vrdp_prob.models.physics import PhysicsModel
 from vrdp_prob.models.scenery import Scenery
 from vrdp_prob.models.simulator.worlds import Worlds
@@ -115,13 +115,11 @@ class Posterior:
 
     def mass_ratios(self) -> tuple[PairSummary, ...]:
         """Mass of the first over mass of the second body of every pair that collides."""
-        mass = self._draws("mass")
-        return tuple(self._pair_summary("mass_ratio", pair, mass, np.divide) for pair in self.pairs)
+        return tuple(self._pair_summary(pair, MASS.name, np.divide) for pair in self.pairs)
 
     def restitution_pairs(self) -> tuple[PairSummary, ...]:
         """Restitution (product of both factors) of every pair that collides."""
-        restitution = self._draws("restitution")
-        return tuple(self._pair_summary("restitution_product", pair, restitution, np.multiply) for pair in self.pairs)
+        return tuple(self._pair_summary(pair, RESTITUTION.name, np.multiply) for pair in self.pairs)
 
     def to_arviz(self) -> Any:
         """All groups as what the installed ArviZ works with: `InferenceData` before its version 1, else `DataTree`."""
@@ -164,18 +162,11 @@ class Posterior:
         values: np.ndarray = self.data["posterior"][name].transpose("chain", "draw", ...).values
         return values
 
-    def _pair_summary(
-        self, quantity: str, pair: tuple[str, str], draws: np.ndarray, combine: PairFunction
-    ) -> PairSummary:
+    def _pair_summary(self, pair: tuple[str, str], name: str, combine: PairFunction) -> PairSummary:
+        draws = self._draws(name)
         first, second = (draws[..., self.tracks.index(body)] for body in pair)
-        weighed = all(self.tracks.bodies[self.tracks.index(body)].mass is not None for body in pair)
-        told = any(
-            one.determined
-            for group in self.groups
-            for one in group.combinations
-            if one.quantity == quantity and set(one.objects) == set(pair)
-        )
-        return PairSummary(pair, Summary.of(combine(first, second)), told or (weighed and quantity == "mass_ratio"))
+        told = all(getattr(self.status[body], name).status is not Status.DEFAULT for body in pair)
+        return PairSummary(pair, Summary.of(combine(first, second)), determined=told)
 
     def _worlds(self, draws: xr.Dataset) -> Worlds:
         return Scenery.of(self.tracks).worlds(self.model, quantities(draws))

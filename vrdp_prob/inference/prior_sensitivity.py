@@ -14,6 +14,7 @@ from arviz_stats.base.array import array_stats
 from jaxtyping import Float
 
 from vrdp_prob.errors import InputError
+from vrdp_prob.inference.identifiability import Status
 from vrdp_prob.inference.posterior import Posterior
 from vrdp_prob.models.parameters import MASS, RESTITUTION, ROLLING_RESISTANCE, SLIDING_FRICTION
 from vrdp_prob.models.unknowns import ANGLE_NOISE, DEGREES_OF_FREEDOM, NOISE
@@ -96,7 +97,7 @@ class Sensitivity:
 def prior_sensitivity(posterior: Posterior) -> tuple[Sensitivity, ...]:
     """Sensitivity of the mass ratio and restitution of every colliding pair, and of the friction that all share.
 
-    What keeps a fixed default, or was drawn from the prior afterwards as the data say nothing of it, is left out.
+    What the data say nothing of, which keeps a fixed default or is drawn from the prior, is left out.
 
     Raises
     ------
@@ -154,7 +155,8 @@ def _reported(posterior: Posterior) -> Iterator[tuple[str, tuple[str, ...], Floa
     draws = posterior.data["posterior"]
     for pair in posterior.pairs:
         for quantity, parameter, sign in (("mass_ratio", MASS, -1), ("restitution", RESTITUTION, 1)):
-            if any(_drawn_apart(posterior, parameter.name, body) for body in pair):
+            statuses = [getattr(posterior.status[body], parameter.name).status for body in pair]
+            if Status.DEFAULT in statuses:
                 continue
             first, second = (
                 np.log(draws[parameter.name].sel(body=body).transpose("chain", "draw").values) for body in pair
@@ -163,11 +165,3 @@ def _reported(posterior: Posterior) -> Iterator[tuple[str, tuple[str, ...], Floa
     for friction in FRICTIONS:
         if friction.name in draws:
             yield friction.name, (), np.log(draws[friction.name].transpose("chain", "draw").values)
-
-
-def _drawn_apart(posterior: Posterior, name: str, body: str) -> bool:
-    """Whether a parameter of a body was no unknown and yet varies: then no density knows of its draws."""
-    values, density = (
-        posterior.data[group].to_dataset()[name].sel(body=body).values for group in ("posterior", "log_prior")
-    )
-    return bool(np.ptp(values) > 0) and not np.ptp(density) > 0

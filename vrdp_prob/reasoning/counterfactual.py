@@ -1,11 +1,11 @@
 """What if an object were removed or changed: only what the change can reach is simulated.
 
 Abduction, action, prediction. Until the changed object first touches another, nothing differs from what was seen; where
-its speed or its friction changes, its own course differs from its release on. From then on a body is *reached* once it
-touches, or fails to touch, one that is reached (or the changed one); a reached body is simulated from its last
-observed state, every other body keeps its observed course and its observed events. Time is cut at the observed contacts
-and at regular steps; at each cut the bodies that are not reached are put back on their observed course, so that no
-error of the model grows in them.
+its speed or its friction changes, or a mass that its path follows, its own course differs from its release on. From
+then on a body is *reached* once it touches, or fails to touch, one that is reached (or the changed one); a reached body
+is simulated from its last observed state, every other body keeps its observed course and its observed events. Time is
+cut at the observed contacts and at regular steps; at each cut the bodies that are not reached are put back on their
+observed course, so that no error of the model grows in them.
 
 At the first contact of an object that became heavier, lighter or bouncier the geometry is what it was: the observed
 velocity changes are kept and scaled as the impulse of the pair scales, which carries over the part of the contact that
@@ -118,7 +118,7 @@ class Counterfactual:
         return float(self._first[self._body]) if self._intervention.felt_at_release.any() else None
 
     def _at_release(self, state: State) -> None:
-        """Another speed or friction reaches its body as soon as it moves."""
+        """Another speed or friction, or a mass that the path follows, reaches its body as soon as it moves."""
         velocity, felt = self._intervention.released(state.velocity[:, self._body])
         state.velocity[:, self._body] = velocity
         state.rolling[felt, self._body] = state.velocity[felt, self._body]

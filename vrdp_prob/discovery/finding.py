@@ -181,6 +181,11 @@ class Description:
     size: float
     sentences: tuple[str, ...]
 
+    @property
+    def has_formula(self) -> bool:
+        """Whether the formula explains anything."""
+        return self.explained > 0
+
 
 @dataclass(frozen=True)
 class ComparedOption:

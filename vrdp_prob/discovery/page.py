@@ -181,7 +181,7 @@ def _bounds(finding: Finding) -> list[dict[str, Any]]:
 def _description(description: Description) -> dict[str, Any]:
     return {
         "sentences": [typeset(one) for one in description.sentences],
-        "formula": description.formula if description.explained > 0 else "",
+        "formula": description.formula if description.has_formula else "",
         "size": with_unit(number(description.size), "m/s^2"),
         "explained": _percent(description.explained),
     }

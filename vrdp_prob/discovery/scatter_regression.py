@@ -9,8 +9,6 @@ from scipy.stats import f as f_distribution
 
 LARGEST_SCATTER, SCATTERS = 2.0, 60
 """Largest standard deviation of the scatter that is considered, and number of trial values."""
-
-
 RANK = 1e-9
 """Share of the largest variance below which a combination of numbers has none, but follows from the others."""
 
@@ -57,15 +55,15 @@ def dependence(
     known, asked
         Columns of the regression.
     """
-    independent = orth(covariance + owners @ owners.T, rcond=RANK)
-    values, owners = independent.T @ values, independent.T @ owners
-    covariance = independent.T @ covariance @ independent
+    shared = owners @ owners.T
+    independent = orth(covariance + shared, rcond=RANK)
+    values = independent.T @ values
+    covariance, shared = (independent.T @ one @ independent for one in (covariance, shared))
     design = independent.T @ np.concatenate([known, asked], axis=1)
     freedom = len(values) - design.shape[1]
     if freedom < 2 or np.linalg.matrix_rank(design) < design.shape[1]:
         return None
     scatters = np.concatenate([[0.0], np.geomspace(1e-4, LARGEST_SCATTER, SCATTERS)])
-    shared = owners @ owners.T
     fits = [_weighed(values, covariance + scatter**2 * shared, design) for scatter in scatters]
     best = int(np.argmax([fit[0] for fit in fits]))
     _, estimate, spread, misfit = fits[best]

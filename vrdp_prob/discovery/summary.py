@@ -71,7 +71,7 @@ def lines(finding: Finding) -> list[str]:
             told.append(f"      {title(name)} {mean} (95 %: {interval})")
     if finding.description is not None:
         told += [f"  {line}" for line in finding.description.sentences]
-    if finding.description is not None and finding.description.explained > 0:
+    if finding.description is not None and finding.description.has_formula:
         told.append(f"  a description, not a cause: {'; '.join(finding.description.formula.splitlines())}")
     told += summary(finding)[bool(finding.named) :]
     if finding.verdict is Verdict.NONE and finding.upper_bounds:
@@ -160,7 +160,7 @@ def _rest(finding: Finding) -> str:
     if description is None or description.size == 0:
         return ""
     size = f"the missing acceleration is {with_unit(number(description.size), 'm/s^2')} on average (root mean square)"
-    if description.explained <= 0:
+    if not description.has_formula:
         return size
     return (
         f"{size}; a formula that describes it, without saying why, explains {chance(description.explained)} of it in "

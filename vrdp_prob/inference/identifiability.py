@@ -135,9 +135,7 @@ def identifiability(
     linked, _ = _graphs(tracks, [*pairs, *combinations(sorted(felt), 2)], ())
     masses, restitutions = _Unknowns.masses(tracks, information), _Unknowns.restitutions(tracks, information)
     return {
-        body.id: BodyStatus(
-            _mass_status(body.id, linked, masses), _restitution_status(body.id, with_walls, restitutions)
-        )
+        body.id: BodyStatus(masses.status(body.id, linked), restitutions.status(body.id, with_walls))
         for body in tracks.bodies
     }
 
@@ -226,6 +224,8 @@ class _Unknowns:
         Their names among the coordinates, by that of the body or wall.
     sign
         -1 where a contact tells a ratio, 1 where it tells a product.
+    together
+        What is said of one that is known with others only.
     known
         Bodies or walls whose value was given.
     """
@@ -233,19 +233,21 @@ class _Unknowns:
     information: Information
     keys: Mapping[str, tuple[str, int]]
     sign: float
+    together: Status
     known: frozenset[str]
 
     @classmethod
     def masses(cls, tracks: Tracks, information: Information) -> "_Unknowns":
         keys = {body.id: (MASS.name, index) for index, body in enumerate(tracks.bodies)}
-        return cls(information, keys, -1.0, frozenset(body.id for body in tracks.bodies if body.mass is not None))
+        known = frozenset(body.id for body in tracks.bodies if body.mass is not None)
+        return cls(information, keys, -1.0, Status.RATIO_ONLY, known)
 
     @classmethod
     def restitutions(cls, tracks: Tracks, information: Information) -> "_Unknowns":
         keys = {body.id: (RESTITUTION.name, index) for index, body in enumerate(tracks.bodies)}
         keys |= {wall_name(index): (WALL_RESTITUTION.name, index) for index in range(len(tracks.walls))}
         known = {wall_name(index) for index, wall in enumerate(tracks.walls) if wall.restitution is not None}
-        return cls(information, keys, 1.0, frozenset(known))
+        return cls(information, keys, 1.0, Status.PRODUCT_ONLY, frozenset(known))
 
     def contraction(self, *names: str) -> float:
         """That of one, or of the ratio or product of two."""
@@ -270,43 +272,31 @@ class _Unknowns:
         share = 1 - self.information.sd({first: 1.0, second: self.sign}) ** 2 / apart if apart > 0 else 0.0
         return 2 * share / (1 + share) if share > 0 else 0.0
 
-    def cluster(self, name: str, graph: Graph) -> Graph:
-        """What hangs together with one through clear contacts of unknowns."""
+    def status(self, name: str, graph: Graph) -> ParameterStatus:
+        """What the data say of one."""
+        if name in self.known:
+            return ParameterStatus(Status.IDENTIFIED, contraction=1.0)
+        partners = [other for other in sorted(graph[name]) if self.link(name, other) >= LEAST_CONTRACTION]
+        contraction = self.contraction(name)
+        if not partners and contraction < LEAST_CONTRACTION:
+            return ParameterStatus(Status.DEFAULT)
+        if self._is_fixed(name, graph):
+            return ParameterStatus(Status.IDENTIFIED, contraction=contraction)
+        return ParameterStatus(self.together, tuple(one for one in partners if one not in self.known), contraction)
+
+    def _is_fixed(self, name: str, graph: Graph) -> bool:
+        """Whether the common scale of what hangs together through clear contacts of unknowns is told.
+
+        Less is enough where it touches something known; and round an odd ring products tell each of their factors.
+        """
         clear: Graph = {
             one: {other for other in partners if other not in self.known and self.link(one, other) >= FIXED_SCALE}
             for one, partners in graph.items()
             if one not in self.known
         }
-        return {one: clear[one] for one in _component(name, clear)}
-
-    def fixes(self, weights: Mapping[str, float], graph: Graph) -> bool:
-        """Whether the common scale of a cluster is told; less is enough where it touches something known."""
-        touches = any(partner in self.known for one in weights for partner in graph[one])
-        told = self.information.contraction({self.keys[one]: weight for one, weight in weights.items()})
+        distance = _component(name, clear)
+        if self.sign > 0 and any(distance[one] % 2 == distance[other] % 2 for one in distance for other in clear[one]):
+            return True
+        touches = any(partner in self.known for one in distance for partner in graph[one])
+        told = self.information.contraction({self.keys[one]: (-self.sign) ** steps for one, steps in distance.items()})
         return told >= (LEAST_CONTRACTION if touches else FIXED_SCALE)
-
-
-def _mass_status(name: str, graph: Graph, masses: _Unknowns) -> ParameterStatus:
-    if name in masses.known:
-        return ParameterStatus(Status.IDENTIFIED, contraction=1.0)
-    partners = [other for other in sorted(graph[name]) if masses.link(name, other) >= LEAST_CONTRACTION]
-    contraction = masses.contraction(name)
-    if not partners and contraction < LEAST_CONTRACTION:
-        return ParameterStatus(Status.DEFAULT)
-    if masses.fixes(dict.fromkeys(masses.cluster(name, graph), 1.0), graph):
-        return ParameterStatus(Status.IDENTIFIED, contraction=contraction)
-    return ParameterStatus(Status.RATIO_ONLY, tuple(one for one in partners if one not in masses.known), contraction)
-
-
-def _restitution_status(name: str, graph: Graph, restitutions: _Unknowns) -> ParameterStatus:
-    partners = [other for other in sorted(graph[name]) if restitutions.link(name, other) >= LEAST_CONTRACTION]
-    contraction = restitutions.contraction(name)
-    if not partners and contraction < LEAST_CONTRACTION:
-        return ParameterStatus(Status.DEFAULT)
-    cluster = restitutions.cluster(name, graph)
-    distance = _component(name, cluster)
-    odd_cycle = any(distance[first] % 2 == distance[second] % 2 for first in cluster for second in cluster[first])
-    if odd_cycle or restitutions.fixes({one: 1.0 - 2.0 * (distance[one] % 2) for one in cluster}, graph):
-        return ParameterStatus(Status.IDENTIFIED, contraction=contraction)
-    others = tuple(one for one in partners if one not in restitutions.known)
-    return ParameterStatus(Status.PRODUCT_ONLY, others, contraction)

@@ -1,6 +1,6 @@
 """The posterior of one video: draws with names and units, what they can be trusted for, and worlds made of them."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any, TypeVar
@@ -121,6 +121,10 @@ class Posterior:
         """Restitution (product of both factors) of every pair that collides."""
         return tuple(self._pair_summary(pair, RESTITUTION.name, np.multiply) for pair in self.pairs)
 
+    def tells(self, bodies: Iterable[str], name: str) -> bool:
+        """Whether the data say something of the `mass` or the `restitution` of all of some bodies."""
+        return all(getattr(self.status[body], name).status is not Status.DEFAULT for body in bodies)
+
     def to_arviz(self) -> Any:
         """All groups as what the installed ArviZ works with: `InferenceData` before its version 1, else `DataTree`."""
         return for_arviz(self.data)
@@ -165,8 +169,7 @@ class Posterior:
     def _pair_summary(self, pair: tuple[str, str], name: str, combine: PairFunction) -> PairSummary:
         draws = self._draws(name)
         first, second = (draws[..., self.tracks.index(body)] for body in pair)
-        told = all(getattr(self.status[body], name).status is not Status.DEFAULT for body in pair)
-        return PairSummary(pair, Summary.of(combine(first, second)), determined=told)
+        return PairSummary(pair, Summary.of(combine(first, second)), determined=self.tells(pair, name))
 
     def _worlds(self, draws: xr.Dataset) -> Worlds:
         return Scenery.of(self.tracks).worlds(self.model, quantities(draws))

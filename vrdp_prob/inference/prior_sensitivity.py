@@ -14,7 +14,6 @@ from arviz_stats.base.array import array_stats
 from jaxtyping import Float
 
 from vrdp_prob.errors import InputError
-from vrdp_prob.inference.identifiability import Status
 from vrdp_prob.inference.posterior import Posterior
 from vrdp_prob.models.parameters import MASS, RESTITUTION, ROLLING_RESISTANCE, SLIDING_FRICTION
 from vrdp_prob.models.unknowns import ANGLE_NOISE, DEGREES_OF_FREEDOM, NOISE
@@ -155,8 +154,7 @@ def _reported(posterior: Posterior) -> Iterator[tuple[str, tuple[str, ...], Floa
     draws = posterior.data["posterior"]
     for pair in posterior.pairs:
         for quantity, parameter, sign in (("mass_ratio", MASS, -1), ("restitution", RESTITUTION, 1)):
-            statuses = [getattr(posterior.status[body], parameter.name).status for body in pair]
-            if Status.DEFAULT in statuses:
+            if not posterior.tells(pair, parameter.name):
                 continue
             first, second = (
                 np.log(draws[parameter.name].sel(body=body).transpose("chain", "draw").values) for body in pair

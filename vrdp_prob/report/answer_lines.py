@@ -4,7 +4,7 @@ import math
 from collections.abc import Sequence
 
 from vrdp_prob.reasoning import Answer
-from vrdp_prob.report.wording import listed, percent, percent_error, with_names
+from vrdp_prob.report.wording import listed, percent, percent_error, rests_on, with_names
 from vrdp_prob.scene import Body
 
 
@@ -29,7 +29,7 @@ def answer_lines(answer: Answer, bodies: Sequence[Body], limits: Sequence[str] =
     notes = [*answer.notes, *limits]
     if answer.relies_on_default:
         who = f"object{'s' * (len(answer.relies_on_default) > 1)} {listed(answer.relies_on_default)}"
-        notes.insert(0, f"Rests on mass or restitution of {who}, which this video does not determine.")
+        notes.insert(0, rests_on(who))
     return lines + [f"note: {with_names(note, bodies)}" for note in notes]
 
 

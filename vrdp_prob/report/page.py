@@ -31,6 +31,7 @@ from vrdp_prob.report.wording import (
     percent,
     percent_error,
     restitution_status,
+    rests_on,
     seconds,
     sentence,
     tags,
@@ -149,7 +150,7 @@ def _question(item: AnswerContent, content: ReportContent) -> dict[str, Any]:
     notes = list(answer.notes)
     if answer.relies_on_default:
         who = listed(f"the {name.get(body, body)}" for body in answer.relies_on_default)
-        notes.insert(0, f"Rests on mass or restitution of {who}, which this video does not determine.")
+        notes.insert(0, rests_on(who))
     world = next((world for world in content.worlds if world.key == item.world), None)
     if world is not None and world.kind == FACTUAL:
         world = None  # the page opens with it

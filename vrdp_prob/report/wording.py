@@ -117,8 +117,6 @@ def percent_error(probability: float, error: float) -> str:
 def decimals(interval: Summary) -> int:
     """Decimal places that the width of an interval supports (two digits of its half width, between 0 and 4)."""
     width = interval.q95 - interval.q05
-    if width <= 0:
-        return 2
     return min(max(1 - math.floor(math.log10(width / 2)), 0), MOST_DECIMALS)
 
 
@@ -153,6 +151,11 @@ def restitution_status(parameter: ParameterSummary, name: Mapping[str, str]) -> 
     if parameter.status == "identified":
         return "Known from its collisions."
     return f"Only its product with that of {_the(parameter.partners, name)} is known."
+
+
+def rests_on(objects: str) -> str:
+    """The note of an answer that hangs on what the video does not tell of some objects."""
+    return f"Rests on mass or restitution of {objects}, which this video does not determine."
 
 
 def _untold(parameter: ParameterSummary) -> str:

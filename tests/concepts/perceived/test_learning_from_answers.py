@@ -184,8 +184,11 @@ def test_a_gpu_learns_where_it_is_asked(monkeypatch: pytest.MonkeyPatch, tmp_pat
     named = {str(place): one for place, one in enumerate(TAUGHT)}
     kept = Checkpoint(tmp_path, {"seed": "1"})
     torch.cuda.reset_peak_memory_stats()
+    torch.cuda.manual_seed(5)
+    before = torch.cuda.get_rng_state()
     learned = learn(named, seed=1, device="cuda", checkpoint=kept)
     assert torch.cuda.max_memory_allocated() > 0
+    assert torch.equal(torch.cuda.get_rng_state(), before)
     assert learned.concepts.lessons.attributes_right > 0.9
     again = learn(named, seed=1, device="cuda", checkpoint=kept)
     for one, other in zip(learned.concepts.networks, again.concepts.networks, strict=True):

@@ -18,6 +18,7 @@ from vrdp_prob.errors import InputError
 from vrdp_prob.inference.checkpoint import Checkpoint
 from vrdp_prob.plural import several
 from vrdp_prob.progress import ProgressDisplay, SilentProgress
+from vrdp_prob.randomness import seeded
 
 NETWORKS = 5
 """Networks that learn the same words; each holds out another part of the videos, and together they hold out all."""
@@ -156,8 +157,7 @@ def _trained(
     held_out = _held_out(taught, place)
     rest = [one for one in taught if not any(one is other for other in held_out)] or list(taught)
     own_seed = seed * NETWORKS + place
-    with torch.random.fork_rng(devices=[]):
-        torch.manual_seed(own_seed)
+    with seeded(own_seed):
         network = ConceptNetwork(vocabulary)
     network.measure([one.observation for one in taught])
     network.to(device)

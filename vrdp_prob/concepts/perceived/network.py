@@ -44,6 +44,11 @@ class ConceptNetwork(nn.Module):
         self.crossings = ConceptSpace(EVENTS[1:], WindowEncoder.length, mu=_RARE)
         self.meetings = ConceptSpace(EVENTS[:1], WindowEncoder.length, mu=_RARE)
 
+    @property
+    def device(self) -> torch.device:
+        """Where it computes."""
+        return self.appearance.mean.device
+
     def measure(self, observations: Sequence[Observation]) -> None:
         """Take means and scales of what the encoders see from the videos to learn from."""
         self.appearance.mean.copy_(torch.cat([one.statistics for one in observations]).mean(dim=0))
@@ -69,8 +74,8 @@ class ConceptNetwork(nn.Module):
         most = max(one.there.shape[1] for one in observations)
         there = torch.cat([nn.functional.pad(one.there, (0, most - one.there.shape[1])) for one in observations])
         slides = torch.cat([one.slides for one in observations])
-        device = self.appearance.mean.device
-        features = self.appearance(torch.cat(list(shown)).to(device), there.to(device), slides.to(device))
+        inputs = (torch.cat(list(shown)), there, slides)
+        features = self.appearance(*(values.to(self.device) for values in inputs))
         owner = torch.cat([torch.full((len(one.there),), place) for place, one in enumerate(observations)])
         table = {name: self._space(name).exclusive(features).cpu() for name in self.attributes}
         return [{name: values[owner == place] for name, values in table.items()} for place in range(len(observations))]
@@ -107,4 +112,4 @@ class ConceptNetwork(nn.Module):
         return space
 
     def _windows(self, windows: Tensor) -> Tensor:
-        return windows.to(self.appearance.mean.device)
+        return windows.to(self.device)

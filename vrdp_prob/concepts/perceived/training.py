@@ -17,6 +17,7 @@ from vrdp_prob.concepts.perceived.observation import Observation
 from vrdp_prob.concepts.perceived.standing import See, Standing, facts_of, standing
 from vrdp_prob.concepts.perceived.training_state import TrainingState
 from vrdp_prob.progress import Advance
+from vrdp_prob.randomness import seeded
 
 _RATE, _DECAY = 3e-3, 1e-3
 _STEPS = 5
@@ -99,8 +100,7 @@ class _Course:
         """Go over the videos once; the randomness follows from the epoch alone, so that any epoch can be the next."""
         own_seed = (self.seed << 16) + epoch
         generator = torch.Generator().manual_seed(own_seed)
-        with torch.random.fork_rng(devices=[]):
-            torch.manual_seed(own_seed)
+        with seeded(own_seed, self.network.device):
             for batch in _batches(self.taught, generator):
                 self.network.train()
                 self.optimiser.zero_grad()

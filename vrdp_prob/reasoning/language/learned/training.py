@@ -9,6 +9,7 @@ from jaxtyping import Int
 from torch import Tensor
 
 from vrdp_prob.progress import ProgressDisplay, SilentProgress
+from vrdp_prob.randomness import seeded
 from vrdp_prob.reasoning.language.learned.examples import Example, examples
 from vrdp_prob.reasoning.language.learned.network import (
     BEGIN,
@@ -56,8 +57,7 @@ def train(
     vocabulary = _vocabulary(pool)
     known = set(vocabulary.words)
     pool = [example for example in pool if known.issuperset(example.words)]
-    with torch.random.fork_rng(devices=[]):
-        torch.manual_seed(seed)
+    with seeded(seed):
         return _fitted(pool, vocabulary, steps, generator, display), vocabulary
 
 

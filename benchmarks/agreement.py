@@ -28,6 +28,7 @@ from _resumable import Result, measured, read
 from arviz_stats.base.array import array_stats
 
 from tests.inference.prior_scenes import prior_scene
+from vrdp_prob.errors import InputError
 from vrdp_prob.inference import default_model
 from vrdp_prob.inference.diagnostics import Reported
 from vrdp_prob.inference.infer import sampled
@@ -49,6 +50,8 @@ TOGETHER = 4
 MOST = 400
 """Scenes after which no further ones are tried."""
 RESULTS = Path("out") / "agreement.jsonl"
+REFUSED = "none"
+"""In place of a sampler where the fit refuses the tracks: nothing moves in them."""
 
 Moments = dict[str, tuple[np.ndarray, np.ndarray]]
 
@@ -93,7 +96,10 @@ def one(seed: int) -> Result:
     torch.set_num_threads(1)
     scene = prior_scene(seed)
     assert scene is not None
-    fit = fit_map(scene.tracks, default_model(), np.random.default_rng(seed))
+    try:
+        fit = fit_map(scene.tracks, default_model(), np.random.default_rng(seed))
+    except InputError as refused:
+        return {"seed": seed, "stopped": {"sampler": REFUSED, "sentence": str(refused)}, "compared": []}
     reported = Reported.of(fit.likelihood.coordinates, fit.contacts, fit.likelihood.tracks.bodies)
     moments: dict[str, Moments] = {}
     seconds: dict[str, float] = {}
@@ -236,7 +242,8 @@ def _share(results: Sequence[Result]) -> float:
 def _stopped(results: Sequence[Result]) -> str:
     """How many scenes were not compared because of which sampler."""
     by = [result["stopped"]["sampler"] for result in results if result["stopped"]]
-    return ", ".join(f"{by.count(name)} `{name}`" for name in SAMPLERS) + " has not converged"
+    stopped = ", ".join(f"{by.count(name)} `{name}`" for name in SAMPLERS) + " has not converged"
+    return stopped + (f", in {refused} nothing moves" if (refused := by.count(REFUSED)) else "")
 
 
 def _versions(results: Sequence[Result]) -> str:

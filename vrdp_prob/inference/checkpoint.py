@@ -9,7 +9,6 @@ import zipfile
 from collections.abc import Callable, Collection, Mapping
 from functools import cache
 from hashlib import sha256
-from importlib.metadata import version
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +17,7 @@ from vrdp_prob.errors import InputError
 from vrdp_prob.files import check_writable, write_atomically
 from vrdp_prob.models.physics import PhysicsModel
 from vrdp_prob.scene import Camera, Tracks
+from vrdp_prob.version import __version__
 
 Arrays = Mapping[str, np.ndarray]
 PACKAGE = Path(__file__).parents[1]
@@ -56,7 +56,7 @@ def model_facts(model: PhysicsModel) -> dict[str, str]:
 
 def program_facts(**settings: object) -> dict[str, str]:
     """The version of the program with the text of its code, and the settings given, in short texts by name."""
-    return {"version": f"{version('vrdp-prob')} {_code()}", **{name: str(value) for name, value in settings.items()}}
+    return {"version": f"{__version__} {_code()}", **{name: str(value) for name, value in settings.items()}}
 
 
 @cache

@@ -1,8 +1,8 @@
 """A model that discovery extends on some videos, what these tell of the numbers that others share, and forecasts."""
 
 import pickle
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -12,25 +12,49 @@ from jaxtyping import Float
 from vrdp_prob.discovery.discover import discover
 from vrdp_prob.discovery.document import write_finding
 from vrdp_prob.files import write_atomically
+from vrdp_prob.inference import default_model
 from vrdp_prob.inference.map_fit import fit_map
-from vrdp_prob.inference.several_videos import SharedFit, fit_together
+from vrdp_prob.inference.several_videos import SharedFit, fit_together, learned_model
 from vrdp_prob.models.physics import PhysicsModel
 from vrdp_prob.progress import progress_display
 from vrdp_prob.scene import Tracks
 
 
-def extended_model(training: Sequence[Tracks], folder: Path) -> PhysicsModel:
+@dataclass(frozen=True)
+class Learned:
+    """What some videos tell under a model: their fit, and the model that believes it."""
+
+    fit: SharedFit
+    model: PhysicsModel
+
+
+def learned_base(training: Sequence[Tracks], folder: Path) -> Learned:
+    """What some videos tell under the default model; the fit is kept in a folder."""
+
+    def found() -> SharedFit:
+        return fit_together(training, model=default_model(), seed=0, progress=progress_display(quiet=False))
+
+    fit = _kept(folder / "base.pickle", found)
+    return Learned(fit, learned_model(fit))
+
+
+def learned_extension(training: Sequence[Tracks], folder: Path) -> Learned:
     """The default model extended by what discovery finds on some videos; the finding is kept in a folder."""
-    if not (folder / "model.toml").exists():
-        write_finding(discover(training, seed=0, progress=progress_display(quiet=False)), folder)
-    return PhysicsModel.read(folder / "model.toml")
+
+    def found() -> SharedFit:
+        finding = discover(training, seed=0, progress=progress_display(quiet=False))
+        write_finding(finding, folder)
+        assert finding.fit is not None
+        return finding.fit
+
+    fit = _kept(folder / "fit.pickle", found)
+    return Learned(fit, PhysicsModel.read(folder / "model.toml"))
 
 
-def fit_of(training: Sequence[Tracks], model: PhysicsModel, folder: Path, name: str) -> SharedFit:
-    """What some videos tell under a model of some name; the fit is kept in a folder."""
-    path = folder / f"{name.replace(' ', '-')}.pickle"
+def _kept(path: Path, found: Callable[[], SharedFit]) -> SharedFit:
+    """A fit from a file, which is made where it is missing."""
     if not path.exists():
-        fit = fit_together(training, model=model, seed=0, progress=progress_display(quiet=False))
+        fit = found()
         with write_atomically(path) as temporary:
             temporary.write_bytes(pickle.dumps(fit))
     fit = pickle.loads(path.read_bytes())

@@ -23,7 +23,7 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 import numpy as np
 import torch
-from _extension import extended_model, fit_of, forecast
+from _extension import forecast, learned_base, learned_extension
 from _page import page_parser, publish, table_row
 from _resumable import Result, measured
 from jaxtyping import Float
@@ -31,7 +31,7 @@ from jaxtyping import Float
 from vrdp_prob.datasets import load_all
 from vrdp_prob.evaluation.scores import calibration_error
 from vrdp_prob.inference import default_model, infer
-from vrdp_prob.inference.several_videos.learned import learned_model, with_learned_walls
+from vrdp_prob.inference.several_videos.learned import with_learned_walls
 from vrdp_prob.models.physics import PhysicsModel
 from vrdp_prob.models.simulator.events import RolloutEventKind
 from vrdp_prob.models.simulator.rollout import compile_model, simulate
@@ -69,16 +69,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
     names = {part: [_video(one) for one in asked if one["split"] == part] for part in ("train", "test")}
     training = [_up_to(ASKED, tracks) for tracks in load_all(DATA, videos=names["train"][: options.train])]
     compile_model(default_model())
-    extended = extended_model(training, options.results / "finding")
-    fits = {
-        name: fit_of(training, model, options.results, name)
-        for name, model in ((BASE, default_model()), (EXTENDED, extended))
+    found = {
+        BASE: learned_base(training, options.results),
+        EXTENDED: learned_extension(training, options.results / "finding"),
     }
     questions = {_video(one): tuple(one["questions"]) for one in asked}
     tasks = [
-        Task(with_learned_walls(fit, tracks), questions[tracks.video], name, learned_model(fit))
+        Task(with_learned_walls(learned.fit, tracks), questions[tracks.video], name, learned.model)
         for tracks in load_all(DATA, videos=names["test"])
-        for name, fit in fits.items()
+        for name, learned in found.items()
     ]
     tasks += [Task(one.tracks, one.questions, STRAIGHT, None) for one in tasks if one.name == BASE]
     results = measured(

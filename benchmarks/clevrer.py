@@ -21,7 +21,7 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 import numpy as np
 import torch
 from _answer_goals import GOALS, title
-from _extension import extended_model, fit_of, forecast
+from _extension import forecast, learned_base, learned_extension
 from _page import page_parser, publish, table_row
 from _resumable import Result, measured
 from _score_cells import gain, number, percent
@@ -30,7 +30,6 @@ from vrdp_prob.datasets import load_all, read_questions
 from vrdp_prob.evaluation.judgement import Judgement, judge
 from vrdp_prob.evaluation.scores import Scores, bootstrap, brier_gain
 from vrdp_prob.inference import default_model, infer
-from vrdp_prob.inference.several_videos.learned import learned_model
 from vrdp_prob.models.physics import PhysicsModel
 from vrdp_prob.models.simulator.rollout import compile_model
 from vrdp_prob.reasoning import PosteriorWorlds
@@ -68,11 +67,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     names = [f"video_{scene:05d}" for scene in range(SCENES)]
     training = load_all(DATA, videos=names[0::2][: options.train])
     compile_model(default_model())
-    models = {PLAIN: default_model()}
-    extended = extended_model(training, options.results / "finding")
-    compile_model(extended)
-    for name, model in ((BASE, default_model()), (EXTENDED, extended)):
-        models[name] = learned_model(fit_of(training, model, options.results, name))
+    models = {
+        PLAIN: default_model(),
+        BASE: learned_base(training, options.results).model,
+        EXTENDED: learned_extension(training, options.results / "finding").model,
+    }
+    compile_model(models[EXTENDED])
     tasks = [
         Task(tracks, name, model)
         for tracks in load_all(DATA, videos=names[1::2][: options.test])

@@ -15,6 +15,7 @@ from vrdp_prob import load_all
 from vrdp_prob.discovery.discover import discover
 from vrdp_prob.discovery.finding import Finding, Verdict
 from vrdp_prob.models.model_file import known_effects
+from vrdp_prob.models.physics import PhysicsModel
 
 SMALL = Setting(videos=3, bodies=3)
 LARGER = Setting(videos=6, bodies=3)
@@ -56,6 +57,22 @@ def test_a_tilt_is_named_and_left_out_videos_are_predicted_better(tilted: tuple[
     gain = first.gain
     assert gain.elpd_difference > 10
     assert sum(one > 0 for one in gain.by_video.values()) >= 2
+
+
+def test_the_extended_model_believes_what_the_videos_say(tilted: tuple[Truth, Finding], tmp_path: Path) -> None:
+    truth, finding = tilted
+    laws = truth.videos[0].laws
+    for name, true in (("tilt_x", laws.tilt_x), ("tilt_y", laws.tilt_y)):
+        belief = finding.extended.beliefs[name]
+        estimate = finding.causes[0].parameters[name]
+        assert (belief.prior.mean, belief.prior.sd) == pytest.approx((estimate.mean, estimate.sd))
+        assert abs(belief.default - true) < 4 * belief.prior.sd < 4 * 0.01
+        given, extended = finding.left_out[finding.videos[0]]
+        assert name not in given.beliefs
+        assert extended.beliefs[name].prior.sd > belief.prior.sd
+    finding.extended.write(tmp_path / "model.toml")
+    read = PhysicsModel.read(tmp_path / "model.toml")
+    assert {one.name: one for one in read.parameters} == {one.name: one for one in finding.extended.parameters}
 
 
 def test_a_check_shows_it(tilted: tuple[Truth, Finding]) -> None:

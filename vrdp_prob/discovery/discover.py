@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from jaxtyping import Float
 
+from vrdp_prob.discovery.believed import extended_model, models_of_the_others
 from vrdp_prob.discovery.checking import check_video_count
 from vrdp_prob.discovery.checks import run_checks
 from vrdp_prob.discovery.describe import describe
@@ -102,11 +103,13 @@ def discover(
         checks_after=after,
         upper_bounds=tuple(_bounds(found)),
         model=physics,
-        extended=found.best.fit.model,
+        extended=extended_model(found.best, found.overdispersion),
         videos=tuple(tracks.video for tracks in videos),
         description=describe(found.best.fit, after) if verdict is Verdict.UNKNOWN else None,
         notes=tuple(_notes(found, reasons, unlisted)),
         figures=residual_figures(found.base.fit, found.best.fit if found.best.causes else None),
+        fit=found.best.fit,
+        left_out=models_of_the_others(found.base, found.best, found.overdispersion),
     )
 
 

@@ -44,9 +44,7 @@ def estimates(
         their mean; 1 where None.
     """
     factors = np.ones(len(fit.videos)) if overdispersion is None else overdispersion
-    shared_sd = fit.joint.gaussian.sd * np.sqrt(factors.mean())
-    if unexplained is not None:
-        shared_sd = shared_sd * unexplained.shared_widening
+    shared_sd = widened(fit.joint.gaussian.sd, factors, unexplained)
     units = {parameter.name: parameter for parameter in effect.parameters}
     found: dict[str, Estimate] = {}
     joint = fit.joint
@@ -72,6 +70,14 @@ def estimates(
             if name in effect.stepwise and value is not None:
                 found[f"{name}[{video.name}]"] = _between_frames(value, video.likelihood.tracks, units[name].unit)
     return found
+
+
+def widened(
+    sd: Float[np.ndarray, "shared"], overdispersion: Float[np.ndarray, "video"], unexplained: Unexplained | None
+) -> Float[np.ndarray, "shared"]:
+    """Standard deviations of what videos share, with what a fit leaves to chance and the overdispersion of videos."""
+    wider: np.ndarray = sd * np.sqrt(overdispersion.mean())
+    return wider if unexplained is None else wider * unexplained.shared_widening
 
 
 def _estimate(transform: Transform, mean: float, sd: float, unit: str) -> Estimate:
@@ -105,7 +111,7 @@ def surprise(fit: SharedFit, effect: Effect) -> float:
     """
     joint = fit.joint
     strengths = {*effect.vanishes_at, *effect.vanishes_like}
-    priors = {one.name: one.prior for one in effect.parameters if one.name not in strengths}
+    priors = {one.name: fit.model.believed(one).prior for one in effect.parameters if one.name not in strengths}
     found = [
         (priors[key[0]], joint.gaussian.mean[place]) for place, key in enumerate(joint.numbers.keys) if key[0] in priors
     ]

@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
 
+from vrdp_prob.inference.several_videos.fitting import SharedFit
 from vrdp_prob.models.physics import PhysicsModel
 
 
@@ -261,8 +262,9 @@ class Finding:
     upper_bounds
         Of every cause that was not named.
     model, extended
-        The model that was given, and the same with the named causes, which believes of single bodies (masses,
-        restitutions, frictions) what the videos say of all of them, where these are enough.
+        The model that was given, and the same with the named causes for further videos of the same table: it believes
+        what the videos say of what they share, and of single bodies (masses, restitutions, frictions) what they say of
+        all of them, where these are enough. What happened once in a video, a kick or lost frames, is no part of it.
     description
         Of what is left unexplained; None where nothing is.
     videos
@@ -274,6 +276,11 @@ class Finding:
         `themed` uses the page's colours (`var(--ink)`, `var(--accent)`, ...); any other stands on white.
     answers
         Answers to questions about the videos under both models; None where nothing was asked or nothing is named.
+    fit
+        The joint fit of the model with all named causes, for what videos say together
+        (`vrdp_prob.inference.several_videos`); None for a finding that was put together by hand.
+    left_out
+        By the name of a video: both models, believing what the other videos say, for that video itself.
     """
 
     verdict: Verdict
@@ -288,6 +295,8 @@ class Finding:
     notes: tuple[str, ...] = ()
     figures: Mapping[str, str] = field(default_factory=dict)
     answers: tuple[ComparedAnswer, ...] | None = None
+    fit: SharedFit | None = None
+    left_out: Mapping[str, tuple[PhysicsModel, PhysicsModel]] = field(default_factory=dict)
 
     @property
     def named(self) -> tuple[FoundCause, ...]:

@@ -194,7 +194,14 @@ def _model(finding: Finding) -> dict[str, Any]:
     else:
         words = "The model that was given: nothing is added to it that has no name."
     if finding.extended.beliefs != finding.model.beliefs:
-        words += " What it believes of single bodies (masses, restitutions, frictions) is what these videos say of all."
+        words += (
+            " It is for further videos of the same table: it believes what these videos say of the table, and of single"
+            " bodies (masses, restitutions, frictions) what they say of all. Given to one of these videos, it counts"
+            " what that video says twice."
+        )
+    kept = {effect.name for effect in finding.extended.effects}
+    if past := [title(cause.name) for cause in finding.named if cause.name not in kept]:
+        words += f" {listed(past)} is no part of it, since that happened once in a video."
     return {
         "model": finding.model.name,
         "model_words": words,

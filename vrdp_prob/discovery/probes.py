@@ -65,7 +65,7 @@ def probes(
         Values of its parameters where it is looked for.
     """
     part, video = fit.fits[index], fit.joint.videos[index]
-    likelihood = plain_likelihood(part.clues, fit.model.with_effect(effect), fit.structures[index])
+    likelihood = plain_likelihood(part.clues, fit.extended(effect), fit.structures[index])
     entries = likelihood.coordinates.entries
     start = video.likelihood.coordinates.carried(fit.joint.point(index), likelihood.coordinates)
     vanishing = fit.vanishing([effect])

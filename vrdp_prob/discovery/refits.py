@@ -180,7 +180,7 @@ class Refits:
         again = [effect for effect, promised in told if reached.get(effect.name, 0.0) < promised]
 
         def searched(effect: Effect) -> Trial | None:
-            model = trial.fit.model.with_effect(effect)
+            model = trial.fit.extended(effect)
             tracks = [part.clues.tracks for part in trial.fit.fits]
             try:
                 fit = fit_together(tracks, model=model, shared=trial.fit.shared, seed=self.seed, model_error=False)

@@ -114,7 +114,7 @@ def _scanned(fit: SharedFit, model: ResidualModel, seed: int, effect: Effect) ->
 def _probed(
     fit: SharedFit, model: ResidualModel, effect: Effect
 ) -> tuple[Sequence[Mapping[str, float]], list[list[Probe]]]:
-    points = effect.search_points([part.likelihood.tracks for part in fit.fits])
+    points = effect.search_points(fit.tracks)
     return points, in_parallel(
         lambda index: probes(fit, index, model.videos[index].noise, effect, points), range(len(fit.fits))
     )

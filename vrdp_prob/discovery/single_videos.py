@@ -91,7 +91,7 @@ def causes_of_lost_videos(
         found: list[tuple[Effect, MapFit]] = []
         for first in range(0, len(effects), AT_ONCE):
             some = effects[first : first + AT_ONCE]
-            models = [fit.model.with_effect(effect) for effect in some]
+            models = [fit.extended(effect) for effect in some]
             fits = in_processes(searched(video), models)
             found += zip(some, fits, strict=True)
             if min(one.misfit.ratio for one in fits) < EXPLAINED:

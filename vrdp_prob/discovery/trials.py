@@ -129,7 +129,7 @@ class Trial:
         None where no world can begin there, or the log posterior does not come near to `least` at once.
         """
         last = self.causes[-1]
-        left = self.fit.model.without_effect(last).with_effect(score.effect)
+        left = self.fit.model.without_effect(last).with_effect(score.effect, self.fit.tracks)
         choices = {name: one for name, one in self.choices.items() if name != last.name}
         try:
             fit = self.fit.under(left, start=score.start, least=least, rounds=FIRST_ROUNDS, model_error=False)
@@ -146,7 +146,7 @@ class Trial:
             {(name, body): score.start[name] for name in own_fields if name in score.start for body in these}
             for these in bodies
         ]
-        model = self.fit.model.with_effect(effect)
+        model = self.fit.extended(effect)
         fit = self.fit.under(model, start=score.start, own=starts, rounds=FIRST_ROUNDS, model_error=False)
         return self.and_cause(effect, fit)
 
@@ -175,7 +175,7 @@ class Trial:
             own.append(values)
         acting = np.array([min(len(mine), 1) for mine in sites])
         choices = {**self.choices, effect.name: np.log(max(score.places, 1)) * acting}
-        model = self.fit.model.with_effect(effect)
+        model = self.fit.extended(effect)
         fit = self.fit.under(model, own=own, held=held, rounds=FIRST_ROUNDS, model_error=False)
         return replace(self, causes=(*self.causes, effect), fit=fit, choices=choices)
 

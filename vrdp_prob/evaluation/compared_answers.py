@@ -31,8 +31,9 @@ def with_answers(
     """A finding that also tells what both models answer to questions about its videos.
 
     Each model answers from Laplace draws of each video alone, which are not handed on to emcee where they cannot be
-    trusted. A question that one of them cannot answer is left out and told of. Where no cause is named there is one
-    model only, and nothing is asked.
+    trusted; what the other videos say is its prior. What happened once in a video, as a kick, is in neither model. A
+    question that one of them cannot answer is left out and told of. Where no cause is named there is one model only,
+    and nothing is asked.
 
     Parameters
     ----------
@@ -55,7 +56,7 @@ def with_answers(
         return finding
     asked = [(tracks, tuple(questions[tracks.video])) for tracks in videos if questions.get(tracks.video)]
     compile_model(finding.extended)
-    work = _Comparison(finding.model, finding.extended, tuple(words), seed)
+    work = _Comparison(finding, tuple(words), seed)
     shown = progress or SilentProgress()
     with several_processes(processes), shown.stage("Questions, both models", total=len(asked)) as advance:
         found = in_processes(work, asked, advance=advance)
@@ -69,15 +70,15 @@ def with_answers(
 class _Comparison:
     """Both models asked about one video."""
 
-    given: PhysicsModel
-    extended: PhysicsModel
+    finding: Finding
     words: tuple[ChangeWord, ...]
     seed: int
 
     def __call__(self, asked: tuple[Tracks, tuple[Question, ...]]) -> tuple[list[ComparedAnswer], list[str]]:
         """Answers to the questions, and why others have none."""
         tracks, questions = asked
-        worlds = [self._worlds(tracks, model) for model in (self.given, self.extended)]
+        models = self.finding.left_out.get(tracks.video, (self.finding.model, self.finding.extended))
+        worlds = [self._worlds(tracks, model) for model in models]
         answers, reasons = [], []
         for question in questions:
             try:

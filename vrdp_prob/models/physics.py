@@ -1,6 +1,6 @@
 """A physics model is a set of effects; it is written to and read from a TOML file."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -25,6 +25,7 @@ from vrdp_prob.models.simulator.laws import (
     path_depends_on_spin,
     path_follows_mass,
 )
+from vrdp_prob.scene import Tracks
 
 
 @dataclass(frozen=True)
@@ -87,9 +88,19 @@ class PhysicsModel:
         """The model of VRDP: dry friction, air drag, angular drag and normal impacts."""
         return cls("base", (DryFriction(), AirDrag(), AngularDrag(), NormalImpact()))
 
-    def with_effect(self, effect: Effect) -> "PhysicsModel":
-        """The model with one more cause."""
-        return PhysicsModel(f"{self.name}+{effect.name}", (*self.effects, effect), self.beliefs)
+    def with_effect(self, effect: Effect, videos: Sequence[Tracks] = ()) -> "PhysicsModel":
+        """The model with one more cause.
+
+        Parameters
+        ----------
+        effect
+            The cause.
+        videos
+            What was seen where it is looked for, by which its places and times are expected; as they are stated where
+            none is given.
+        """
+        beliefs = {**self.beliefs, **effect.expected(videos)} if videos else self.beliefs
+        return PhysicsModel(f"{self.name}+{effect.name}", (*self.effects, effect), beliefs)
 
     def without_effect(self, effect: Effect) -> "PhysicsModel":
         """The model without one of its causes, and without what was believed of it alone."""

@@ -71,6 +71,15 @@ class SharedFit:
         """Names of the videos."""
         return tuple(video.name for video in self.joint.videos)
 
+    @property
+    def tracks(self) -> tuple[Tracks, ...]:
+        """What was seen in each video."""
+        return tuple(part.likelihood.tracks for part in self.fits)
+
+    def extended(self, effect: Effect) -> PhysicsModel:
+        """Its model with one more cause, whose places and times are expected where these videos show something."""
+        return self.model.with_effect(effect, self.tracks)
+
     def value(self, name: str) -> float | None:
         """Most probable value of a number that all videos share, in its unit; None where they share no such number."""
         place = next((k for k, key in enumerate(self.joint.numbers.keys) if key == (name, ())), None)

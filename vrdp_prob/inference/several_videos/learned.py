@@ -1,10 +1,14 @@
 """What some videos tell of the numbers that further videos of the same table share with them."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 
+import numpy as np
+from jaxtyping import Float
+
 from vrdp_prob.inference.several_videos.fitting import SharedFit
-from vrdp_prob.inference.several_videos.linking import shared_key
+from vrdp_prob.inference.several_videos.linking import Key, shared_key
 from vrdp_prob.inference.several_videos.population import with_learned_population
 from vrdp_prob.models.coordinates import Coordinate
 from vrdp_prob.models.parameters import WALL_RESTITUTION, Scope
@@ -19,15 +23,34 @@ def learned_model(fit: SharedFit) -> PhysicsModel:
     (masses, restitutions, frictions) it is learned how far apart they are, of restitutions their middle, too; that of
     masses cannot be seen.
     """
-    model = with_learned_population(fit)
     gaussian = fit.joint.gaussian
-    told = dict(zip(fit.joint.numbers.keys, zip(gaussian.mean, gaussian.sd, strict=True), strict=True))
+    return believing(with_learned_population(fit), fit.joint.numbers.keys, gaussian.mean, gaussian.sd)
+
+
+def believing(
+    model: PhysicsModel,
+    keys: Sequence[Key],
+    mean: Float[np.ndarray, "shared"],
+    sd: Float[np.ndarray, "shared"],
+) -> PhysicsModel:
+    """A model that believes something of what several videos share.
+
+    Parameters
+    ----------
+    model
+        The model.
+    keys
+        What each number is shared as.
+    mean, sd
+        What is believed of the numbers, in their coordinates; it is never believed less sharply than before.
+    """
+    told = dict(zip(keys, zip(mean, sd, strict=True), strict=True))
     beliefs = dict(model.beliefs)
     for parameter in model.parameters:
         if parameter.scope is Scope.SHARED and (parameter.name, ()) in told:
-            mean, sd = map(float, told[parameter.name, ()])
-            prior = replace(parameter.prior, mean=mean, sd=min(sd, parameter.prior.sd))
-            beliefs[parameter.name] = replace(parameter, prior=prior, default=parameter.transform.to_value(mean))
+            middle, width = map(float, told[parameter.name, ()])
+            prior = replace(parameter.prior, mean=middle, sd=min(width, parameter.prior.sd))
+            beliefs[parameter.name] = replace(parameter, prior=prior, default=parameter.transform.to_value(middle))
     return replace(model, beliefs=beliefs)
 
 

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from typing import ClassVar
 
 from vrdp_prob.models.effects.effect import BodyView, Effect
-from vrdp_prob.models.effects.places import places_around
+from vrdp_prob.models.effects.places import Region, places_around
 from vrdp_prob.models.parameters import Parameter, Prior, Transform
 from vrdp_prob.models.simulator.formula import Scalar
 from vrdp_prob.scene import Tracks
@@ -28,6 +28,9 @@ BOWL_Y = Parameter(
 SEARCH_SHARES = (-1.0, -0.5, 0.0, 0.5, 1.0)
 """Where the middle is looked for, in half widths of the region where bodies were seen."""
 
+REACH = 0.5
+"""Standard deviation of each coordinate of its place, in half widths of the region where bodies were seen."""
+
 
 class Bowl(Effect):
     """A pull towards one point, in proportion to the distance."""
@@ -42,6 +45,10 @@ class Bowl(Effect):
     source: ClassVar = "gravity on a paraboloid, small slopes: bowl_stiffness is g over the radius of curvature"
     parameters: ClassVar = (BOWL_STIFFNESS, BOWL_X, BOWL_Y)
     vanishes_at: ClassVar = {"bowl_stiffness": 0.0}
+
+    def expected(self, videos: Sequence[Tracks]) -> Mapping[str, Parameter]:
+        """The middle is somewhere in or around the region where bodies were seen."""
+        return Region.of(videos).expected(BOWL_X, BOWL_Y, REACH)
 
     def search_points(self, videos: Sequence[Tracks]) -> Sequence[Mapping[str, float]]:
         """Middles in and around the region where bodies were seen."""

@@ -9,6 +9,7 @@ from jaxtyping import Float
 from torch import Tensor
 
 from vrdp_prob.models.effects.effect import Effect
+from vrdp_prob.models.effects.places import expected_time
 from vrdp_prob.models.parameters import Parameter, Prior, Scope, Transform
 from vrdp_prob.scene import Tracks
 
@@ -45,6 +46,10 @@ class ClockError(Effect):
     parameters: ClassVar = (LOST_TIME, LOST_AT)
     vanishes_at: ClassVar = {"lost_time": 0.0}
     stepwise: ClassVar = frozenset({"lost_at"})
+
+    def expected(self, videos: Sequence[Tracks]) -> Mapping[str, Parameter]:
+        """Frames are missing somewhere in the videos."""
+        return expected_time(videos, LOST_AT)
 
     def search_points(self, videos: Sequence[Tracks]) -> Sequence[Mapping[str, float]]:
         """Between any two frames."""

@@ -136,8 +136,8 @@ class Effect:
 
     @classmethod
     def does_something(cls) -> bool:
-        """Whether the effect has its own version of any hook."""
-        return any(cls.overrides(name) for name in _hooks())
+        """Whether the effect has its own version of any hook that changes what happens or is measured."""
+        return any(cls.overrides(name) for name in _hooks() if name not in _OF_THE_SEARCH)
 
     def search_points(self, videos: Sequence[Tracks]) -> Sequence[Mapping[str, float]]:
         """Values of parameters from which a search for the effect begins, for an effect that has a place or a time.
@@ -145,6 +145,14 @@ class Effect:
         Parameters that are left out begin at the value at which the effect vanishes, or at their default.
         """
         return ({},)
+
+    def expected(self, videos: Sequence[Tracks]) -> Mapping[str, Parameter]:
+        """Parameters by name, with what is believed of them where it is known where and when bodies were seen.
+
+        For an effect that has a place or a time: what its parameters state holds for a scene around the origin that
+        begins at 0 s. A search takes these instead, so that it does not matter where the origin lies.
+        """
+        return {}
 
     def acceleration(self, time: Scalar, body: BodyView, parameters: Mapping[str, Scalar]) -> tuple[Scalar, Scalar]:
         """Acceleration of a body in m/s^2, dry friction apart."""
@@ -247,6 +255,9 @@ class Effect:
     ) -> Float[Tensor, "world time body 2"]:
         """Positions in m as they are measured, from the true ones."""
         return positions
+
+
+_OF_THE_SEARCH = ("search_points", "expected")
 
 
 def _hooks() -> list[str]:

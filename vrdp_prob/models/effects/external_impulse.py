@@ -6,6 +6,7 @@ from typing import ClassVar
 import numpy as np
 
 from vrdp_prob.models.effects.effect import BodyView, Effect
+from vrdp_prob.models.effects.places import expected_time
 from vrdp_prob.models.parameters import Parameter, Prior, Scope, Transform
 from vrdp_prob.models.simulator.formula import Scalar
 from vrdp_prob.scene import Tracks
@@ -48,6 +49,10 @@ class ExternalImpulse(Effect):
     source: ClassVar = "definition of an impulse"
     parameters: ClassVar = (IMPULSE_TIME, IMPULSE_X, IMPULSE_Y)
     vanishes_at: ClassVar = {"impulse_x": 0.0, "impulse_y": 0.0}
+
+    def expected(self, videos: Sequence[Tracks]) -> Mapping[str, Parameter]:
+        """It happens at some time while bodies are seen."""
+        return expected_time(videos, IMPULSE_TIME)
 
     def search_points(self, videos: Sequence[Tracks]) -> Sequence[Mapping[str, float]]:
         """At every second frame."""

@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 from typing import ClassVar
 
 from vrdp_prob.models.effects.effect import BodyView, Effect
-from vrdp_prob.models.effects.places import visited
+from vrdp_prob.models.effects.places import Region, visited
 from vrdp_prob.models.parameters import Parameter, Prior, Transform
 from vrdp_prob.models.simulator.formula import Scalar
 from vrdp_prob.models.simulator.mathematics import length, maximum, where
@@ -29,6 +29,9 @@ PATCH_FRICTION = Parameter(
 SEARCH_STEP, SEARCH_RADII = 0.3, (0.3, 0.6)
 """Distance in m between the places where a patch is looked for, and radii in m that are tried."""
 
+REACH = 1.0
+"""Standard deviation of each coordinate of its place, in half widths of the region where bodies were seen."""
+
 
 class FrictionPatch(Effect):
     """Friction differs inside a disc."""
@@ -43,6 +46,10 @@ class FrictionPatch(Effect):
     source: ClassVar = "dry friction of two materials"
     parameters: ClassVar = (PATCH_X, PATCH_Y, PATCH_RADIUS, PATCH_FRICTION)
     vanishes_at: ClassVar = {"patch_friction": 0.0}
+
+    def expected(self, videos: Sequence[Tracks]) -> Mapping[str, Parameter]:
+        """The patch is somewhere where bodies were seen."""
+        return Region.of(videos).expected(PATCH_X, PATCH_Y, REACH)
 
     def search_points(self, videos: Sequence[Tracks]) -> Sequence[Mapping[str, float]]:
         """Places a third of a metre apart wherever bodies were seen, with a small and a large radius."""

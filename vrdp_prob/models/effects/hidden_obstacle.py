@@ -8,8 +8,10 @@ from jaxtyping import Float
 from torch import Tensor
 
 from vrdp_prob.models.effects.effect import Effect
+from vrdp_prob.models.effects.places import Region
 from vrdp_prob.models.parameters import Parameter, Prior, Transform, restitution_parameter
 from vrdp_prob.models.simulator.obstacle import Obstacle
+from vrdp_prob.scene import Tracks
 
 OBSTACLE_X = Parameter("obstacle_x", "m", "x of the obstacle", Transform.IDENTITY, Prior(0.0, 2.0), default=0.0)
 OBSTACLE_Y = Parameter("obstacle_y", "m", "y of the obstacle", Transform.IDENTITY, Prior(0.0, 2.0), default=0.0)
@@ -17,6 +19,9 @@ OBSTACLE_RADIUS = Parameter(
     "obstacle_radius", "m", "radius of the obstacle", Transform.LOG, Prior(math.log(0.2), 0.7), default=0.2
 )
 OBSTACLE_RESTITUTION = restitution_parameter("obstacle_restitution", "restitution factor of the obstacle")
+
+REACH = 1.0
+"""Standard deviation of each coordinate of its place, in half widths of the region where bodies were seen."""
 
 
 class HiddenObstacle(Effect):
@@ -27,6 +32,10 @@ class HiddenObstacle(Effect):
     law: ClassVar = "a fixed disc at (obstacle_x, obstacle_y) with obstacle_radius; e = r obstacle_restitution"
     source: ClassVar = "contact with a body of infinite mass"
     parameters: ClassVar = (OBSTACLE_X, OBSTACLE_Y, OBSTACLE_RADIUS, OBSTACLE_RESTITUTION)
+
+    def expected(self, videos: Sequence[Tracks]) -> Mapping[str, Parameter]:
+        """The obstacle is somewhere where bodies were seen."""
+        return Region.of(videos).expected(OBSTACLE_X, OBSTACLE_Y, REACH)
 
     def obstacles(self, parameters: Mapping[str, Float[Tensor, "..."]]) -> Sequence[Obstacle]:
         """The disc."""

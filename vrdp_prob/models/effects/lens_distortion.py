@@ -8,7 +8,7 @@ from jaxtyping import Float
 from torch import Tensor
 
 from vrdp_prob.models.effects.effect import Effect
-from vrdp_prob.models.effects.places import places_around
+from vrdp_prob.models.effects.places import Region, places_around
 from vrdp_prob.models.parameters import Parameter, Prior, Transform
 from vrdp_prob.scene import Tracks
 
@@ -27,6 +27,9 @@ LENS_Y = Parameter("lens_y", "m", "y of the picture's centre", Transform.IDENTIT
 SEARCH_SHARES = (-0.4, -0.2, 0.0, 0.2, 0.4)
 """Where the centre is looked for, in half widths of the region where bodies were seen."""
 
+REACH = 0.25
+"""Standard deviation of each coordinate of its place, in half widths of the region where bodies were seen."""
+
 
 class LensDistortion(Effect):
     """Positions are recorded farther from the picture's centre than they are, or nearer."""
@@ -41,6 +44,10 @@ class LensDistortion(Effect):
     source: ClassVar = "Brown, Close-range camera calibration, Photogrammetric Engineering 37 (1971), first radial term"
     parameters: ClassVar = (DISTORTION, LENS_X, LENS_Y)
     vanishes_at: ClassVar = {"distortion": 0.0}
+
+    def expected(self, videos: Sequence[Tracks]) -> Mapping[str, Parameter]:
+        """The picture's centre is in the middle of what was seen, about."""
+        return Region.of(videos).expected(LENS_X, LENS_Y, REACH)
 
     def search_points(self, videos: Sequence[Tracks]) -> Sequence[Mapping[str, float]]:
         """Centres in the inner part of the region where bodies were seen."""

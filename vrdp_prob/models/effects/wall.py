@@ -8,8 +8,10 @@ from jaxtyping import Float
 from torch import Tensor
 
 from vrdp_prob.models.effects.effect import Effect
+from vrdp_prob.models.effects.places import Region
 from vrdp_prob.models.parameters import Parameter, Prior, Transform, restitution_parameter
 from vrdp_prob.models.simulator.obstacle import Obstacle
+from vrdp_prob.scene import Tracks
 
 HALF_LENGTH = 20.0
 """Half the length of the wall in m: it ends nowhere that a body gets to."""
@@ -32,6 +34,9 @@ WALL_DIRECTION = Parameter(
 )
 HIDDEN_WALL_RESTITUTION = restitution_parameter("hidden_wall_restitution", "restitution factor of the wall")
 
+REACH = 1.5
+"""Standard deviation of its distance from the middle of the region where bodies were seen, in half widths of that."""
+
 
 class Wall(Effect):
     """A fixed straight wall that bodies bounce off."""
@@ -44,6 +49,10 @@ class Wall(Effect):
     )
     source: ClassVar = "contact with a body of infinite mass"
     parameters: ClassVar = (WALL_DISTANCE, WALL_DIRECTION, HIDDEN_WALL_RESTITUTION)
+
+    def expected(self, videos: Sequence[Tracks]) -> Mapping[str, Parameter]:
+        """The wall is somewhere in or around the region where bodies were seen."""
+        return Region.of(videos).expected_distance(WALL_DISTANCE, REACH)
 
     def obstacles(self, parameters: Mapping[str, Float[Tensor, "..."]]) -> Sequence[Obstacle]:
         """The wall."""

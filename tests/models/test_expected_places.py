@@ -1,0 +1,58 @@
+"""Where and when effects are expected, by where and when bodies were seen."""
+
+import numpy as np
+import pytest
+
+from vrdp_prob.models.effects.bowl import Bowl
+from vrdp_prob.models.effects.effect import Effect
+from vrdp_prob.models.effects.external_impulse import ExternalImpulse
+from vrdp_prob.models.effects.surface_tilt import SurfaceTilt
+from vrdp_prob.models.effects.wall import Wall
+from vrdp_prob.models.model_file import known_effects
+from vrdp_prob.models.physics import PhysicsModel
+from vrdp_prob.scene import Body, Shape, Tracks
+
+LOOKED_FOR = [effect() for effect in known_effects().values() if effect.overrides("expected")]
+
+
+def seen(middle: tuple[float, float] = (0.0, 0.0), *, begin: float = 0.0, half_width: float = 1.5) -> Tracks:
+    """A body that crosses a square along its diagonal in 4 s."""
+    times = begin + np.linspace(0.0, 4.0, 21)
+    path = np.asarray(middle) + half_width * np.linspace(-1.0, 1.0, 21)[:, None]
+    return Tracks.from_arrays("one", (Body("a", Shape.CYLINDER, 0.1),), times, path[:, None])
+
+
+@pytest.mark.parametrize("effect", LOOKED_FOR, ids=lambda effect: effect.name)
+def test_a_small_scene_around_the_origin_changes_little(effect: Effect) -> None:
+    stated = {parameter.name: parameter for parameter in effect.parameters}
+    for name, parameter in effect.expected([seen(half_width=0.5)]).items():
+        assert parameter.prior.mean == pytest.approx(stated[name].prior.mean, abs=0.5 * stated[name].prior.sd)
+        assert parameter.prior.sd == pytest.approx(stated[name].prior.sd)
+
+
+def test_a_place_moves_with_the_scene_and_is_as_wide_as_it() -> None:
+    expected = Bowl().expected([seen((6.0, -3.0), half_width=8.0)])
+    assert (expected["bowl_x"].prior.mean, expected["bowl_y"].prior.mean) == pytest.approx((6.0, -3.0))
+    assert (expected["bowl_x"].default, expected["bowl_y"].default) == pytest.approx((6.0, -3.0))
+    assert expected["bowl_x"].prior.sd == pytest.approx(4.0)
+    assert "bowl_stiffness" not in expected
+
+
+def test_a_wall_may_be_where_the_scene_is() -> None:
+    distance = Wall().expected([seen((30.0, 40.0))])["hidden_wall_distance"].prior
+    assert abs(50.0 - distance.mean) < 1.5 * distance.sd
+
+
+def test_a_kick_happens_while_bodies_are_seen() -> None:
+    time = ExternalImpulse().expected([seen(begin=1000.0), seen(begin=1020.0)])["impulse_time"].prior
+    assert time.mean == pytest.approx(1012.0)
+    assert abs(1000.0 - time.mean) < 2 * time.sd
+
+
+def test_a_model_believes_it_and_forgets_it_with_the_effect() -> None:
+    bowl, videos = Bowl(), [seen((6.0, -3.0))]
+    model = PhysicsModel.base().with_effect(bowl, videos)
+    assert model.believed(bowl.parameters[1]).prior.mean == pytest.approx(6.0)
+    assert PhysicsModel.base().with_effect(bowl).believed(bowl.parameters[1]) == bowl.parameters[1]
+    assert not model.without_effect(bowl).beliefs
+    assert not PhysicsModel.base().with_effect(SurfaceTilt(), videos).beliefs

@@ -87,4 +87,5 @@ def test_a_disc_in_the_place_of_the_kick_explains_the_videos_as_well(kicked: Tri
     assert found
     best = max(found, key=lambda one: float(one.log_density.sum()))
     assert best.names == ("hidden_obstacle",)
+    assert not any(name.startswith("impulse") for one in best.fit.structures for name, _ in one.held)
     assert best.log_density.sum() > kicked.log_density.sum() - 15

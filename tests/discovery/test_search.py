@@ -9,7 +9,9 @@ from vrdp_prob.discovery import refits, search
 from vrdp_prob.discovery.scores import CauseScore
 from vrdp_prob.discovery.trials import Trial
 from vrdp_prob.inference.several_videos.ascent import ImpossibleStartError
+from vrdp_prob.models.effects.bowl import Bowl
 from vrdp_prob.models.effects.external_impulse import ExternalImpulse
+from vrdp_prob.models.effects.lens_distortion import LensDistortion
 from vrdp_prob.models.effects.surface_tilt import SurfaceTilt
 
 
@@ -285,3 +287,36 @@ def test_a_cause_with_which_no_joint_world_can_begin_is_left_out(monkeypatch: py
     trial = _refit("", 0.0)
     trial.choices, trial.names, trial.fit = {}, (), Mock(fits=[])
     assert _refits()._lost(trial, []) == []
+
+
+@pytest.mark.parametrize(
+    ("explains", "is_believed", "taken"),
+    [(9.5, True, "tilt"), (9.5, False, None), (6.0, True, None)],
+    ids=["as much", "as much, and doubted as well", "less"],
+)
+def test_a_rival_takes_the_place_of_a_doubted_cause_where_it_explains_as_much(
+    explains: float, is_believed: bool, taken: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    nothing, bowl, tilt = _refit("", 0.0), _refit("bowl", 10.0), _refit("tilt", explains)
+    nothing.causes, bowl.causes, tilt.causes = (), (Bowl(),), (SurfaceTilt(),)
+    tilt.continued.return_value = tilt
+    monkeypatch.setattr(search._Searcher, "_left_out", lambda _self, _best, _cause: nothing)
+    _judge_by_gain(monkeypatch)
+    monkeypatch.setattr(refits.Refits, "left", lambda _self, _trial: Mock(spec=refits.Left, overdispersion=np.ones(3)))
+    before = search.Search(nothing, bowl, (), (nothing,), ((tilt,),), _refits(needed=2.0))
+    found = before.with_rival(bowl.causes[0], lambda _trial: is_believed)
+    assert (found.best if found else None) is (tilt if taken else None)
+
+
+def test_what_brings_too_little_without_a_doubted_cause_goes_too(monkeypatch: pytest.MonkeyPatch) -> None:
+    nothing, lens, both = _refit("", 0.0), _refit("lens", 0.5), _refit("lens+bowl", 9.0)
+    bowl = Bowl()
+    nothing.causes, lens.causes, both.causes = (), (LensDistortion(),), (LensDistortion(), bowl)
+    both.without.return_value, lens.continued.return_value = lens, lens
+    monkeypatch.setattr(search._Searcher, "_left_out", lambda _self, _best, _cause: nothing)
+    _judge_by_gain(monkeypatch)
+    monkeypatch.setattr(refits.Refits, "left", lambda _self, _trial: Mock(spec=refits.Left, overdispersion=np.ones(3)))
+    base = _refit("", 0.0)
+    found = search.Search(base, both, (), (lens, nothing), ((), ()), _refits(needed=5.0)).without([bowl])
+    assert found.best is base
+    assert found.lesser == ()

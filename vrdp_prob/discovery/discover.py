@@ -91,8 +91,10 @@ def discover(
         reasons: list[Doubt] = []
         while doubted := _doubted(found, after):
             not_named += [one for one in _causes(found, doubted, seed) if not one.named]
-            reasons += [one for some in doubted.values() for one in some]
-            found = found.without(list(doubted))
+            other = next((one for cause in doubted if (one := found.with_rival(cause, _credible)) is not None), None)
+            if other is None:
+                reasons += [one for some in doubted.values() for one in some]
+            found = found.without(list(doubted)) if other is None else other
             after = _checks_after(found, checks, seed)
         verdict = Verdict.UNKNOWN if unlisted is not None or reasons else _verdict(found, checks, after)
         causes = _each_once([*_causes(found, {}, seed), *not_named])
@@ -128,6 +130,11 @@ def _doubted(found: Search, after: Sequence[Check]) -> dict[Effect, tuple[Doubt,
     """The causes of the best model that are doubted, and why."""
     reasons = {cause: tuple(doubts(found.best, cause, after)) for cause in found.best.causes}
     return {cause: some for cause, some in reasons.items() if some}
+
+
+def _credible(trial: Trial) -> bool:
+    """Whether nobody doubts the last cause of a model by its parameters."""
+    return not any(doubts(trial, trial.causes[-1]))
 
 
 def _verdict(found: Search, before: Sequence[Check], after: Sequence[Check]) -> Verdict:

@@ -1,7 +1,8 @@
 """Forward selection of causes by how well whole videos are predicted that the model was not fitted to."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from jaxtyping import Float
@@ -89,18 +90,38 @@ class Search:
         return self.left.overdispersion
 
     def without(self, causes: Sequence[Effect]) -> "Search":
-        """The search with a best model that lacks some of its causes."""
+        """The search with a best model that lacks some of its causes, and those that bring too little without these."""
         if not causes:
             return self
-        left = [cause for cause in self.best.causes if cause not in causes]
-        if not left:
-            return replace(self, best=self.base, lesser=(), rivals=())
+        if len(causes) == len(self.best.causes):
+            return self._with_best(self.base)
         best = self.best
         for cause in causes:
             best = best.without(cause)
-        best = best.continued()
-        lesser = tuple(best.without(cause).continued() for cause in best.causes)
-        return replace(self, best=best, lesser=lesser, rivals=tuple(() for _ in lesser))
+        return self._with_best(best.continued())
+
+    def with_rival(self, cause: Effect, believable: Callable[[Trial], bool]) -> "Search | None":
+        """The search with another cause in the place of one of the best model; None where none explains as much.
+
+        Parameters
+        ----------
+        cause
+            The cause whose place is taken.
+        believable
+            Whether a model with a rival in it is one to go on with.
+        """
+        number = self.best.causes.index(cause)
+        for rival in sorted(self.rivals[number], key=merit, reverse=True):
+            if gain(self.best, rival, self.overdispersion)[0] < self.needed and believable(rival):
+                found = self._with_best(rival.continued())
+                if rival.causes[-1] in found.best.causes:
+                    return found
+        return None
+
+    def _with_best(self, best: Trial) -> "Search":
+        """The search with another best model, as far as its causes are established."""
+        best, lesser = _Searcher(self.refits).established(best)
+        return replace(self, best=best if best.causes else self.base, lesser=lesser, rivals=tuple(() for _ in lesser))
 
 
 def search(
@@ -247,13 +268,9 @@ class _Searcher:
         known = [one for one in chain[-2:-1] if one.causes == best.causes[:-1]]
         lesser = (*self._lesser(best, best.causes[: len(best.causes) - len(known)]), *known)
         divisor = steps[-1].left.overdispersion
-
-        def sure(trial: Trial) -> float:
-            return float((trial.log_density / divisor).sum()) + trial.log_prior
-
+        sure = partial(_sure, divisor=divisor)
         for _ in range(MOST_SWAPS):
-            while lesser and self.doubted(best, weakest := max(lesser, key=sure), divisor):
-                best, lesser = weakest, self._lesser(weakest, weakest.causes)
+            best, lesser = self._pruned(best, lesser, divisor)
             rivals = self._rivals(best, lesser, steps)
             better = max((one for some in rivals for one in some), key=sure, default=best)
             if sure(better) <= sure(best):
@@ -262,6 +279,17 @@ class _Searcher:
             lesser = self._lesser(best, best.causes)
             rivals = self._rivals(best, lesser, steps)
         return best, lesser, rivals
+
+    def established(self, best: Trial) -> tuple[Trial, tuple[Trial, ...]]:
+        """A model without those of its causes that bring too little, and the same without each of the others."""
+        return self._pruned(best, self._lesser(best, best.causes), self.refits.left(best).overdispersion)
+
+    def _pruned(
+        self, best: Trial, lesser: tuple[Trial, ...], divisor: Float[np.ndarray, "video"]
+    ) -> tuple[Trial, tuple[Trial, ...]]:
+        while lesser and self.doubted(best, weakest := max(lesser, key=partial(_sure, divisor=divisor)), divisor):
+            best, lesser = weakest, self._lesser(weakest, weakest.causes)
+        return best, lesser
 
     def unpatched(self, best: Trial) -> Trial:
         """A model without those of its causes that patch several videos and explain few of them."""
@@ -296,3 +324,8 @@ class _Searcher:
                 others = self.refits.made_of(without, again)
             found.append(tuple(one for one in others if not one.patches(one.causes[-1])))
         return tuple(found)
+
+
+def _sure(trial: Trial, divisor: Float[np.ndarray, "video"]) -> float:
+    """How probable (nats) a model is, where gains of videos are divided."""
+    return float((trial.log_density / divisor).sum()) + trial.log_prior

@@ -132,7 +132,14 @@ class Trial:
         left = self.fit.model.without_effect(last).with_effect(score.effect, self.fit.tracks)
         choices = {name: one for name, one in self.choices.items() if name != last.name}
         try:
-            fit = self.fit.under(left, start=score.start, least=least, rounds=FIRST_ROUNDS, model_error=False)
+            fit = self.fit.under(
+                left,
+                start=score.start,
+                held=self._held_without(last),
+                least=least,
+                rounds=FIRST_ROUNDS,
+                model_error=False,
+            )
         except ImpossibleStartError:
             return None
         return replace(self, causes=(*self.causes[:-1], score.effect), fit=fit, choices=choices)
@@ -221,11 +228,14 @@ class Trial:
         """The fit without one of its causes."""
         left = self._with_stated_population(self.fit.model.without_effect(cause))
         choices = {name: one for name, one in self.choices.items() if name != cause.name}
-        gone = {parameter.name for parameter in cause.parameters}
-        held = [{key: one.held[key] for key in one.held if key[0] not in gone} for one in self.fit.structures]
-        fit = self.fit.under(left, held=held, rounds=FIRST_ROUNDS, model_error=False)
+        fit = self.fit.under(left, held=self._held_without(cause), rounds=FIRST_ROUNDS, model_error=False)
         causes = tuple(one for one in self.causes if one is not cause)
         return replace(self, causes=causes, fit=with_own_population(fit), choices=choices)
+
+    def _held_without(self, cause: Effect) -> list[dict[Owned, float | None]]:
+        """Numbers of each video that are held, but those of a cause."""
+        gone = {parameter.name for parameter in cause.parameters}
+        return [{key: one.held[key] for key in one.held if key[0] not in gone} for one in self.fit.structures]
 
     def _with_stated_population(self, model: PhysicsModel) -> PhysicsModel:
         """A model in which bodies may be what they may before anything is learned.

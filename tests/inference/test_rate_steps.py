@@ -6,11 +6,16 @@ velocities. What the tracks tell are the sums of friction and drag, and velociti
 
 import numpy as np
 import pytest
+import torch
 from jaxtyping import Float
 from numpy.random import RandomState
 
+from vrdp_prob.inference.curved_gaussian import CurvedGaussian
+from vrdp_prob.inference.laplace import sample_laplace
+from vrdp_prob.inference.mixture import Mixture
 from vrdp_prob.inference.mode import Mode
 from vrdp_prob.inference.rate_steps import RateSteps
+from vrdp_prob.inference.samples import Gaussian
 from vrdp_prob.inference.straightening import Rates
 
 DIRECTIONS = np.array([[1, 1, 0, 0, 0, 0], [1, 0, 1, 0, 0, 0], [0, 0, 0, 1, 0, 0]], dtype=float)
@@ -45,6 +50,19 @@ def steps() -> RateSteps:
     return found
 
 
+@pytest.fixture(scope="module")
+def weighted_drags() -> tuple[Float[np.ndarray, "draw"], Float[np.ndarray, "draw"]]:
+    """Draws of the logarithm of the drag from the prior, and their weights."""
+    random = RandomState(1)
+    drawn = PRIOR_SD * random.standard_normal((4_000_000, 6))
+    drawn[:, 4:] = LAG * np.exp(drawn[:, 3:4]) + VELOCITY_SD * random.standard_normal((len(drawn), 2))
+    correction = log_density(drawn) + (drawn[:, :4] ** 2 / (2 * PRIOR_SD[:4] ** 2)).sum(axis=1)
+    correction += ((drawn[:, 4:] - LAG * np.exp(drawn[:, 3:4])) ** 2).sum(axis=1) / (2 * VELOCITY_SD**2)
+    weights = np.exp(correction - correction.max())
+    weights /= weights.sum()
+    return drawn[:, 3], weights
+
+
 def test_without_rates_there_are_no_steps() -> None:
     rates = Rates(np.zeros((0, 2)), np.zeros(0, dtype=int), np.zeros(2), np.ones(2))
     assert RateSteps.of(Mode(np.zeros(2), np.eye(2), 0.0), rates) is None
@@ -75,7 +93,9 @@ def test_a_step_keeps_what_the_tracks_tell(steps: RateSteps) -> None:
     assert np.median(np.abs(moved[possible][traded][:, 4:] - LAG * rates[traded, 2:]), axis=0).max() < VELOCITY_SD
 
 
-def test_a_chain_of_such_steps_draws_what_it_should(steps: RateSteps) -> None:
+def test_a_chain_of_such_steps_draws_what_it_should(
+    steps: RateSteps, weighted_drags: tuple[np.ndarray, np.ndarray]
+) -> None:
     """Steps and small Gaussian ones; against weighted draws of the prior, in units of both errors."""
     random = RandomState(1)
     places = np.tile([0.0, 0.0, 0.0, 0.0, LAG, LAG], (500, 1))
@@ -89,16 +109,34 @@ def test_a_chain_of_such_steps_draws_what_it_should(steps: RateSteps) -> None:
         places, values = np.where(taken[:, None], moved, places), np.where(taken, there, values)
         if number >= 100:
             kept.append(places[:, 3])
-    drawn = PRIOR_SD * random.standard_normal((4_000_000, 6))
-    drawn[:, 4:] = LAG * np.exp(drawn[:, 3:4]) + VELOCITY_SD * random.standard_normal((len(drawn), 2))
-    correction = log_density(drawn) + (drawn[:, :4] ** 2 / (2 * PRIOR_SD[:4] ** 2)).sum(axis=1)
-    correction += ((drawn[:, 4:] - LAG * np.exp(drawn[:, 3:4])) ** 2).sum(axis=1) / (2 * VELOCITY_SD**2)
-    weights = np.exp(correction - correction.max())
-    weights /= weights.sum()
+    drags, weights = weighted_drags
     draws = np.array(kept)
     for function in (lambda x: x, lambda x: (x < -1.0).astype(float), lambda x: x**2):
-        mean, of_walkers = float(weights @ function(drawn[:, 3])), function(draws).mean(axis=0)
-        error = np.sqrt((weights**2) @ (function(drawn[:, 3]) - mean) ** 2)
+        mean, of_walkers = float(weights @ function(drags)), function(draws).mean(axis=0)
+        error = np.sqrt((weights**2) @ (function(drags) - mean) ** 2)
         chain_error = of_walkers.std(ddof=1) / np.sqrt(len(of_walkers))
         assert chain_error < 0.05
         assert abs(of_walkers.mean() - mean) < 4 * np.hypot(error, chain_error)
+
+
+@pytest.mark.parametrize("trading", [True, False])
+def test_fast_draws_reach_the_end_of_the_ridge_by_such_steps(
+    steps: RateSteps, weighted_drags: tuple[np.ndarray, np.ndarray], *, trading: bool
+) -> None:
+    point = np.array([0.0, 0.0, 0.0, 0.0, LAG, LAG])
+    start = Mixture.of(CurvedGaussian.straight(Gaussian.from_precision(point, precision_at(point))))
+    generator, count = np.random.default_rng(3), 4000
+    samples = sample_laplace(
+        lambda points: torch.from_numpy(log_density(points.detach().numpy())),
+        start,
+        draws=count,
+        generator=generator,
+        rate_steps=steps if trading else None,
+        hand_on=False,
+    )
+    drags, weights = weighted_drags
+    share = float(weights @ (drags < -2.0))
+    error = np.sqrt((weights**2) @ ((drags < -2.0) - share) ** 2 + share / count)
+    found = float((samples.points[0, :, 3] < -2.0).mean())
+    assert bool(abs(found - share) < 4 * error) is trading
+    np.testing.assert_allclose(samples.log_density[0], log_density(samples.points[0]))

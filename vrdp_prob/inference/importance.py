@@ -47,19 +47,7 @@ class Weighted:
     ) -> "Weighted":
         """So many points of a mixture."""
         points, _ = proposal.draws(count, generator)
-
-        def evaluated(begin: int) -> tuple[Float[np.ndarray, "point"], int]:
-            with metered() as meter:  # the meter of the calling thread is not that of this one
-                values = evaluate(density, points[begin : begin + BATCH])
-            return values, meter.rows
-
-        found = []
-        with ThreadPoolExecutor(min(THREADS, os.cpu_count() or 1)) as threads:
-            for values, rows in threads.map(evaluated, range(0, count, BATCH)):
-                record_work(rows)
-                advance(len(values))
-                found.append(values)
-        log_density = np.concatenate(found)
+        log_density = evaluated_in_batches(density, points, advance)
         return cls(points, log_density, log_density - proposal.log_density(points))
 
     def joined(self, other: "Weighted") -> "Weighted":
@@ -69,6 +57,25 @@ class Weighted:
             np.concatenate([self.log_density, other.log_density]),
             np.concatenate([self.log_ratio, other.log_ratio]),
         )
+
+
+def evaluated_in_batches(
+    density: LogDensity, points: Float[np.ndarray, "point dimension"], advance: Advance
+) -> Float[np.ndarray, "point"]:
+    """Log density of many points, batches of them side by side."""
+
+    def evaluated(begin: int) -> tuple[Float[np.ndarray, "point"], int]:
+        with metered() as meter:  # the meter of the calling thread is not that of this one
+            values = evaluate(density, points[begin : begin + BATCH])
+        return values, meter.rows
+
+    found = []
+    with ThreadPoolExecutor(min(THREADS, os.cpu_count() or 1)) as threads:
+        for values, rows in threads.map(evaluated, range(0, len(points), BATCH)):
+            record_work(rows)
+            advance(len(values))
+            found.append(values)
+    return np.concatenate(found)
 
 
 def smoothed_weights(log_ratio: Float[np.ndarray, "draw"]) -> tuple[Float[np.ndarray, "draw"], float]:

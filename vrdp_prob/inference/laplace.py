@@ -1,23 +1,35 @@
 """The fast way: draws from curved clouds around the modes, corrected by Pareto-smoothed importance sampling.
 
+Clouds do not follow the ridge along which friction and drag trade for each other to its ends, and a tail that no draw
+has hit leaves no trace in the weights. So every resampled draw then takes some Metropolis steps along that ridge
+(resample-move; Gilks and Berzuini, Following a moving target, J. Royal Statistical Society B 63, 2001).
+
 Where the weights cannot be trusted it says so and hands on to emcee, which sets out from what it has learned.
 """
 
 from dataclasses import replace
 
 import numpy as np
+from jaxtyping import Float
 
 from vrdp_prob.inference.checkpoint import Checkpoint
 from vrdp_prob.inference.diagnostics import Reported, weighted_statistics
 from vrdp_prob.inference.emcee_sampler import sample_emcee
-from vrdp_prob.inference.importance import Weighted, effective_count, flattened, resampled, smoothed_weights
+from vrdp_prob.inference.importance import (
+    Weighted,
+    effective_count,
+    evaluated_in_batches,
+    flattened,
+    resampled,
+    smoothed_weights,
+)
 from vrdp_prob.inference.mixture import Jumps, Mixture
 from vrdp_prob.inference.mode_weights import doubts, weights_from_importance
 from vrdp_prob.inference.rate_steps import RateSteps
 from vrdp_prob.inference.samples import ESS_GOAL, PARETO_K_GOAL, LogDensity, Samples
 from vrdp_prob.inference.shaping import shaped
 from vrdp_prob.models.simulator.work import metered
-from vrdp_prob.progress import ProgressDisplay, SilentProgress
+from vrdp_prob.progress import Advance, ProgressDisplay, SilentProgress
 
 ROUND = 4000
 """Proposals after which it is seen whether there are enough."""
@@ -32,6 +44,8 @@ FEWEST = 100.0
 least spread."""
 FAR = 0.7
 """Share of the proposals that jumps make, where there are any."""
+TRADES = 30
+"""Steps of each draw along the ridge of friction and drag."""
 MARGIN = 1.1
 """Effective draws beyond the goal at which it stops, so that resampling does not fall short of it."""
 
@@ -70,7 +84,7 @@ def sample_laplace(
     jumps
         Proposals that reach what lies beyond the clouds, if anything does.
     rate_steps
-        Steps that trade rates of slowing down, for emcee, if it comes to that.
+        Steps that trade rates of slowing down, which the draws take in the end, and emcee, if it comes to that.
     hand_on
         Whether emcee goes on where the weights cannot be trusted. If not, the draws are handed back as they are, and
         their Pareto k says that they are not to be trusted.
@@ -123,15 +137,42 @@ def sample_laplace(
     if effective_count(weights) < FEWEST:
         weights = flattened(drawn.log_ratio, FEWEST)
     chosen = resampled(weights, draws, generator)
+    points, log_density, trades = drawn.points[chosen], drawn.log_density[chosen], 0
+    with metered() as trading:
+        if rate_steps is not None:
+            trades = TRADES * draws
+            with (progress or SilentProgress()).stage("Trading friction for drag", total=trades) as advance:
+                points, log_density = _traded(
+                    density, rate_steps, points, log_density, generator=generator, advance=advance
+                )
     return Samples(
-        drawn.points[chosen][None],
-        drawn.log_density[chosen][None],
+        points[None],
+        log_density[None],
         {"log_weight": np.log(np.maximum(weights[chosen], 1e-300))[None]},
         pareto_k=pareto_k,
         known=known,
-        evaluations=len(drawn.log_ratio) + form.evaluations,
+        evaluations=len(drawn.log_ratio) + form.evaluations + trades,
         gradients=form.gradients,
-        work=meter.rows,
+        work=meter.rows + trading.rows,
         modes=modes,
         doubts=doubts(modes),
     )
+
+
+def _traded(
+    density: LogDensity,
+    rate_steps: RateSteps,
+    points: Float[np.ndarray, "draw dimension"],
+    log_density: Float[np.ndarray, "draw"],
+    *,
+    generator: np.random.Generator,
+    advance: Advance,
+) -> tuple[Float[np.ndarray, "draw dimension"], Float[np.ndarray, "draw"]]:
+    """Draws after some steps of each that trade rates of slowing down, with their log densities."""
+    for _ in range(TRADES):
+        moved, volume = rate_steps.moved(points, generator)
+        value = evaluated_in_batches(density, moved, advance)
+        taken = np.log(generator.random(len(points))) < value + volume - log_density
+        points = np.where(taken[:, None], moved, points)
+        log_density = np.where(taken, value, log_density)
+    return points, log_density

@@ -39,6 +39,7 @@ def test_a_push_that_no_model_knows_shows_among_outliers() -> None:
     pushed = Tracks.from_arrays("pushed", tracks.bodies, tracks.times, positions)
     fit = fitted(with_outliers(pushed, 0.05))
     assert fit.misfit.outliers
+    assert "Gaussian and larger there" in fit.misfit.sentences[-1]
     assert not fit.misfit.fits
     assert fit.misfit.error_acceleration is not None
 
@@ -56,6 +57,17 @@ def test_a_small_push_is_told_whether_or_not_the_noise_is_stated(stated: bool) -
     assert not misfit.fits
     assert f"{misfit.ratio:.2f} times the measurement noise, and smoothly" in misfit.sentences[0]
     assert ("Errors of measurement that are alike" in misfit.sentences[0]) is stated
+
+
+def test_student_t_noise_that_gives_way_to_an_unknown_acceleration_is_told() -> None:
+    tracks = observe(chain(), noise=0.02, seed=4)
+    positions = tracks.positions.copy()
+    positions[:, 0, 1] += 0.01 * np.maximum(tracks.times - 1.5, 0.0) ** 2
+    fit = fitted(Tracks.from_arrays("pushed", tracks.bodies, tracks.times, positions), NoiseFamily.STUDENT_T)
+    assert fit.likelihood.model_error is not None
+    assert fit.likelihood.noise is NoiseFamily.GAUSSIAN
+    assert not fit.misfit.outliers
+    assert "not Student-t as was asked for" in fit.misfit.sentences[-1]
 
 
 @pytest.mark.parametrize(

@@ -43,7 +43,7 @@ class Misfit:
     outliers
         Number of positions that lie far off those before and after.
     outliers_count
-        Whether they count in full, since Gaussian noise was asked for.
+        Whether they count in full, since the noise is not Student-t.
     error_acceleration, error_duration
         Size (m/s^2) and duration (s) of the unknown acceleration that the intervals allow for; None where none is
         needed.
@@ -89,10 +89,15 @@ class Misfit:
             if self.outliers_count:
                 taken = "Gaussian, as was asked for, so that they count in full"
             elif self.error_acceleration is not None:
-                taken = "larger there, which discounts them"
+                taken = "Gaussian and larger there, which discounts them"
             else:
                 taken = "Student-t, which discounts them"
             found += (f"{positions} far off those before and after; the noise is taken as {taken}.",)
+        elif self.error_acceleration is not None and not self.outliers_count:
+            found += (
+                "Beside an unknown acceleration the noise is taken as Gaussian, not Student-t as was asked for; only "
+                "what lies far off its neighbours is discounted.",
+            )
         return found
 
     def with_error(self, error: ModelError, reference: float) -> "Misfit":

@@ -22,9 +22,16 @@ import torch
 
 from tests.inference.map_comparison import compare
 from tests.inference.random_scenes import random_truth
-from vrdp_prob.inference import default_model
-from vrdp_prob.inference.map_fit import fit_map
-from vrdp_prob.inference.plan import ALL_AT_ONCE, CURRICULUM, FREE_FIRST, GROWING, FitPlan, Optimiser
+from vrdp_prob.inference import (
+    ALL_AT_ONCE,
+    CURRICULUM,
+    FREE_FIRST,
+    GROWING,
+    FitPlan,
+    Optimiser,
+    default_model,
+    fit_map,
+)
 from vrdp_prob.workers import local_workers
 
 PLANS = {

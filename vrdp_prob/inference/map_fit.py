@@ -171,6 +171,7 @@ def fit_map(
             found,
             lambda starts: _refined(likelihood, starts, likelihood, stages),
             lambda one: judge(likelihood, one.point, clues).ratio < LIKE_NOISE,
+            optimiser=stages.optimiser,
         )
         # A model error may explain what another yaw explains, too; so both are candidates under one.
         found = turned.found

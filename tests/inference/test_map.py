@@ -21,8 +21,9 @@ from vrdp_prob.inference.modes import structure_at, with_all_that_meet
 from vrdp_prob.inference.plan import CURRICULUM, GROWING, FitPlan, Optimiser
 from vrdp_prob.inference.refinement import Refined, at_the_top, climb
 from vrdp_prob.models.likelihood import Likelihood
+from vrdp_prob.models.model_error import ModelError
 from vrdp_prob.models.simulator.events import RolloutEventKind
-from vrdp_prob.models.unknowns import Structure, unknowns
+from vrdp_prob.models.unknowns import Structure, structure_of, unknowns
 
 SCENES, GOAL = 300, 0.99
 TOLERANCE = 3 * np.sqrt(GOAL * (1 - GOAL) / SCENES)
@@ -50,6 +51,23 @@ def test_the_map_is_as_probable_as_the_truth(seed: int) -> None:
     assert fit.converged
     assert fit.search.done
     assert list(fit.modes) == sorted(fit.modes, key=lambda mode: -mode.log_density)
+
+
+def test_a_wrong_fit_is_not_forgiven_for_its_model_error() -> None:
+    fit, comparison = fitted(4)
+    likelihood, observations = fit.likelihood, fit.likelihood.observations
+    ones, angles = np.ones(len(observations.frame)), np.ones(len(observations.angle))
+    error = ModelError(1.0, 1.0, 1e4, 0.0, 0.3, ones, angles)  # explains any motion
+    structure = structure_of(likelihood.coordinates)
+    coordinates = unknowns(likelihood.tracks, likelihood.model, structure, model_error=error)
+    for shift, right in ((0.0, True), (0.1, False)):
+        point = likelihood.coordinates.carried(fit.point, coordinates)
+        point[coordinates.places["x", 0]] += shift
+        mode = replace(fit.modes[0], point=point, precision=np.eye(len(point)))
+        forgiving = replace(likelihood, coordinates=coordinates, model_error=error)
+        judged = compare(random_truth(4), replace(fit, likelihood=forgiving, modes=(mode,)))
+        assert judged.true == pytest.approx(comparison.true)
+        assert judged.succeeded is right
 
 
 def test_alternatives_find_a_contact_that_one_start_misses() -> None:

@@ -84,7 +84,7 @@ def infer(
     seed
         Seed of all randomness: the same seed gives the same posterior.
     draws
-        Number of draws to keep.
+        Number of draws to keep, evenly spaced among all that were made; `convergence` judges these.
     progress
         Told how far the work is.
     noise

@@ -3,7 +3,8 @@
 The fit's vector lacks what it took for unimportant (the velocity of a body at rest, mass and restitution of a body that
 meets nobody); these take the prior's mean, which is their default. In the truth, too, matter and yaw of bodies that
 meet nobody in either world take it: they say nothing about the tracks, and their true values would only cost the truth
-probability and make the comparison easy.
+probability and make the comparison easy. A model error that the fit found is left out of that likelihood, since it
+would forgive a wrong fit; the noise is then the most probable one for the fit's world.
 """
 
 from dataclasses import dataclass, replace
@@ -14,6 +15,7 @@ import torch
 from tests.inference.random_scenes import Truth
 from vrdp_prob.inference.events import first_contacts
 from vrdp_prob.inference.map_fit import MapFit
+from vrdp_prob.inference.noise_fit import best_noise
 from vrdp_prob.models.likelihood import Likelihood
 from vrdp_prob.models.unknowns import Structure, unknowns
 from vrdp_prob.scene import Shape
@@ -61,6 +63,8 @@ def compare(truth: Truth, fit: MapFit) -> Comparison:
     """Compare a fit with the truth."""
     everything = full_likelihood(fit)
     lifted, true = lift(fit, everything), truth.point(everything)
+    if fit.likelihood.model_error is not None:
+        lifted = best_noise(everything, lifted)
     meeting = {body for point in (lifted, true) for pair in _pairs(everything, point) for body in pair}
     alone = set(range(len(truth.tracks.bodies))) - meeting
     unimportant = everything.coordinates.mask(MATTER, alone)
@@ -73,12 +77,11 @@ def compare(truth: Truth, fit: MapFit) -> Comparison:
 
 
 def full_likelihood(fit: MapFit) -> Likelihood:
-    """The fit's likelihood with the motion and the matter of every body among the unknowns."""
+    """The fit's likelihood with the motion and the matter of every body among the unknowns, without a model error."""
     bodies = frozenset(range(len(fit.likelihood.tracks.bodies)))
     fitted = fit.likelihood
-    structure = Structure(bodies, bodies)
-    coordinates = unknowns(fitted.tracks, fitted.model, structure, fitted.noise, model_error=fitted.model_error)
-    return replace(fitted, coordinates=coordinates)
+    coordinates = unknowns(fitted.tracks, fitted.model, Structure(bodies, bodies), fitted.noise)
+    return replace(fitted, coordinates=coordinates, model_error=None)
 
 
 def lift(fit: MapFit, everything: Likelihood) -> np.ndarray:

@@ -14,8 +14,9 @@ from tests.inference.densities import TwoModes
 from vrdp_prob.errors import InputError
 from vrdp_prob.inference.checkpoint import Checkpoint, fingerprint
 from vrdp_prob.inference.emcee_sampler import sample_emcee
-from vrdp_prob.inference.infer import default_model
+from vrdp_prob.inference.infer import default_model, infer
 from vrdp_prob.inference.nuts_sampler import sample_nuts
+from vrdp_prob.inference.plan import CURRICULUM
 from vrdp_prob.inference.samples import Samples
 from vrdp_prob.scene import Body, Shape, Tracks
 
@@ -107,6 +108,15 @@ def test_another_run_is_refused_by_name_of_what_differs(tmp_path: Path) -> None:
     Checkpoint(tmp_path, {"seed": "1", "draws": "400"}).keep("part", {"a": np.ones(2)})
     with pytest.raises(InputError, match=r"belongs to another run \(other draws, sampler\)"):
         Checkpoint(tmp_path, {"seed": "1", "draws": "500", "sampler": "nuts"})
+
+
+def test_a_checkpoint_belongs_to_its_plan(tmp_path: Path) -> None:
+    bodies, still = (Body("a", Shape.SPHERE, 0.2),), np.zeros((30, 1, 2))
+    tracks = Tracks.from_arrays("still", bodies, np.arange(30.0), still)
+    with pytest.raises(InputError, match="no object moves"):  # after the folder was claimed
+        infer(tracks, checkpoint=tmp_path)
+    with pytest.raises(InputError, match=r"belongs to another run \(other plan\)"):
+        infer(tracks, checkpoint=tmp_path, plan=CURRICULUM)
 
 
 def test_a_fingerprint_changes_with_one_measured_number() -> None:

@@ -3,6 +3,7 @@ from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
+import h5py
 import numpy as np
 import pytest
 import torch
@@ -10,7 +11,8 @@ import xarray as xr
 
 from tests.inference.generator import Scene, observe
 from vrdp_prob.errors import InputError
-from vrdp_prob.inference import BodyStatus, ParameterStatus, Posterior, Status, infer
+from vrdp_prob.inference import BodyStatus, ParameterStatus, Posterior, Status, default_model, infer
+from vrdp_prob.models.parameters import RESTITUTION
 from vrdp_prob.models.simulator.rollout import simulate
 from vrdp_prob.scene import Shape, Tracks
 
@@ -126,6 +128,15 @@ def test_files_that_are_no_posterior_are_refused(tmp_path: Path) -> None:
         Posterior.read(path)
 
 
+def test_files_of_another_format_are_refused(tmp_path: Path) -> None:
+    path = tmp_path / "posterior.nc"
+    chain_posterior()[1].write(path)
+    with h5py.File(path, "a") as file:
+        file.attrs["format"] = 1
+    with pytest.raises(InputError, match=r"posterior.nc: the posterior is of file format 1, this program reads 2; run"):
+        Posterior.read(path)
+
+
 def test_a_body_without_a_radius_is_told_to_meet_nothing() -> None:
     tracks = observe(chain(), frames=30)
     bodies = (*tracks.bodies[:-1], replace(tracks.bodies[-1], radius=None))
@@ -235,6 +246,17 @@ def test_defaults_can_be_drawn_from_the_prior() -> None:
     np.testing.assert_array_equal(posterior.data["posterior"]["mass"][..., :3], kept.data["posterior"]["mass"][..., :3])
     assert any("drawn from the prior" in text for text in posterior.warnings)
     assert posterior.status["3"].is_default
+
+
+def test_restitutions_drawn_from_the_prior_give_no_energy() -> None:
+    soft = replace(RESTITUTION, prior=replace(RESTITUTION.prior, softness=0.3))
+    model = replace(default_model(), beliefs={RESTITUTION.name: soft})
+    tracks = observe(chain(), noise=0.01, frames=30, seed=4)
+    posterior = infer(tracks, model=model, sampler="laplace", draws=50, defaults="prior", hand_on=False)
+    drawn = posterior.data["posterior"]["restitution"].sel(body="3").values
+    assert posterior.status["3"].is_default
+    assert np.ptp(drawn) > 0.1
+    assert drawn.max() <= 1
 
 
 def test_a_posterior_given_the_motion_is_narrower_and_keeps_the_motion() -> None:

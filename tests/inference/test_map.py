@@ -10,7 +10,7 @@ import torch
 from tests.inference.generator import states
 from tests.inference.map_comparison import Comparison, compare
 from tests.inference.prior_scenes import prior_scene
-from tests.inference.random_scenes import Truth, random_truth
+from tests.inference.random_scenes import Truth, collisions_of_each, random_truth
 from vrdp_prob.inference import default_model
 from vrdp_prob.inference.encounters import CROWDED, MANY_PARTNERS, hard_to_explain
 from vrdp_prob.inference.events import courses
@@ -19,9 +19,11 @@ from vrdp_prob.inference.map_fit import MapFit, fit_map
 from vrdp_prob.inference.mode_search import ModeSearch
 from vrdp_prob.inference.modes import structure_at, with_all_that_meet
 from vrdp_prob.inference.plan import CURRICULUM, GROWING, FitPlan, Optimiser
+from vrdp_prob.inference.refinement import Refined, at_the_top, climb
 from vrdp_prob.models.likelihood import Likelihood
+from vrdp_prob.models.model_error import ModelError
 from vrdp_prob.models.simulator.events import RolloutEventKind
-from vrdp_prob.models.unknowns import Structure, unknowns
+from vrdp_prob.models.unknowns import Structure, structure_of, unknowns
 
 SCENES, GOAL = 300, 0.99
 TOLERANCE = 3 * np.sqrt(GOAL * (1 - GOAL) / SCENES)
@@ -49,6 +51,23 @@ def test_the_map_is_as_probable_as_the_truth(seed: int) -> None:
     assert fit.converged
     assert fit.search.done
     assert list(fit.modes) == sorted(fit.modes, key=lambda mode: -mode.log_density)
+
+
+def test_a_wrong_fit_is_not_forgiven_for_its_model_error() -> None:
+    fit, comparison = fitted(4)
+    likelihood, observations = fit.likelihood, fit.likelihood.observations
+    ones, angles = np.ones(len(observations.frame)), np.ones(len(observations.angle))
+    error = ModelError(1.0, 1.0, 1e4, 0.0, 0.3, ones, angles)  # explains any motion
+    structure = structure_of(likelihood.coordinates)
+    coordinates = unknowns(likelihood.tracks, likelihood.model, structure, model_error=error)
+    for shift, right in ((0.0, True), (0.1, False)):
+        point = likelihood.coordinates.carried(fit.point, coordinates)
+        point[coordinates.places["x", 0]] += shift
+        mode = replace(fit.modes[0], point=point, precision=np.eye(len(point)))
+        forgiving = replace(likelihood, coordinates=coordinates, model_error=error)
+        judged = compare(random_truth(4), replace(fit, likelihood=forgiving, modes=(mode,)))
+        assert judged.true == pytest.approx(comparison.true)
+        assert judged.succeeded is right
 
 
 def test_alternatives_find_a_contact_that_one_start_misses() -> None:
@@ -96,6 +115,11 @@ def test_contacts_in_quick_succession_are_hard_to_explain() -> None:
     assert not hard_to_explain([(1.0 + 0.1 * k, 2 * k, 2 * k + 1) for k in range(CROWDED)], long_ago)
 
 
+def test_collisions_of_a_body_are_counted_with_those_of_one_partner() -> None:
+    contacts = [(1.0, 0, 1), (1.05, 0, 1), (1.1, 0, 1), (2.0, 0, 1), (3.0, 1, 2)]
+    assert collisions_of_each(contacts, 4) == [2, 3, 1, 0]
+
+
 def test_many_partners_of_one_body_are_hard_to_explain() -> None:
     partners = [(1.0 + k, 0, 1 + k) for k in range(MANY_PARTNERS)]
     assert hard_to_explain(partners, np.zeros(8))
@@ -122,6 +146,35 @@ def test_lbfgs_reaches_the_same_maximum_in_stages() -> None:
     staged, comparison = fitted(4, FitPlan(Optimiser.LBFGS, free_first=True, windows=CURRICULUM.windows))
     assert comparison.succeeded
     assert staged.log_density == pytest.approx(fit.log_density, abs=0.5)
+
+
+@pytest.mark.parametrize(
+    ("refined", "climbed", "converged"),
+    [
+        pytest.param(True, (2.5, False), False, id="least squares stood still, L-BFGS climbed to its limit of steps"),
+        pytest.param(True, (0.0, False), True, id="least squares stood still, L-BFGS found no way up"),
+        pytest.param(False, (0.0, False), False, id="neither ended by itself"),
+        pytest.param(False, (2.5, True), True, id="L-BFGS reached the top"),
+    ],
+)
+def test_a_search_has_converged_where_its_last_part_did(
+    refined: bool, climbed: tuple[float, bool], converged: bool
+) -> None:
+    point, (gain, reached) = np.zeros(2), climbed
+    found = [Refined(point, -7.0, refined, 1), Refined(point, -9.0, True, 1)]
+    tops = [Refined(point, -8.9, True, 1), Refined(point, -7.0 + gain, reached, 1)]
+    assert at_the_top(found, tops) is converged
+
+
+@pytest.mark.parametrize(("iterations", "converged"), [(1, False), (200, True)])
+def test_a_climb_that_ends_at_its_limit_has_not_converged(iterations: int, converged: bool) -> None:
+    fit, _ = fitted(4)
+    start = replace(fit.modes[0], point=fit.point.copy())
+    start.point[fit.likelihood.coordinates.places["x", 0]] += 0.02
+    (value,) = fit.likelihood.log_density(torch.from_numpy(start.point[None])).tolist()
+    climbed = climb(fit.likelihood, replace(start, log_density=value), iterations)
+    assert climbed.log_density > value + 0.1
+    assert climbed.converged is converged
 
 
 def test_a_quarter_turn_of_a_cube_is_no_other_mode() -> None:

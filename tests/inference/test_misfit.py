@@ -10,7 +10,7 @@ from tests.inference.test_infer import chain, with_outliers
 from vrdp_prob.inference import default_model
 from vrdp_prob.inference.clues import Clues
 from vrdp_prob.inference.map_fit import MapFit, fit_map
-from vrdp_prob.inference.misfit import judge, tempered
+from vrdp_prob.inference.misfit import Misfit, judge, tempered
 from vrdp_prob.models.noise import NoiseFamily
 from vrdp_prob.scene import Tracks
 
@@ -39,8 +39,44 @@ def test_a_push_that_no_model_knows_shows_among_outliers() -> None:
     pushed = Tracks.from_arrays("pushed", tracks.bodies, tracks.times, positions)
     fit = fitted(with_outliers(pushed, 0.05))
     assert fit.misfit.outliers
+    assert "Gaussian and larger there" in fit.misfit.sentences[-1]
     assert not fit.misfit.fits
     assert fit.misfit.error_acceleration is not None
+
+
+@pytest.mark.parametrize("stated", [False, True])
+def test_a_small_push_is_told_whether_or_not_the_noise_is_stated(stated: bool) -> None:
+    tracks = observe(chain(), noise=0.02, seed=4)
+    positions = tracks.positions.copy()
+    positions[:, 0, 1] += 0.01 * np.maximum(tracks.times - 1.5, 0.0) ** 2
+    covariance = np.tile(0.02**2 * np.eye(2), (*tracks.seen.shape, 1, 1)) if stated else None
+    pushed = Tracks.from_arrays("pushed", tracks.bodies, tracks.times, positions, position_covariance=covariance)
+    misfit = fitted(pushed).misfit
+    assert misfit.error_acceleration is not None
+    assert not misfit.large
+    assert not misfit.fits
+    assert f"{misfit.ratio:.2f} times the measurement noise, and smoothly" in misfit.sentences[0]
+    assert ("Errors of measurement that are alike" in misfit.sentences[0]) is stated
+
+
+def test_student_t_noise_that_gives_way_to_an_unknown_acceleration_is_told() -> None:
+    tracks = observe(chain(), noise=0.02, seed=4)
+    positions = tracks.positions.copy()
+    positions[:, 0, 1] += 0.01 * np.maximum(tracks.times - 1.5, 0.0) ** 2
+    fit = fitted(Tracks.from_arrays("pushed", tracks.bodies, tracks.times, positions), NoiseFamily.STUDENT_T)
+    assert fit.likelihood.model_error is not None
+    assert fit.likelihood.noise is NoiseFamily.GAUSSIAN
+    assert not fit.misfit.outliers
+    assert "not Student-t as was asked for" in fit.misfit.sentences[-1]
+
+
+@pytest.mark.parametrize(
+    ("residual_sd", "words"),
+    [(0.0104, "no more than measurement noise (0.01 m), but"), (0.012, "0.012 m, 1.20 times the measurement noise,")],
+)
+def test_residuals_that_are_larger_than_the_noise_are_not_said_to_be_within_it(residual_sd: float, words: str) -> None:
+    smooth = Misfit(residual_sd, 0.01, False, 0.3, "0", 0.012, error_acceleration=0.1, error_duration=0.2)
+    assert words in smooth.sentences[0]
 
 
 def test_gaussian_noise_counts_what_stands_out() -> None:

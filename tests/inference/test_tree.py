@@ -17,27 +17,55 @@ from vrdp_prob.inference.map_fit import MapFit, fit_map
 from vrdp_prob.inference.predictive import replicated
 from vrdp_prob.inference.samples import Samples
 from vrdp_prob.inference.tree import PREDICTIVE_DRAWS, posterior_tree
+from vrdp_prob.models.likelihood import Likelihood
 from vrdp_prob.models.model_error import ModelError, straying
 from vrdp_prob.models.noise import NoiseFamily
-from vrdp_prob.models.unknowns import DEGREES_OF_FREEDOM
+from vrdp_prob.models.unknowns import DEGREES_OF_FREEDOM, structure_of, unknowns
 from vrdp_prob.models.unknowns import NOISE as NOISE_SCALE
 
 
 @cache
-def fit() -> MapFit:
-    return fit_map(tracks(), default_model(), np.random.default_rng(0))
+def fit(*, angles: bool = False) -> MapFit:
+    return fit_map(tracks(angles=angles), default_model(), np.random.default_rng(0))
 
 
 def points() -> np.ndarray:
     """Two chains of draws around the best fit."""
-    best = fit().modes[0].point
+    return around(fit())
+
+
+def around(found: MapFit) -> np.ndarray:
+    best = found.modes[0].point
     return best + 0.002 * np.random.default_rng(1).standard_normal((2, 150, len(best)))
 
 
 @cache
 def grouped() -> xr.DataTree:
-    log_density = fit().likelihood.log_density(torch.from_numpy(points().reshape(300, -1))).numpy().reshape(2, 150)
-    return posterior_tree(fit(), Samples(points(), log_density), np.zeros((2, 150)), np.random.default_rng(2))
+    return groups_of(fit())
+
+
+def groups_of(found: MapFit) -> xr.DataTree:
+    draws = around(found)
+    log_density = found.likelihood.log_density(torch.from_numpy(draws.reshape(300, -1))).numpy().reshape(2, 150)
+    return posterior_tree(found, Samples(draws, log_density), np.zeros((2, 150)), np.random.default_rng(2))
+
+
+def with_angles(kind: str) -> MapFit:
+    """A fit to positions and angles, its density that of Gaussian or Student-t noise or of a model error."""
+    found = fit(angles=True)
+    likelihood, (mode, *_) = found.likelihood, found.modes
+    if kind == "gaussian":
+        return found
+    error = None
+    if kind == "model error":
+        count, turns = len(likelihood.observations.frame), len(likelihood.observations.angle)
+        error = ModelError(0.5, 1.2, 20.0, 5.0, 0.5, np.linspace(1, 2, count), np.linspace(1, 3, turns))
+    family = NoiseFamily.GAUSSIAN if error else NoiseFamily.STUDENT_T
+    structure = structure_of(likelihood.coordinates)
+    coordinates = unknowns(likelihood.tracks, likelihood.model, structure, family, error)
+    other = Likelihood(likelihood.tracks, likelihood.model, coordinates, family, error)
+    point = likelihood.coordinates.carried(mode.point, coordinates)
+    return replace(found, likelihood=other, modes=(replace(mode, point=point, precision=np.eye(len(point))),))
 
 
 @cache
@@ -46,8 +74,39 @@ def posterior() -> Posterior:
 
 
 def test_likelihood_and_prior_add_up_to_the_log_density() -> None:
-    groups = grouped()
-    likelihood = groups["log_likelihood"].to_dataset().to_stacked_array("number", ("chain", "draw")).sum("number")
+    check_that_it_adds_up(grouped())
+
+
+@pytest.mark.parametrize("kind", ["gaussian", "student_t", "model error"])
+def test_they_add_up_with_measured_angles(kind: str) -> None:
+    groups = groups_of(with_angles(kind))
+    check_that_it_adds_up(groups)
+    angles = groups["log_likelihood"]["angle"]
+    observations = fit(angles=True).likelihood.observations
+    assert angles.dims == ("chain", "draw", "angle_observation")
+    assert angles["angle_body"].values.tolist() == [str(body) for body in observations.angle_body]
+    assert np.isfinite(angles).all()
+
+
+def test_predicted_angles_scatter_like_the_measured_ones() -> None:
+    found = fit(angles=True)
+    groups = groups_of(found)
+    predicted, observed = groups["posterior_predictive"]["angle"], groups["observed_data"]["angle"]
+    assert predicted.dims == ("chain", "draw", *observed.dims)
+    measured = found.likelihood.observations.angle_bodies
+    unmeasured = [body for body in range(3) if body not in measured]
+    assert np.isnan(predicted.isel(body=unmeasured)).all()
+    chosen = around(found)[:, predicted["draw"].values].reshape(PREDICTIVE_DRAWS, -1)
+    added = predicted.values.reshape(PREDICTIVE_DRAWS, *observed.shape)
+    added = added - found.likelihood.predicted(torch.from_numpy(chosen))[..., 2]
+    scale = float(groups["posterior"]["angle_noise_scale"].mean()) * found.likelihood.observations.angle_reference
+    for body in measured:
+        assert np.nanstd(added[..., body]) == pytest.approx(scale, rel=0.05)
+
+
+def check_that_it_adds_up(groups: xr.DataTree) -> None:
+    terms = groups["log_likelihood"].to_dataset().data_vars.values()
+    likelihood = sum(values.sum(values.dims[2:]) for values in terms)
     prior = groups["log_prior"].to_dataset().to_stacked_array("number", ("chain", "draw")).sum("number")
     difference = (groups["sample_stats"]["lp"] - likelihood - prior).values
     assert np.isfinite(difference).all()

@@ -1,5 +1,7 @@
 """Cubes whose yaw nobody measured: what a contact tells of it, in scenes of the tests' own integrator."""
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 import torch
@@ -7,7 +9,8 @@ import torch
 from tests.inference.prior_scenes import PriorScene, prior_scene
 from tests.inference.scene_ranks import ranks
 from tests.inference.three_bodies import tracks
-from vrdp_prob.inference import default_model, infer
+from vrdp_prob.inference import FitPlan, Optimiser, default_model, growing_fit, infer, map_fit, yaw_search
+from vrdp_prob.inference.descent import Descent
 from vrdp_prob.inference.hypothesis import QUARTER
 from vrdp_prob.inference.importance import Weighted, effective_count, smoothed_weights
 from vrdp_prob.inference.map_fit import MapFit, fit_map
@@ -16,6 +19,7 @@ from vrdp_prob.inference.samples import PARETO_K_GOAL
 from vrdp_prob.inference.straightening import Rates
 from vrdp_prob.inference.yaw_search import turned_worlds, unseen_yaws
 from vrdp_prob.inference.yaw_tiles import yaw_jumps
+from vrdp_prob.models.likelihood import Likelihood
 
 ONE_CUBE = 2689
 """Seed of a scene in which a cylinder hits a turning cube."""
@@ -55,6 +59,23 @@ def test_tiles_lie_on_an_island_far_finer_than_the_lattice() -> None:
     weights, pareto_k = smoothed_weights(drawn.log_ratio)
     assert pareto_k < PARETO_K_GOAL
     assert effective_count(weights) > 200
+
+
+def test_all_stages_of_a_search_take_the_optimiser_of_its_plan(monkeypatch: pytest.MonkeyPatch) -> None:
+    used: list[tuple[str, Optimiser]] = []
+
+    def noted(stage: str) -> Callable[..., Descent]:
+        def descent(likelihood: Likelihood, optimiser: Optimiser) -> Descent:
+            used.append((stage, optimiser))
+            return Descent(likelihood, Optimiser.GAUSS_NEWTON)  # which is faster
+
+        return descent
+
+    stages = (growing_fit, yaw_search, map_fit)
+    for stage in stages:
+        monkeypatch.setattr(stage, "Descent", noted(stage.__name__))
+    fit_map(tracks(), default_model(), np.random.default_rng(0), plan=FitPlan(Optimiser.LBFGS))
+    assert set(used) == {(stage.__name__, Optimiser.LBFGS) for stage in stages}
 
 
 def test_yaws_are_spread_evenly_where_the_cube_is_hit(one_cube: MapFit) -> None:

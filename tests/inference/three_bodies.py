@@ -8,8 +8,8 @@ from vrdp_prob.scene import Shape, Tracks
 NOISE = 0.005
 
 
-def tracks() -> Tracks:
-    """A disc hits a cube; a third body enters late; some positions are missing."""
+def tracks(*, angles: bool = False) -> Tracks:
+    """A disc hits a cube; a third body enters late; some positions are missing; angles are measured if asked for."""
     scene = Scene(
         (Shape.CYLINDER, Shape.CUBE, Shape.SPHERE),
         np.array([[-1.2, 0.0], [-0.2, 0.05], [-1.0, 1.5]]),
@@ -21,4 +21,4 @@ def tracks() -> Tracks:
         angle=np.array([0.0, 0.3, 0.0]),
         release=np.array([0.0, 0.0, 0.4]),
     )
-    return observe(scene, noise=NOISE, dropout=0.1, frames=40, seed=2)
+    return observe(scene, noise=NOISE, dropout=0.1, frames=40, seed=2, angles=angles)

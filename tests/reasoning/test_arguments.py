@@ -35,6 +35,7 @@ EXPECTED = {
     "draws of nan": "draws is nan; give a whole number of at least 4.",
     "seed as a text": "seed is '0'; give a whole number of at least 0.",
     "model as a text": "model is 'base'; give a PhysicsModel, which PhysicsModel.read reads from a file.",
+    "plan as a text": "plan is 'lbfgs'; give a FitPlan of vrdp_prob.inference.",
     "one video together": f"videos are no list of tracks{OF_SEVERAL}",
     "a folder together": f"videos are no list of tracks{OF_SEVERAL}",
     "unknown shape": "object a: shape 'pyramid' is not known; use sphere, cube or cylinder.",

@@ -13,9 +13,9 @@ from vrdp_prob.errors import InputError
 from vrdp_prob.inference import Status
 from vrdp_prob.models.parameters import RESTITUTION
 from vrdp_prob.models.physics import PhysicsModel
+from vrdp_prob.models.unknowns import prior_restitutions
 from vrdp_prob.reasoning import Change, PosteriorWorlds, ask, infer
 from vrdp_prob.reasoning.changes import BUILT_IN
-from vrdp_prob.reasoning.defaults import prior_restitutions
 from vrdp_prob.scene import Shape, Tracks
 
 DRAWS = 30
@@ -161,7 +161,7 @@ def test_restitutions_from_the_prior_give_no_energy() -> None:
     count = 20_000
     plain = np.exp(RESTITUTION.prior.sample(np.random.default_rng(3), (count,)))
     assert (plain > 1).any()
-    drawn = prior_restitutions(PhysicsModel.base(), count, np.random.default_rng(3)).numpy()
+    drawn = prior_restitutions(PhysicsModel.base(), (count,), np.random.default_rng(3))
     assert (drawn <= 1).all()
     assert drawn[plain <= 1] == pytest.approx(plain[plain <= 1])
 

@@ -58,6 +58,7 @@ CALLS: dict[str, Callable[[Path], Any]] = {
     "draws of nan": lambda _: vrdp_prob.infer(TRACKS, draws=float("nan")),  # type: ignore[arg-type]
     "seed as a text": lambda _: vrdp_prob.infer(TRACKS, seed="0"),  # type: ignore[arg-type]
     "model as a text": lambda _: vrdp_prob.infer(TRACKS, model="base"),  # type: ignore[arg-type]
+    "plan as a text": lambda _: vrdp_prob.infer(TRACKS, plan="lbfgs"),  # type: ignore[arg-type]
     "one video together": lambda _: infer_together(TRACKS),
     "a folder together": lambda _: infer_together("folder"),  # type: ignore[arg-type]
     "unknown shape": lambda _: Body("a", "pyramid"),  # type: ignore[arg-type]

@@ -2,6 +2,8 @@
 
 from vrdp_prob.inference.identifiability import BodyStatus, ParameterStatus, Status
 from vrdp_prob.inference.infer import OPTIONS, SAMPLERS, check_options, default_model, infer
+from vrdp_prob.inference.map_fit import MapFit, fit_map
+from vrdp_prob.inference.plan import ALL_AT_ONCE, CURRICULUM, FREE_FIRST, GROWING, FitPlan, Optimiser
 from vrdp_prob.inference.posterior import Posterior
 from vrdp_prob.inference.samples import Convergence
 from vrdp_prob.inference.several_videos import (
@@ -16,11 +18,18 @@ from vrdp_prob.inference.several_videos import (
 from vrdp_prob.inference.summaries import ObjectSummary, PairSummary, ParameterSummary, Summary
 
 __all__ = [
+    "ALL_AT_ONCE",
+    "CURRICULUM",
+    "FREE_FIRST",
+    "GROWING",
     "OPTIONS",
     "SAMPLERS",
     "BodyStatus",
     "Convergence",
+    "FitPlan",
+    "MapFit",
     "ObjectSummary",
+    "Optimiser",
     "PairSummary",
     "ParameterStatus",
     "ParameterSummary",
@@ -32,6 +41,7 @@ __all__ = [
     "Summary",
     "check_options",
     "default_model",
+    "fit_map",
     "fit_together",
     "infer",
     "infer_together",

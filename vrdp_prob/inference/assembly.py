@@ -17,7 +17,7 @@ from vrdp_prob.inference.samples import Convergence, Samples
 from vrdp_prob.inference.tree import posterior_tree
 from vrdp_prob.models.parameters import MASS, RESTITUTION
 from vrdp_prob.models.roughness import untold_noise
-from vrdp_prob.models.unknowns import felt_masses, mass_prior, structure_of
+from vrdp_prob.models.unknowns import felt_masses, mass_prior, prior_restitutions, structure_of
 from vrdp_prob.scene import Tracks
 
 FEWEST_FRAMES = 5
@@ -95,15 +95,12 @@ def _with_drawn_defaults(
 ) -> xr.Dataset:
     """Draws in which what the data say nothing about follows its prior."""
     tracks, model = fit.likelihood.tracks, fit.likelihood.model
-    drawn = draws.copy(deep=True)
+    drawn, shape = draws.copy(deep=True), (draws.sizes["chain"], draws.sizes["draw"])
     for index, body in enumerate(tracks.bodies):
-        for name, prior, one in (
-            (MASS.name, mass_prior(tracks, model), status[body.id].mass),
-            (RESTITUTION.name, model.believed(RESTITUTION).prior, status[body.id].restitution),
-        ):
-            if one.status is Status.DEFAULT:
-                shape = (draws.sizes["chain"], draws.sizes["draw"])
-                drawn[name].values[..., index] = np.exp(prior.sample(generator, shape))
+        if status[body.id].mass.status is Status.DEFAULT:
+            drawn[MASS.name].values[..., index] = np.exp(mass_prior(tracks, model).sample(generator, shape))
+        if status[body.id].restitution.status is Status.DEFAULT:
+            drawn[RESTITUTION.name].values[..., index] = prior_restitutions(model, shape, generator)
     return drawn
 
 

@@ -20,6 +20,7 @@ from vrdp_prob.inference.map_fit import MapFit, fit_map
 from vrdp_prob.inference.mode_weights import UNSURE
 from vrdp_prob.inference.nuts_sampler import sample_nuts
 from vrdp_prob.inference.parallel import linear_algebra_in_one_thread
+from vrdp_prob.inference.plan import FitPlan
 from vrdp_prob.inference.posterior import Posterior
 from vrdp_prob.inference.proposals import proposals, share_left_out
 from vrdp_prob.inference.rate_steps import RateSteps
@@ -67,6 +68,7 @@ def infer(
     motion: str = "sampled",
     checkpoint: Path | str | None = None,
     hand_on: bool = True,
+    plan: FitPlan | None = None,
 ) -> Posterior:
     """Infer masses, restitutions and motion from the tracks of one video.
 
@@ -82,7 +84,7 @@ def infer(
     seed
         Seed of all randomness: the same seed gives the same posterior.
     draws
-        Number of draws to keep.
+        Number of draws to keep, evenly spaced among all that were made; `convergence` judges these.
     progress
         Told how far the work is.
     noise
@@ -99,6 +101,8 @@ def infer(
         arguments goes on from there and ends with the same numbers.
     hand_on
         Whether emcee goes on where `laplace` finds that it cannot be trusted.
+    plan
+        Stages and optimiser of the search for the most probable values; `FitPlan()` where None.
 
     Returns
     -------
@@ -107,8 +111,8 @@ def infer(
     Raises
     ------
     InputError
-        If the tracks or the model are none, the sampler or an option is unknown, fewer than 4 draws are asked for, the
-        seed is negative, no object moves, or the checkpoint belongs to another run.
+        If the tracks, the model or the plan are none, the sampler or an option is unknown, fewer than 4 draws are asked
+        for, the seed is negative, no object moves, or the checkpoint belongs to another run.
     """
     if not isinstance(tracks, Tracks):
         raise InputError(f"tracks is {_given(tracks)}; give the tracks of one video, which vrdp_prob.load reads.")
@@ -116,14 +120,19 @@ def infer(
     check_counts(draws, seed)
     if not isinstance(model, PhysicsModel | None):
         raise InputError(f"model is {_given(model)}; give a PhysicsModel, which PhysicsModel.read reads from a file.")
+    if not isinstance(plan, FitPlan | None):
+        raise InputError(f"plan is {_given(plan)}; give a FitPlan of vrdp_prob.inference.")
     physics = default_model() if model is None else model
+    stages = FitPlan() if plan is None else plan
     kept = None
     if checkpoint is not None:
         settings = {"sampler": sampler, "draws": draws, "noise": noise, "motion": motion, "hand_on": hand_on}
+        settings["plan"] = stages
         kept = Checkpoint(checkpoint, fingerprint(tracks, physics, seed=seed, **settings))
         kept.claim()
     generator = np.random.default_rng(seed)
-    fit = fit_map(tracks, physics, generator, progress, noise=None if noise == "auto" else NoiseFamily(noise))
+    family = None if noise == "auto" else NoiseFamily(noise)
+    fit = fit_map(tracks, physics, generator, progress, noise=family, plan=stages)
     if motion == "fixed":
         fit = fit.given_motion()
     reported = Reported.of(fit.likelihood.coordinates, fit.contacts, tracks.bodies)

@@ -31,7 +31,7 @@ from vrdp_prob.inference.modes import (
     without_idle,
 )
 from vrdp_prob.inference.plan import FitPlan
-from vrdp_prob.inference.refinement import Refined, climb, refine
+from vrdp_prob.inference.refinement import Refined, at_the_top, climb, refine
 from vrdp_prob.inference.yaw_search import with_other_yaws
 from vrdp_prob.models.likelihood import Likelihood
 from vrdp_prob.models.noise import NoiseFamily
@@ -171,6 +171,7 @@ def fit_map(
             found,
             lambda starts: _refined(likelihood, starts, likelihood, stages),
             lambda one: judge(likelihood, one.point, clues).ratio < LIKE_NOISE,
+            optimiser=stages.optimiser,
         )
         # A model error may explain what another yaw explains, too; so both are candidates under one.
         found = turned.found
@@ -199,7 +200,7 @@ def fit_map(
         likelihood = widened
         evaluations += sum(one.evaluations for one in climbed)
     likelihood, modes = without_idle(likelihood, distinct_modes(likelihood, climbed), structure.moving)
-    converged = found[0].converged or max(climbed, key=lambda one: one.log_density).converged
+    converged = at_the_top(found, climbed)
     search = ModeSearch(stages.alternatives, len(attempts), not _in_doubt(attempts))
     return MapFit(likelihood, modes, converged, search, clues, misfit, evaluations, clues.moving - structure.moving)
 

@@ -18,6 +18,8 @@ NEIGHBOURS = 5
 """Residuals in a row whose median says what is usual there."""
 LARGEST_RATIO = 1.5
 """Residuals this much larger than the measurement noise are called a misfit."""
+LIKE_NOISE = 1.05
+"""Residuals in units of the noise up to which they are said to be no larger."""
 
 
 @dataclass(frozen=True)
@@ -41,7 +43,7 @@ class Misfit:
     outliers
         Number of positions that lie far off those before and after.
     outliers_count
-        Whether they count in full, since Gaussian noise was asked for.
+        Whether they count in full, since the noise is not Student-t.
     error_acceleration, error_duration
         Size (m/s^2) and duration (s) of the unknown acceleration that the intervals allow for; None where none is
         needed.
@@ -76,7 +78,7 @@ class Misfit:
     @property
     def fits(self) -> bool:
         """Whether nothing speaks against the model."""
-        return not self.large and (self.noise_stated or self.error_acceleration is None)
+        return not self.large and self.error_acceleration is None
 
     @property
     def sentences(self) -> tuple[str, ...]:
@@ -87,10 +89,15 @@ class Misfit:
             if self.outliers_count:
                 taken = "Gaussian, as was asked for, so that they count in full"
             elif self.error_acceleration is not None:
-                taken = "larger there, which discounts them"
+                taken = "Gaussian and larger there, which discounts them"
             else:
                 taken = "Student-t, which discounts them"
             found += (f"{positions} far off those before and after; the noise is taken as {taken}.",)
+        elif self.error_acceleration is not None and not self.outliers_count:
+            found += (
+                "Beside an unknown acceleration the noise is taken as Gaussian, not Student-t as was asked for; only "
+                "what lies far off its neighbours is discounted.",
+            )
         return found
 
     def with_error(self, error: ModelError, reference: float) -> "Misfit":
@@ -107,11 +114,17 @@ class Misfit:
                 f"{self.correlation:.2f})."
             )
         else:
+            if self.ratio > LIKE_NOISE:
+                off = f"{self.residual_sd:.2g} m, {self.ratio:.2f} times the measurement noise, and smoothly"
+            else:
+                off = f"no more than measurement noise ({self.residual_sd:.2g} m), but smoothly"
             text = (
-                "The model does not quite explain this motion: after the best fit positions are off by no more than "
-                f"measurement noise ({self.residual_sd:.2g} m), but smoothly, as noise would not be (correlation of "
-                f"neighbouring errors {self.correlation:.2f}; most for object {self.worst})."
+                f"The model does not quite explain this motion: after the best fit positions are off by {off}, as "
+                f"noise would not be (correlation of neighbouring errors {self.correlation:.2f}; most for object "
+                f"{self.worst})."
             )
+            if self.noise_stated:
+                text += " Errors of measurement that are alike in neighbouring frames would look the same."
         if self.error_acceleration is not None:
             text += (
                 f" The intervals allow for an unknown acceleration of {self.error_acceleration:.2g} m/s^2 that lasts "

@@ -25,6 +25,8 @@ SAME_PLACE = 0.5
 """Minima whose residuals differ by less (their norm, of unit variance) are one."""
 CLIMBED = 1e-4
 """Gain (nats) of a step of L-BFGS after which the top is reached."""
+NEAR_THE_TOP = 0.1
+"""Nats that all steps of L-BFGS may gain together where they end at their limit, and still have reached the top."""
 
 
 @dataclass(frozen=True)
@@ -121,7 +123,18 @@ def climb(likelihood: Likelihood, start: Mode, iterations: int) -> Refined:
     )
     if not -result.fun > start.log_density:
         return Refined(start.point, start.log_density, False, int(result.nfev))
-    return Refined(gaussian.points(result.x), -float(result.fun), bool(result.success), int(result.nfev))
+    at_limit = result.nit >= iterations
+    converged = bool(result.success) or (at_limit and -result.fun < start.log_density + NEAR_THE_TOP)
+    return Refined(gaussian.points(result.x), -float(result.fun), converged, int(result.nfev))
+
+
+def at_the_top(found: Sequence[Refined], climbed: Sequence[Refined]) -> bool:
+    """Whether the best of some maxima, and of what was climbed from there, is where a search ended by itself.
+
+    Least squares end where only small steps help them; what L-BFGS gains from there is no small step.
+    """
+    before, best = (max(some, key=lambda one: one.log_density) for some in (found, climbed))
+    return best.converged or (before.converged and best.log_density < before.log_density + NEAR_THE_TOP)
 
 
 def mode_at(likelihood: Likelihood, refined: Refined) -> Mode:

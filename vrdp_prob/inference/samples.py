@@ -155,7 +155,7 @@ class Samples:
 
 @dataclass(frozen=True)
 class Convergence:
-    """Whether the draws can be trusted, in numbers and in words.
+    """Whether the draws can be trusted, in numbers and in words: all that were made, of which a posterior keeps some.
 
     Parameters
     ----------

@@ -63,7 +63,14 @@ def to_tree(posterior: Posterior) -> xr.DataTree:
 
 
 def from_tree(tree: xr.DataTree, tracks: Tracks | None = None) -> Posterior:
-    """The posterior of such groups; the tracks come from them unless given."""
+    """The posterior of such groups; the tracks come from them unless given.
+
+    Raises
+    ------
+    InputError
+        If they are of another layout.
+    """
+    check_format(tree.attrs.get("format"), FORMAT)
     return _posterior(json.loads(tree.attrs["vrdp_prob"]), tree, tracks)
 
 
@@ -82,6 +89,20 @@ def read_posterior(path: Path, tracks: Tracks | None = None) -> Posterior:
         with xr.open_datatree(path, engine="h5netcdf") as opened:
             tree = opened.load().copy()
         return from_tree(tree, tracks)
+
+
+def check_format(found: object, known: int) -> None:
+    """Refuse a file of another layout than the known one.
+
+    Raises
+    ------
+    InputError
+        If it is.
+    """
+    if found != known:
+        raise InputError(
+            f"the posterior is of file format {found}, this program reads {known}; run the inference again."
+        )
 
 
 @contextmanager

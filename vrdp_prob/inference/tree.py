@@ -6,11 +6,11 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
 from vrdp_prob.inference.draws import flat_draws, named_draws, named_fields
 from vrdp_prob.inference.map_fit import MapFit
-from vrdp_prob.inference.predictive import replicated
+from vrdp_prob.inference.predictive import replicated, replicated_angles
 from vrdp_prob.inference.samples import Samples
 from vrdp_prob.models.likelihood import Likelihood
 
@@ -71,16 +71,27 @@ def for_arviz(tree: xr.DataTree) -> Any:
 
 
 def _log_likelihood(likelihood: Likelihood, points: Float[np.ndarray, "chain draw dimension"]) -> xr.Dataset:
-    """Log likelihood of each seen position, in one row, so that nothing is missing."""
-    flat, tracks = flat_draws(points), likelihood.tracks
-    values = np.concatenate([likelihood.pointwise(flat[k : k + BATCH]) for k in range(0, len(flat), BATCH)])
-    frame, body = np.nonzero(tracks.seen)
-    seen = values[:, frame, body].reshape(*points.shape[:2], -1)
-    dataset = _numbered({"position": ((*SAMPLE, "observation"), _rounded(seen))}, points)
-    return dataset.assign_coords(
-        observed_time=("observation", tracks.times[frame], {"units": "s"}),
-        observed_body=("observation", np.array([one.id for one in tracks.bodies])[body]),
-    )
+    """Log likelihood of each seen position, and of each measured angle, in one row, so that nothing is missing."""
+    flat, seen = flat_draws(points), likelihood.observations
+    batches = [likelihood.pointwise(flat[k : k + BATCH]) for k in range(0, len(flat), BATCH)]
+    positions, angles = (np.concatenate(part).reshape(*points.shape[:2], -1) for part in zip(*batches, strict=True))
+    dataset = _numbered({"position": ((*SAMPLE, "observation"), _rounded(positions))}, points)
+    dataset = dataset.assign_coords(_places(likelihood, "observation", "observed", seen.frame, seen.body))
+    if not len(seen.angle):
+        return dataset
+    dataset["angle"] = ((*SAMPLE, "angle_observation"), _rounded(angles))
+    return dataset.assign_coords(_places(likelihood, "angle_observation", "angle", seen.angle_frame, seen.angle_body))
+
+
+def _places(
+    likelihood: Likelihood, axis: str, prefix: str, frame: Int[np.ndarray, "seen"], body: Int[np.ndarray, "seen"]
+) -> dict[str, Any]:
+    """Time and body of observations, as coordinates of their axis."""
+    tracks = likelihood.tracks
+    return {
+        f"{prefix}_time": (axis, tracks.times[frame], {"units": "s"}),
+        f"{prefix}_body": (axis, np.array([one.id for one in tracks.bodies])[body]),
+    }
 
 
 def _log_prior(likelihood: Likelihood, points: Float[np.ndarray, "chain draw dimension"]) -> xr.Dataset:
@@ -98,14 +109,20 @@ def _log_prior(likelihood: Likelihood, points: Float[np.ndarray, "chain draw dim
 def _predictive(
     likelihood: Likelihood, points: Float[np.ndarray, "chain draw dimension"], generator: np.random.Generator
 ) -> xr.Dataset:
-    """Positions as they would be measured, of some draws; NaN before a body's release."""
+    """Positions, and angles where some were measured, as they would be measured; NaN before a body's release."""
     draws = points.shape[1]
     per_chain = min(draws, max(1, PREDICTIVE_DRAWS // len(points)))
     chosen = np.linspace(0, draws - 1, per_chain).round().astype(int)
-    positions = replicated(likelihood, flat_draws(points[:, chosen]), generator)
-    axes = (*SAMPLE, "time", "body", "axis")
+    worlds = flat_draws(points[:, chosen])
+    axes, sizes = (*SAMPLE, "time", "body"), (len(points), per_chain, *likelihood.tracks.seen.shape)
+    positions = replicated(likelihood, worlds, generator).reshape(*sizes, 2)
+    variables: dict[str, Any] = {"position": ((*axes, "axis"), _rounded(positions), {"units": "m"})}
+    if len(likelihood.observations.angle):
+        # a stream of its own: what is drawn after the positions is the same with and without angles
+        angles = replicated_angles(likelihood, worlds, generator.spawn(1)[0]).reshape(sizes)
+        variables["angle"] = (axes, _rounded(angles), {"units": "rad"})
     return xr.Dataset(
-        {"position": (axes, _rounded(positions.reshape(len(points), per_chain, *positions.shape[1:])), {"units": "m"})},
+        variables,
         {
             "chain": np.arange(len(points)),
             "draw": chosen,

@@ -69,7 +69,12 @@ class Turned:
 
 
 def with_other_yaws(
-    likelihood: Likelihood, found: Sequence[Refined], refined: Refine, explained: Callable[[Refined], bool]
+    likelihood: Likelihood,
+    found: Sequence[Refined],
+    refined: Refine,
+    explained: Callable[[Refined], bool],
+    *,
+    optimiser: Optimiser,
 ) -> Turned:
     """Maxima with those of other yaws and spins of cubes, looked for at least once.
 
@@ -83,10 +88,13 @@ def with_other_yaws(
         How what may be near other maxima is refined.
     explained
         Whether a maximum is about as good as noise would make it.
+    optimiser
+        How worlds with other yaws are refined before that.
     """
+    descent = Descent(likelihood, optimiser)
     best, evaluations, idle = sorted(found, key=lambda one: -one.log_density), 0, 0
     for look in range(MOST_LOOKS):
-        starts = (other_later_yaws if look % 2 else other_yaws)(likelihood, best[0].point)
+        starts = (other_later_yaws if look % 2 else other_yaws)(descent, best[0].point)
         others = refined([one.point for one in starts])
         evaluations += sum(one.evaluations for one in starts) + sum(one.evaluations for one in others)
         before = best[0].log_density
@@ -98,33 +106,35 @@ def with_other_yaws(
     return Turned(best, evaluations)
 
 
-def other_yaws(likelihood: Likelihood, point: Float[np.ndarray, "dimension"]) -> list[Minimum]:
+def other_yaws(descent: Descent, point: Float[np.ndarray, "dimension"]) -> list[Minimum]:
     """What is near other maxima of the log posterior, in which a cube has met others with another yaw and spin.
 
     Parameters
     ----------
-    likelihood
-        The density.
+    descent
+        Refines worlds of the density.
     point
         A maximum. Every cube that meets something there, and whose yaw nobody measured, is turned by itself.
     """
+    likelihood = descent.likelihood
     found: list[Minimum] = []
     for body, frame in unseen_yaws(likelihood, point):
         met = bodies_met(likelihood, point, body)
         for one in _with_usual_decay(likelihood, point):
             starts = turned_worlds(likelihood, one, body, frame, spins=SPINS, yaws=YAWS)
-            found += _descended(likelihood, starts, met, frame)
+            found += _descended(descent, starts, met, frame)
     return found
 
 
-def other_later_yaws(likelihood: Likelihood, point: Float[np.ndarray, "dimension"]) -> list[Minimum]:
+def other_later_yaws(descent: Descent, point: Float[np.ndarray, "dimension"]) -> list[Minimum]:
     """The same where a cube has met something again with another yaw, which the spin since its first contact gave it.
 
     Parameters
     ----------
-    likelihood, point
+    descent, point
         See `other_yaws`.
     """
+    likelihood = descent.likelihood
     tracks, places = likelihood.tracks, likelihood.coordinates.places
     found: list[Minimum] = []
     for body, _ in unseen_yaws(likelihood, point):
@@ -141,7 +151,7 @@ def other_later_yaws(likelihood: Likelihood, point: Float[np.ndarray, "dimension
             starts[:, spin] += change
             starts[:, places["angle", body]] -= change * (first - float(tracks.first_seen[body]))
             frame = int(np.searchsorted(tracks.times, time))
-            found += _descended(likelihood, starts, met, frame)
+            found += _descended(descent, starts, met, frame)
     return found
 
 
@@ -157,10 +167,10 @@ def _with_usual_decay(likelihood: Likelihood, point: Float[np.ndarray, "dimensio
 
 
 def _descended(
-    likelihood: Likelihood, starts: Float[np.ndarray, "start dimension"], bodies: frozenset[int], frame: int
+    descent: Descent, starts: Float[np.ndarray, "start dimension"], bodies: frozenset[int], frame: int
 ) -> list[Minimum]:
     """The best of what becomes of starts in the coordinates of some bodies that meet around a frame."""
-    descent = Descent(likelihood, Optimiser.GAUSS_NEWTON)
+    likelihood = descent.likelihood
     local = owned(likelihood.coordinates, bodies) & ~likelihood.coordinates.mask(NOISE_FIELDS)
     until = min(frame + AFTER, len(likelihood.tracks.times))
     first = descent(starts, local, frame_count=until, iterations=FIRST_ITERATIONS)

@@ -223,6 +223,7 @@ class _Lattice:
 
     @property
     def _descent(self) -> Descent:
+        # whatever found the maximum: hundreds of knots go down in one batch, and make proposals, no result
         return Descent(self.likelihood, Optimiser.GAUSS_NEWTON)
 
     @property

@@ -172,24 +172,29 @@ class Likelihood:
         predicted[..., 2] += quantities["angle_zero"].numpy()[:, None]
         return predicted
 
-    def pointwise(self, points: Float[Tensor, "point dimension"]) -> Float[np.ndarray, "point time body"]:
-        """Log likelihood of each seen position (both axes together); NaN where nothing was seen.
+    def pointwise(
+        self, points: Float[Tensor, "point dimension"]
+    ) -> tuple[Float[np.ndarray, "point observation"], Float[np.ndarray, "point angle"]]:
+        """Log likelihood of each seen position (both axes together) and of each measured angle.
 
-        With a model error it is that of a position given the body's earlier ones, so that the sum is that of all.
+        With a model error it is that of one given the body's earlier ones, so that the sum is that of all.
         """
-        observations = self.observations
+        observations, error = self.observations, self._whitening
         with torch.no_grad():
             quantities = self.coordinates.quantities(points)
             discrepancies, _ = self._discrepancies(quantities, None)
-            position, _ = self._independent(discrepancies, quantities)
-            constant = self.noise.log_constant(2, quantities[DEGREES_OF_FREEDOM][:, 0])[:, None]
-            values = constant - (position**2).sum(dim=-1) / 2 - 2 * quantities[NOISE].log()
-        values = values.numpy() + np.linalg.slogdet(observations.whitening)[1]
-        if self._whitening is not None:
-            values = values + self._whitening.position_log_volume.reshape(-1, 2).sum(axis=1)
-        result = np.full((len(points), *self.tracks.seen.shape), np.nan)
-        result[:, observations.frame, observations.body] = values
-        return result
+            position, angle = self._independent(discrepancies, quantities)
+            degrees = quantities[DEGREES_OF_FREEDOM][:, 0]
+            of_position = self.noise.log_constant(2, degrees)[:, None] - (position**2).sum(dim=-1) / 2
+            of_angle = self.noise.log_constant(1, degrees)[:, None] - angle**2 / 2
+            positions = (of_position - 2 * quantities[NOISE].log()).numpy()
+            angles = (of_angle - quantities[ANGLE_NOISE].log()).numpy()
+        positions = positions + np.linalg.slogdet(observations.whitening)[1]
+        angles = angles - np.log(observations.angle_reference)
+        if error is not None:
+            positions = positions + error.position_log_volume.reshape(-1, 2).sum(axis=1)
+            angles = angles + error.angle_log_volume
+        return positions, angles
 
     def information_shares(
         self, points: Float[Tensor, "point dimension"]

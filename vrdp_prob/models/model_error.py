@@ -186,6 +186,11 @@ class Whitening:
         """Logarithm of the factor by which each position residual was stretched, in the order of the residuals."""
         return _log_diagonals(self.positions)
 
+    @cached_property
+    def angle_log_volume(self) -> Float[np.ndarray, "angle"]:
+        """The same for each angle residual."""
+        return _log_diagonals(self.angles)
+
     def whitened_positions(self, residuals: Float[Tensor, "point number"]) -> Float[Tensor, "point number"]:
         """Independent residuals of positions; of a video's first frames where only these are given."""
         return _whitened(residuals, self.positions)

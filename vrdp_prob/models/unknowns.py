@@ -5,6 +5,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+import torch
 from jaxtyping import Float
 
 from vrdp_prob.models.coordinates import Coordinate, Coordinates
@@ -255,6 +256,35 @@ def mass_prior(tracks: Tracks, model: PhysicsModel) -> Prior:
     """Prior of the log mass of a body that nobody weighed: around the weighed ones of the video, if any."""
     prior, middle = model.believed(MASS).prior, _weighed(tracks)
     return prior if middle is None else Prior(math.log(middle), prior.sd)
+
+
+def prior_restitutions(
+    model: PhysicsModel, shape: tuple[int, ...], generator: np.random.Generator
+) -> Float[np.ndarray, "..."]:
+    """Restitution factors from their prior, held to at most 1.
+
+    The prior has a soft edge, for the sake of the samplers: about one draw in a thousand lies above 1, where collisions
+    would give energy. These are drawn again.
+
+    Parameters
+    ----------
+    model
+        The physics, whose prior it is.
+    shape
+        How many.
+    generator
+        Source of the draws.
+    """
+
+    def draw(shape: tuple[int, ...]) -> Float[np.ndarray, "..."]:
+        coordinates = torch.from_numpy(model.believed(RESTITUTION).prior.sample(generator, shape))
+        factors: np.ndarray = RESTITUTION.transform.from_coordinate(coordinates).numpy()
+        return factors
+
+    drawn = draw(shape)
+    while (above := drawn > 1).any():
+        drawn[above] = draw((int(above.sum()),))
+    return drawn
 
 
 def _mass_default(tracks: Tracks, model: PhysicsModel) -> float:

@@ -9,13 +9,12 @@ from typing import Literal
 
 import numpy as np
 import torch
-from jaxtyping import Float
-from torch import Tensor
 
 from vrdp_prob.errors import InputError
-from vrdp_prob.models.parameters import MASS, RESTITUTION
+from vrdp_prob.models.parameters import MASS
 from vrdp_prob.models.physics import PhysicsModel
 from vrdp_prob.models.simulator.worlds import Worlds
+from vrdp_prob.models.unknowns import prior_restitutions
 
 Defaults = Literal["fixed", "prior"]
 
@@ -61,31 +60,6 @@ def with_defaults(
             spread = model.believed(MASS).prior.sd * generator.standard_normal(len(worlds))
             mass[:, body] *= MASS.transform.from_coordinate(torch.from_numpy(spread)).to(mass)
         if of_restitution == DEFAULT:
-            restitution[:, body] = prior_restitutions(model, len(worlds), generator).to(restitution)
+            drawn = prior_restitutions(model, (len(worlds),), generator)
+            restitution[:, body] = torch.from_numpy(drawn).to(restitution)
     return replace(worlds, mass=mass, restitution=restitution)
-
-
-def prior_restitutions(model: PhysicsModel, count: int, generator: np.random.Generator) -> Float[Tensor, "draw"]:
-    """Restitution factors from their prior, held to at most 1.
-
-    The prior has a soft edge, for the sake of the samplers: about one draw in a thousand lies above 1, where collisions
-    would give energy. These are drawn again.
-
-    Parameters
-    ----------
-    model
-        The physics, whose prior it is.
-    count
-        How many.
-    generator
-        Source of the draws.
-    """
-
-    def draw(size: int) -> Float[Tensor, "draw"]:
-        coordinates = model.believed(RESTITUTION).prior.sample(generator, (size,))
-        return RESTITUTION.transform.from_coordinate(torch.from_numpy(coordinates))
-
-    drawn = draw(count)
-    while (above := drawn > 1).any():
-        drawn[above] = draw(int(above.sum()))
-    return drawn

@@ -6,6 +6,7 @@ from functools import cache
 from pathlib import Path
 
 import emcee
+import h5py
 import numpy as np
 import pytest
 import torch
@@ -213,6 +214,10 @@ def test_a_posterior_is_written_and_read_again(tmp_path: Path) -> None:
     posterior.video("hit 1").write(tmp_path / "one.nc")
     with pytest.raises(InputError, match="the posterior of one video; open it with"):
         SharedPosterior.read(tmp_path / "one.nc")
+    with h5py.File(tmp_path / "shared.nc", "a") as file:
+        file.attrs["format"] = 7
+    with pytest.raises(InputError, match="the posterior is of file format 7, this program reads 1; run"):
+        SharedPosterior.read(tmp_path / "shared.nc")
 
 
 def test_a_held_out_video_is_as_probable_as_the_evidence_of_all_says() -> None:

@@ -15,7 +15,7 @@ from vrdp_prob.files import write_atomically
 from vrdp_prob.inference.posterior import Posterior
 from vrdp_prob.inference.samples import Convergence
 from vrdp_prob.inference.several_videos.linking import SharedNumbers, place_words
-from vrdp_prob.inference.storage import from_tree, reading, to_tree
+from vrdp_prob.inference.storage import check_format, from_tree, reading, to_tree
 from vrdp_prob.inference.summaries import Summary
 from vrdp_prob.models import model_file
 from vrdp_prob.models.coordinates import Coordinate
@@ -159,6 +159,7 @@ class SharedPosterior:
             document = json.loads(shared.attrs["vrdp_prob"])
             if "numbers" not in document:
                 raise InputError("the posterior of one video; open it with vrdp_prob.AskablePosterior.read.")
+            check_format(shared.attrs.get("format"), FORMAT)
             return cls(
                 model=PhysicsModel(*model_file.parse(document["model"])),
                 seed=document["seed"],

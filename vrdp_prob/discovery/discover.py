@@ -94,7 +94,7 @@ def discover(
             found = found.without(list(doubted))
             after = _checks_after(found, checks, seed)
         verdict = Verdict.UNKNOWN if unlisted is not None or reasons else _verdict(found, checks, after)
-        causes = _each_once([*_causes(found, {}, seed), *not_named])
+        causes = _in_order([*_causes(found, {}, seed), *not_named])
     return Finding(
         verdict=verdict,
         causes=tuple(causes),
@@ -148,8 +148,7 @@ def _excess(trial: Trial) -> float:
 
 def _causes(found: Search, doubted: Mapping[Effect, Sequence[Doubt]], seed: int) -> list[FoundCause]:
     """The causes of the best model, and those that could take the place of one."""
-    named: list[FoundCause] = []
-    others: list[FoundCause] = []
+    causes: list[FoundCause] = []
     for number, (lesser, rivals) in enumerate(zip(found.lesser, found.rivals, strict=True)):
         best_of = {one.causes[-1].name: one for one in reversed(rivals)}
         trials = [found.best, lesser, *best_of.values()]
@@ -160,21 +159,20 @@ def _causes(found: Search, doubted: Mapping[Effect, Sequence[Doubt]], seed: int)
         cause = found.best.causes[number]
         reasons = doubted.get(cause, ())
         probability = float(shares[0]) * math.prod(one.credible for one in reasons)
-        named.append(_cause(found.best, cause, lesser, found.overdispersion, probability, named=not reasons))
+        causes.append(_cause(found.best, cause, lesser, found.overdispersion, probability, named=not reasons))
         for rival, share in zip(best_of.values(), shares[2:], strict=True):
             if share >= LEAST_SHARE:
                 probability = float(share) * math.prod(one.credible for one in doubts(rival, rival.causes[-1]))
-                others.append(_cause(rival, rival.causes[-1], lesser, found.overdispersion, probability, named=False))
-    named.sort(key=lambda one: (not one.named, -one.probability))
-    return named + sorted(others, key=lambda one: -one.probability)
+                causes.append(_cause(rival, rival.causes[-1], lesser, found.overdispersion, probability, named=False))
+    return causes
 
 
-def _each_once(causes: Sequence[FoundCause]) -> list[FoundCause]:
-    """Causes without those that are there again, less probable: one may take the place of several."""
+def _in_order(causes: Sequence[FoundCause]) -> list[FoundCause]:
+    """Named causes first, each group by probability; one that may take the place of several stands there once."""
     first: dict[str, FoundCause] = {}
     for cause in sorted(causes, key=lambda one: (not one.named, -one.probability)):
         first.setdefault(cause.name, cause)
-    return [cause for cause in causes if first[cause.name] is cause]
+    return list(first.values())
 
 
 def _cause(

@@ -1,5 +1,8 @@
 """Score tests of causes at the strength at which they vanish."""
 
+from collections.abc import Mapping, Sequence
+from typing import ClassVar
+
 import numpy as np
 import pytest
 from scipy.stats import chi2
@@ -9,7 +12,8 @@ from vrdp_prob.discovery.estimates import upper_bounds
 from vrdp_prob.discovery.finding import UpperBound
 from vrdp_prob.discovery.linear import Score
 from vrdp_prob.discovery.residual_model import ResidualModel
-from vrdp_prob.discovery.scores import CauseScore, _largest, _one_sided, happens_once, score_causes
+from vrdp_prob.discovery.scores import CauseScore, Largest, _largest, _one_sided, happens_once, score_causes
+from vrdp_prob.discovery.wording import bound_words
 from vrdp_prob.models.effects.clock_error import ClockError
 from vrdp_prob.models.effects.contact_friction import ContactFriction
 from vrdp_prob.models.effects.effect import Effect
@@ -18,6 +22,7 @@ from vrdp_prob.models.effects.linear_drag import LinearDrag
 from vrdp_prob.models.effects.surface_tilt import SurfaceTilt
 from vrdp_prob.models.effects.wall import Wall
 from vrdp_prob.models.model_file import known_effects
+from vrdp_prob.scene import Tracks
 
 
 def scored(
@@ -139,9 +144,44 @@ def test_a_kick_may_be_as_large_as_where_it_would_fit_best() -> None:
 )
 def test_what_has_no_score_has_no_bound(cause: Effect, strength: str) -> None:
     unit = next(one.unit for one in cause.parameters if one.name == strength)
-    assert upper_bounds(cause, None)[0] == UpperBound(cause.name, strength, None, unit)
+    assert upper_bounds(cause, None)[0] == UpperBound(cause.name, strength, None, unit, told=0)
 
 
 def test_of_several_places_the_largest_bound_counts_and_what_says_nothing_does_not() -> None:
-    found = _largest([("a", -0.5, 0.1), ("b", 0.0, 0.0), ("a", 0.2, 0.3), ("c", 0.0, 0.0), ("c", 1.0, 1.0)])
-    assert found == {"a": pytest.approx(0.2 + 0.3 * 1.645, abs=1e-3), "b": None, "c": pytest.approx(2.645, abs=1e-3)}
+    places = [(-0.5, 0.1), (0.2, 0.3), (9.0, 30.0), (0.0, 0.0)]
+    (found,) = _largest([[("impulse_x", *one)] for one in places], ExternalImpulse()).values()
+    assert (found.places, found.told) == (4, 2)
+    assert found.bound == pytest.approx(0.2 + 0.3 * 1.645, abs=1e-3)
+    (vague,) = _largest([[("impulse_x", *one)] for one in places[2:]], ExternalImpulse()).values()
+    assert (vague.places, vague.told) == (2, 1)
+    assert vague.bound == pytest.approx(9 + 30 * 1.645, abs=0.1)
+    (nothing,) = _largest([[("impulse_x", *one)] for one in places[3:]], ExternalImpulse()).values()
+    assert nothing == Largest(None, places=1, told=0)
+
+
+def test_a_patch_may_be_larger_where_bodies_hardly_were_than_where_one_would_fit_best() -> None:
+    one = scored(None, seed=1, names=("friction_patch",))["friction_patch"]
+    (bound,) = upper_bounds(one.effect, one)
+    assert 1 < bound.told < bound.places
+    assert bound.bound is not None
+    best = abs(one.start["patch_friction"])
+    sd = best / np.sqrt(one.chi_square)
+    assert bound.bound > 2 * (best + 1.645 * sd)
+    assert f"at {bound.told} of {bound.places} places" in bound_words(bound)
+
+
+class _Asked(ExternalImpulse):
+    """A kick that remembers for which videos its times were asked."""
+
+    asked: ClassVar[list[tuple[str, ...]]] = []
+
+    def search_points(self, videos: Sequence[Tracks]) -> Sequence[Mapping[str, float]]:
+        self.asked.append(tuple(one.video for one in videos))
+        return super().search_points(videos)[:3]
+
+
+def test_what_happens_once_in_a_video_is_looked_for_at_the_times_of_that_video_alone() -> None:
+    _, fit = fitted(seed=1)
+    (one,) = score_causes(fit, ResidualModel.of(fit), [_Asked()], seed=0)
+    assert _Asked.asked == [(name,) for name in fit.videos]
+    assert one.largest["impulse_x"].places <= 3 * len(fit.videos)

@@ -57,6 +57,8 @@ def test_evidence_bounds_and_notes():
         "bound": 0.0123,
         "unit": "1/s",
         "vanishes_at": 0.0,
+        "places": 1,
+        "told": 1,
     }
     assert found["upper_bounds"][-1]["bound"] is None
     assert found["notes"] == ["Two videos end before 1 s; their errors at 1 s are not counted."]

@@ -8,7 +8,7 @@ from jaxtyping import Float
 from scipy.stats import chi2
 
 from vrdp_prob.discovery.finding import Estimate, UpperBound
-from vrdp_prob.discovery.scores import CauseScore
+from vrdp_prob.discovery.scores import CauseScore, Largest
 from vrdp_prob.discovery.unexplained import Unexplained
 from vrdp_prob.inference.several_videos.fitting import SharedFit
 from vrdp_prob.inference.several_videos.linking import place_words
@@ -135,7 +135,7 @@ def _unit(unit: str) -> str:
 
 
 def upper_bounds(effect: Effect, score: CauseScore | None) -> list[UpperBound]:
-    """How large the strengths of a cause may be (95 %), where it would fit best.
+    """How large the strengths of a cause may be (95 %), at the place where most could have hidden.
 
     Parameters
     ----------
@@ -146,8 +146,11 @@ def upper_bounds(effect: Effect, score: CauseScore | None) -> list[UpperBound]:
     """
     names = dict.fromkeys([*effect.vanishes_at, *effect.vanishes_like]) or [effect.parameters[0].name]
     units = {parameter.name: parameter.unit for parameter in effect.parameters}
-    largest = {} if score is None else score.largest
-    return [UpperBound(effect.name, name, largest.get(name), units[name], _nothing(effect, name)) for name in names]
+    largest = {name: (score.largest if score else {}).get(name, Largest(None, 1, 0)) for name in names}
+    return [
+        UpperBound(effect.name, name, one.bound, units[name], _nothing(effect, name), one.places, one.told)
+        for name, one in largest.items()
+    ]
 
 
 def _nothing(effect: Effect, strength: str) -> float | str:

@@ -148,9 +148,13 @@ class UpperBound:
     name, parameter
         The cause and its parameter.
     bound, unit
-        How far the parameter may be from where the cause does nothing; None where the data put no bound on it.
+        How far the parameter may be from where the cause does nothing, at the place where it may be farthest of those
+        that tell anything; None where the data put no bound on it.
     vanishes_at
         Where that is: a value, or the name of the parameter that it is then equal to.
+    places, told
+        Number of places (points of a search, bodies or videos) at which it was looked for, and of those that tell
+        anything: nobody was at the others.
     """
 
     name: str
@@ -158,6 +162,8 @@ class UpperBound:
     bound: float | None
     unit: str
     vanishes_at: float | str = 0.0
+    places: int = 1
+    told: int = 1
 
 
 @dataclass(frozen=True)

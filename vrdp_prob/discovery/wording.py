@@ -86,9 +86,15 @@ def difference_words(gain: Gain) -> str:
 
 
 def bound_words(bound: UpperBound) -> str:
-    """An upper bound with its unit, from where it counts if that is not 0, or that there is none."""
+    """An upper bound with its unit, from where it counts if that is not 0, and where; or that there is none."""
     if bound.bound is None or not math.isfinite(bound.bound):
         return "no bound"
+    where = f" at {bound.told} of {bound.places} places, the others tell nothing" if bound.told < bound.places else ""
+    return f"{_bound_size(bound)}{where}"
+
+
+def _bound_size(bound: UpperBound) -> str:
+    assert bound.bound is not None
     digits, times, power = number(bound.bound, bound.bound / 10).partition(TIMES)
     if "." in digits:
         digits = digits.rstrip("0").rstrip(".")

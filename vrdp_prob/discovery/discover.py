@@ -10,7 +10,7 @@ from vrdp_prob.discovery.checking import check_video_count
 from vrdp_prob.discovery.checks import run_checks
 from vrdp_prob.discovery.describe import describe
 from vrdp_prob.discovery.doubts import Doubt, doubts
-from vrdp_prob.discovery.estimates import cause_sentence, estimates, upper_bounds
+from vrdp_prob.discovery.estimates import cause_sentence, estimates, mass_scale_notes, upper_bounds
 from vrdp_prob.discovery.figures import residual_figures
 from vrdp_prob.discovery.finding import Check, Finding, FoundCause, Gain, UpperBound, Verdict
 from vrdp_prob.discovery.free_flight import NORMAL_95
@@ -105,7 +105,7 @@ def discover(
         extended=found.best.fit.model,
         videos=tuple(tracks.video for tracks in videos),
         description=describe(found.best.fit, after) if verdict is Verdict.UNKNOWN else None,
-        notes=tuple(_notes(found, reasons, unlisted)),
+        notes=(*_notes(found, reasons, unlisted), *mass_scale_notes(_told(found, causes), videos)),
         figures=residual_figures(found.base.fit, found.best.fit if found.best.causes else None),
     )
 
@@ -206,6 +206,12 @@ def _gain(before: Trial, after: Trial, overdispersion: Float[np.ndarray, "video"
         elpd_se=error,
         by_video=dict(zip(videos, gains(after, before, overdispersion).tolist(), strict=True)),
     )
+
+
+def _told(found: Search, causes: Sequence[FoundCause]) -> list[Effect]:
+    """The effects of some causes."""
+    names = {cause.name for cause in causes}
+    return [effect for effect in found.refits.catalogue if effect.name in names]
 
 
 def _bounds(found: Search) -> list[UpperBound]:

@@ -1,7 +1,7 @@
 """What a fit says of the parameters of a cause, in their units, and how large a cause may be that was not named."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Mapping
 
 import numpy as np
 from jaxtyping import Float
@@ -72,6 +72,25 @@ def estimates(
             if name in effect.stepwise and value is not None:
                 found[f"{name}[{video.name}]"] = _between_frames(value, video.likelihood.tracks, units[name].unit)
     return found
+
+
+def mass_scale_notes(effects: Iterable[Effect], videos: Iterable[Tracks]) -> Iterator[str]:
+    """What limits estimates of parameters that show only as their ratio to the masses, where no mass is stated.
+
+    Parameters
+    ----------
+    effects
+        Effects whose parameters are told.
+    videos
+        What was seen.
+    """
+    if any(body.mass is not None for tracks in videos for body in tracks.bodies):
+        return
+    for name in (one.name for effect in effects for one in effect.parameters if one.goes_with_masses):
+        yield (
+            f"No mass is stated, and only the ratio of {name.replace('_', ' ')} to the masses shows: its value and its "
+            "interval are those for masses of the scale that was believed, and change in proportion with it."
+        )
 
 
 def _estimate(transform: Transform, mean: float, sd: float, unit: str) -> Estimate:

@@ -84,6 +84,16 @@ def test_the_unknown_is_described():
     found = to_document(unknown())
     assert found["verdict"] == "unknown"
     assert found["description"]["explained"] == 0.61
+    assert found["tried"][0] == {
+        "name": "pair_force",
+        "gain": 4.2,
+        "gain_se": 3.1,
+        "gain_needed": 5.99,
+        "probability": 0.21,
+        "probability_needed": 0.8,
+        "why": "it gains too little",
+    }
+    assert {one["name"] for one in found["tried"]}.isdisjoint(cause["name"] for cause in found["causes"])
     assert found["description"]["formula"].startswith("a_x = ")
     assert to_document(nothing())["description"] is None
 

@@ -17,6 +17,7 @@ from vrdp_prob.discovery.free_flight import NORMAL_95
 from vrdp_prob.discovery.mimics import Unlisted, laws_of, without_mimics
 from vrdp_prob.discovery.search import Search, search
 from vrdp_prob.discovery.trials import Trial, gain, gains, weights
+from vrdp_prob.discovery.tried import tried_causes
 from vrdp_prob.inference import default_model
 from vrdp_prob.inference.parallel import linear_algebra_in_one_thread, several_processes
 from vrdp_prob.inference.several_videos.fitting import fit_together
@@ -95,6 +96,7 @@ def discover(
             after = _checks_after(found, checks, seed)
         verdict = Verdict.UNKNOWN if unlisted is not None or reasons else _verdict(found, checks, after)
         causes = _in_order([*_causes(found, {}, seed), *not_named])
+        tried = tried_causes(found, {cause.name for cause in causes}, seed=seed)
     return Finding(
         verdict=verdict,
         causes=tuple(causes),
@@ -107,6 +109,7 @@ def discover(
         description=describe(found.best.fit, after) if verdict is Verdict.UNKNOWN else None,
         notes=(*_notes(found, reasons, unlisted), *mass_scale_notes(_told(found, causes), videos)),
         figures=residual_figures(found.base.fit, found.best.fit if found.best.causes else None),
+        tried=tuple(tried),
     )
 
 

@@ -115,6 +115,33 @@ class FoundCause:
 
 
 @dataclass(frozen=True)
+class TriedCause:
+    """A cause that was tried and not established, so that it is told of nowhere else.
+
+    Parameters
+    ----------
+    name
+        Its name in the catalogue.
+    gain, gain_se
+        Difference of the log predictive density of left-out videos (nats) that it brings, and its standard error.
+    gain_needed
+        What it would have to bring.
+    probability, probability_needed
+        Against the model without it, and what that would have to be.
+    why
+        What speaks against it, as a clause for a reader.
+    """
+
+    name: str
+    gain: float
+    gain_se: float
+    gain_needed: float
+    probability: float
+    probability_needed: float
+    why: str
+
+
+@dataclass(frozen=True)
 class Check:
     """A test of what a model leaves unexplained.
 
@@ -278,6 +305,8 @@ class Finding:
     figures
         What the model misses, and the extended one: an SVG element as text by its title. One whose root has the class
         `themed` uses the page's colours (`var(--ink)`, `var(--accent)`, ...); any other stands on white.
+    tried
+        Further causes that were tried on the extended model and not established.
     answers
         Answers to questions about the videos under both models; None where nothing was asked or nothing is named.
     """
@@ -294,6 +323,7 @@ class Finding:
     notes: tuple[str, ...] = ()
     figures: Mapping[str, str] = field(default_factory=dict)
     answers: tuple[ComparedAnswer, ...] | None = None
+    tried: tuple[TriedCause, ...] = ()
 
     @property
     def named(self) -> tuple[FoundCause, ...]:

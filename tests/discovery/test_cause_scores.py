@@ -12,13 +12,22 @@ from vrdp_prob.discovery.estimates import upper_bounds
 from vrdp_prob.discovery.finding import UpperBound
 from vrdp_prob.discovery.linear import Score
 from vrdp_prob.discovery.residual_model import ResidualModel
-from vrdp_prob.discovery.scores import CauseScore, Largest, _largest, _one_sided, happens_once, score_causes
+from vrdp_prob.discovery.scores import (
+    CauseScore,
+    Largest,
+    _largest,
+    _one_sided,
+    _p_value,
+    happens_once,
+    score_causes,
+)
 from vrdp_prob.discovery.wording import bound_words
 from vrdp_prob.models.effects.clock_error import ClockError
 from vrdp_prob.models.effects.contact_friction import ContactFriction
 from vrdp_prob.models.effects.effect import Effect
 from vrdp_prob.models.effects.external_impulse import ExternalImpulse
 from vrdp_prob.models.effects.linear_drag import LinearDrag
+from vrdp_prob.models.effects.slip_to_roll import SlipToRoll
 from vrdp_prob.models.effects.surface_tilt import SurfaceTilt
 from vrdp_prob.models.effects.wall import Wall
 from vrdp_prob.models.model_file import known_effects
@@ -83,6 +92,36 @@ def test_several_strengths_that_cannot_be_negative_are_each_tested_on_one_side(
     assert found.chi_square == pytest.approx(sum(value**2 for value in expected))
     assert found.chi_square <= free.chi_square
     assert _one_sided(free, ["tilt_x", "tilt_y"], SurfaceTilt()) is free
+
+
+@pytest.mark.parametrize(
+    ("effect", "names", "correlation", "exact"),
+    [
+        (LinearDrag(), ["linear_drag"], 0.0, True),
+        (SlipToRoll(), ["slip_friction"], 0.0, True),
+        (SurfaceTilt(), ["tilt_x", "tilt_y"], 0.3, True),
+        (ContactFriction(), ["contact_friction", "wall_friction"], 0.0, False),
+        (ContactFriction(), ["contact_friction", "wall_friction"], -0.8, False),
+        (ContactFriction(), ["contact_friction", "wall_friction"], 0.8, False),
+    ],
+)
+def test_p_values_of_strengths_at_a_boundary_are_as_rare_as_they_say(
+    effect: Effect, names: list[str], correlation: float, *, exact: bool
+) -> None:
+    generator = np.random.default_rng(0)
+    information = np.array([[4.0, 4 * correlation], [4 * correlation, 4.0]])[: len(names), : len(names)]
+    gradients = generator.multivariate_normal(np.zeros(len(names)), information, 4000)
+    found = [_one_sided(Score(one, information), names, effect) for one in gradients]
+    p_values = np.array([_p_value(one, names, effect) for one in found])
+    for level in (0.2, 0.05, 0.01):
+        share, error = (p_values < level).mean(), np.sqrt(level / len(p_values))
+        assert share < level + 3 * error
+        assert share > level - 3 * error or not exact
+
+
+def test_what_slips_is_never_slowed_less_than_what_rolls() -> None:
+    assert _one_sided(Score(np.array([-3.0]), np.eye(1)), ["slip_friction"], SlipToRoll()).chi_square == 0
+    assert _p_value(Score(np.zeros(1), np.eye(1)), ["slip_friction"], SlipToRoll()) == 1.0
 
 
 def test_the_p_value_of_a_single_place_is_that_of_chi_square() -> None:

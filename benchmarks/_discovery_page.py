@@ -16,6 +16,7 @@ from _discovery_results import (
     answer,
     between,
     checks,
+    clearly_gains,
     covered,
     hit,
     intervals,
@@ -24,6 +25,7 @@ from _discovery_results import (
     reached,
     right,
     sure,
+    sure_hit,
     unknown,
 )
 from _discovery_tasks import SIZES, Kind
@@ -69,14 +71,16 @@ def _figure(value: float | None) -> str:
 def _recall(results: Sequence[Result]) -> str:
     bounds = (*SIZES, np.inf)
     bins = list(pairwise(bounds))
-    head = ["hidden", *(f"from {low:g} noise sd" for low, _ in bins), "and nothing else", "smaller"]
+    sizes = [f"from {low:g} noise sd" for low, _ in bins]
+    head = ["hidden", *sizes, "gain > 2 standard errors, too", "and nothing else", "smaller"]
     rows = []
     ones = of(results, Kind.ONE)
     for way in [*dict.fromkeys(way for result in ones for way in result["ways"]), None]:
         mine = [result for result in ones if way in (None, *result["ways"])]
         seen = between(mine, SIZES[0], np.inf)
         shares = [str(Share(between(mine, *ends), hit)) for ends in bins]
-        rows.append((way or "all", *shares, str(Share(seen, alone)), str(len(mine) - len(seen))))
+        stricter = [str(Share(seen, one)) for one in (sure_hit, alone)]
+        rows.append((way or "all", *shares, *stricter, str(len(mine) - len(seen))))
     return _table(head, rows) if ones else ""
 
 
@@ -120,11 +124,13 @@ def _pairs(results: Sequence[Result]) -> str:
             " + ".join(ways),
             ", ".join(f"{reached(one):.1f}" for one in mine),
             str(Share(mine, hit)),
+            str(Share(mine, sure_hit)),
             _list(", ".join(named(one)) or answer(one) for one in mine),
         )
         for ways, mine in _by_ways(of(results, Kind.TWO)).items()
     ]
-    return _table(("hidden", "smaller of their sizes", "both named", "answers"), rows) if rows else ""
+    head = ("hidden", "smaller of their sizes", "both named", "gains > 2 standard errors, too", "answers")
+    return _table(head, rows) if rows else ""
 
 
 def _outside(results: Sequence[Result]) -> str:
@@ -138,10 +144,11 @@ def _outside(results: Sequence[Result]) -> str:
 
 def _removed(results: Sequence[Result]) -> str:
     rows = [
-        (" + ".join(ways), str(Share(mine, unknown)), _list(_probable(one) for one in mine))
+        (" + ".join(ways), str(Share(mine, unknown)), str(Share(mine, sure)), _list(_probable(one) for one in mine))
         for ways, mine in _by_ways(of(results, Kind.REMOVED)).items()
     ]
-    return _table(("hidden, and not looked for", "verdict `unknown`", "answers"), rows) if rows else ""
+    head = ("hidden, and not looked for", "verdict `unknown`", f"a cause with probability > {SURE}", "answers")
+    return _table(head, rows) if rows else ""
 
 
 def _probable(result: Result) -> str:
@@ -163,8 +170,8 @@ def _gains(results: Sequence[Result]) -> str:
         "noise, mm",
     )
     rows = []
-    for name, found in right(results).items():
-        sure = sum(one["gain"] > 2 * one["gain_se"] for one in found)
+    for name, found in right(results, Kind.ONE).items():
+        sure = sum(map(clearly_gains, found))
         errors = 1e3 * np.median([[*one["rmse"], one["noise"]] for one in found], axis=0)
         gain = np.median([one["gain"] for one in found])
         rows.append((name, str(len(found)), str(sure), f"{gain:.0f}", *(f"{error:.1f}" for error in errors)))

@@ -1,5 +1,8 @@
 """Score tests of causes at the strength at which they vanish."""
 
+from collections.abc import Mapping, Sequence
+from typing import ClassVar
+
 import numpy as np
 import pytest
 from scipy.stats import chi2
@@ -9,15 +12,26 @@ from vrdp_prob.discovery.estimates import upper_bounds
 from vrdp_prob.discovery.finding import UpperBound
 from vrdp_prob.discovery.linear import Score
 from vrdp_prob.discovery.residual_model import ResidualModel
-from vrdp_prob.discovery.scores import CauseScore, _largest, _one_sided, happens_once, score_causes
+from vrdp_prob.discovery.scores import (
+    CauseScore,
+    Largest,
+    _largest,
+    _one_sided,
+    _p_value,
+    happens_once,
+    score_causes,
+)
+from vrdp_prob.discovery.wording import bound_words
 from vrdp_prob.models.effects.clock_error import ClockError
 from vrdp_prob.models.effects.contact_friction import ContactFriction
 from vrdp_prob.models.effects.effect import Effect
 from vrdp_prob.models.effects.external_impulse import ExternalImpulse
 from vrdp_prob.models.effects.linear_drag import LinearDrag
+from vrdp_prob.models.effects.slip_to_roll import SlipToRoll
 from vrdp_prob.models.effects.surface_tilt import SurfaceTilt
 from vrdp_prob.models.effects.wall import Wall
 from vrdp_prob.models.model_file import known_effects
+from vrdp_prob.scene import Tracks
 
 
 def scored(
@@ -80,6 +94,36 @@ def test_several_strengths_that_cannot_be_negative_are_each_tested_on_one_side(
     assert _one_sided(free, ["tilt_x", "tilt_y"], SurfaceTilt()) is free
 
 
+@pytest.mark.parametrize(
+    ("effect", "names", "correlation", "exact"),
+    [
+        (LinearDrag(), ["linear_drag"], 0.0, True),
+        (SlipToRoll(), ["slip_friction"], 0.0, True),
+        (SurfaceTilt(), ["tilt_x", "tilt_y"], 0.3, True),
+        (ContactFriction(), ["contact_friction", "wall_friction"], 0.0, False),
+        (ContactFriction(), ["contact_friction", "wall_friction"], -0.8, False),
+        (ContactFriction(), ["contact_friction", "wall_friction"], 0.8, False),
+    ],
+)
+def test_p_values_of_strengths_at_a_boundary_are_as_rare_as_they_say(
+    effect: Effect, names: list[str], correlation: float, *, exact: bool
+) -> None:
+    generator = np.random.default_rng(0)
+    information = np.array([[4.0, 4 * correlation], [4 * correlation, 4.0]])[: len(names), : len(names)]
+    gradients = generator.multivariate_normal(np.zeros(len(names)), information, 4000)
+    found = [_one_sided(Score(one, information), names, effect) for one in gradients]
+    p_values = np.array([_p_value(one, names, effect) for one in found])
+    for level in (0.2, 0.05, 0.01):
+        share, error = (p_values < level).mean(), np.sqrt(level / len(p_values))
+        assert share < level + 3 * error
+        assert share > level - 3 * error or not exact
+
+
+def test_what_slips_is_never_slowed_less_than_what_rolls() -> None:
+    assert _one_sided(Score(np.array([-3.0]), np.eye(1)), ["slip_friction"], SlipToRoll()).chi_square == 0
+    assert _p_value(Score(np.zeros(1), np.eye(1)), ["slip_friction"], SlipToRoll()) == 1.0
+
+
 def test_the_p_value_of_a_single_place_is_that_of_chi_square() -> None:
     one = scored(None, seed=1, names=("surface_tilt",))["surface_tilt"]
     assert one.degrees == 2
@@ -139,9 +183,44 @@ def test_a_kick_may_be_as_large_as_where_it_would_fit_best() -> None:
 )
 def test_what_has_no_score_has_no_bound(cause: Effect, strength: str) -> None:
     unit = next(one.unit for one in cause.parameters if one.name == strength)
-    assert upper_bounds(cause, None)[0] == UpperBound(cause.name, strength, None, unit)
+    assert upper_bounds(cause, None)[0] == UpperBound(cause.name, strength, None, unit, told=0)
 
 
 def test_of_several_places_the_largest_bound_counts_and_what_says_nothing_does_not() -> None:
-    found = _largest([("a", -0.5, 0.1), ("b", 0.0, 0.0), ("a", 0.2, 0.3), ("c", 0.0, 0.0), ("c", 1.0, 1.0)])
-    assert found == {"a": pytest.approx(0.2 + 0.3 * 1.645, abs=1e-3), "b": None, "c": pytest.approx(2.645, abs=1e-3)}
+    places = [(-0.5, 0.1), (0.2, 0.3), (9.0, 30.0), (0.0, 0.0)]
+    (found,) = _largest([[("impulse_x", *one)] for one in places], ExternalImpulse()).values()
+    assert (found.places, found.told) == (4, 2)
+    assert found.bound == pytest.approx(0.2 + 0.3 * 1.645, abs=1e-3)
+    (vague,) = _largest([[("impulse_x", *one)] for one in places[2:]], ExternalImpulse()).values()
+    assert (vague.places, vague.told) == (2, 1)
+    assert vague.bound == pytest.approx(9 + 30 * 1.645, abs=0.1)
+    (nothing,) = _largest([[("impulse_x", *one)] for one in places[3:]], ExternalImpulse()).values()
+    assert nothing == Largest(None, places=1, told=0)
+
+
+def test_a_patch_may_be_larger_where_bodies_hardly_were_than_where_one_would_fit_best() -> None:
+    one = scored(None, seed=1, names=("friction_patch",))["friction_patch"]
+    (bound,) = upper_bounds(one.effect, one)
+    assert 1 < bound.told < bound.places
+    assert bound.bound is not None
+    best = abs(one.start["patch_friction"])
+    sd = best / np.sqrt(one.chi_square)
+    assert bound.bound > 2 * (best + 1.645 * sd)
+    assert f"at {bound.told} of {bound.places} places" in bound_words(bound)
+
+
+class _Asked(ExternalImpulse):
+    """A kick that remembers for which videos its times were asked."""
+
+    asked: ClassVar[list[tuple[str, ...]]] = []
+
+    def search_points(self, videos: Sequence[Tracks]) -> Sequence[Mapping[str, float]]:
+        self.asked.append(tuple(one.video for one in videos))
+        return super().search_points(videos)[:3]
+
+
+def test_what_happens_once_in_a_video_is_looked_for_at_the_times_of_that_video_alone() -> None:
+    _, fit = fitted(seed=1)
+    (one,) = score_causes(fit, ResidualModel.of(fit), [_Asked()], seed=0)
+    assert _Asked.asked == [(name,) for name in fit.videos]
+    assert one.largest["impulse_x"].places <= 3 * len(fit.videos)

@@ -8,7 +8,7 @@ from tests.discovery.scenes import Setting
 from vrdp_prob.discovery import discover as module
 from vrdp_prob.discovery.body_checks import REBOUND
 from vrdp_prob.discovery.checks import run_checks
-from vrdp_prob.discovery.contact_checks import KICK
+from vrdp_prob.discovery.contact_checks import AT_WALLS, KICK, REBOUND_AT_WALLS
 from vrdp_prob.discovery.describe import describe
 from vrdp_prob.discovery.doubts import OWN_CHECKS, Doubt, doubts
 from vrdp_prob.discovery.finding import Check, Verdict
@@ -52,6 +52,13 @@ def test_what_is_left_of_the_very_thing_that_a_cause_does_speaks_against_it(tria
     assert REBOUND in doubt.sentence
 
 
+def test_of_several_checks_of_a_cause_the_worst_counts_as_often_as_there_are_some(trial: Trial) -> None:
+    (doubt,) = doubts(trial, SpeedDependentRestitution(), [*left(REBOUND, 0.5), *left(REBOUND_AT_WALLS, 5e-4)])
+    assert doubt.credible == pytest.approx(0.1)
+    assert REBOUND_AT_WALLS in doubt.sentence
+    assert not list(doubts(trial, SpeedDependentRestitution(), [*left(REBOUND, 0.5), *left(REBOUND_AT_WALLS, 6e-3)]))
+
+
 def test_a_kick_that_leaves_sudden_changes_is_not_the_only_one_or_none(trial: Trial) -> None:
     (doubt,) = doubts(trial, ExternalImpulse(), left(KICK, 1e-4))
     assert doubt.credible == pytest.approx(0.01)
@@ -61,7 +68,8 @@ def test_a_kick_that_leaves_sudden_changes_is_not_the_only_one_or_none(trial: Tr
 def test_checks_and_causes_go_by_their_names(trial: Trial) -> None:
     names = {one.name for one in run_checks(trial.fit, seed=0)}
     assert known_effects().keys() >= OWN_CHECKS.keys()
-    assert names >= {name for name in OWN_CHECKS.values() if "friction of the bodies" not in name}
+    own = {name for some in OWN_CHECKS.values() for name in some}
+    assert names >= {name for name in own if "friction of the bodies" not in name and AT_WALLS not in name}
 
 
 def test_a_doubted_cause_is_told_of_and_not_part_of_the_extended_model(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -7,7 +7,7 @@ from typing import ClassVar
 import pytest
 
 from tests.discovery.fitted import fitted
-from vrdp_prob.discovery.estimates import cause_sentence, estimates, surprise
+from vrdp_prob.discovery.estimates import cause_sentence, estimates, mass_scale_notes, surprise
 from vrdp_prob.discovery.finding import Estimate
 from vrdp_prob.models.effects.air_drag import AirDrag
 from vrdp_prob.models.effects.body_friction import BodyFriction
@@ -56,6 +56,15 @@ def test_a_sentence_tells_the_direction_that_the_interval_tells(low: float, high
 @pytest.mark.parametrize("effect", [one for one in known_effects().values() if one.signed_sentences])
 def test_a_direction_is_that_of_one_strength(effect: type[Effect]) -> None:
     assert list(effect.vanishes_at.values()) == [0.0]
+
+
+def test_a_strength_that_goes_with_the_masses_is_told_as_such_where_no_mass_is() -> None:
+    videos = fitted(seed=1)[0].tracks
+    (note,) = mass_scale_notes([LinearDrag(), PairForce()], videos)
+    assert "only the ratio of pair strength to the masses shows" in note
+    weighed = [replace(one, bodies=tuple(replace(body, mass=1.0) for body in one.bodies)) for one in videos]
+    assert not list(mass_scale_notes([PairForce()], weighed))
+    assert not list(mass_scale_notes([LinearDrag()], videos))
 
 
 class _Placed(Effect):

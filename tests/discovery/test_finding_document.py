@@ -57,6 +57,8 @@ def test_evidence_bounds_and_notes():
         "bound": 0.0123,
         "unit": "1/s",
         "vanishes_at": 0.0,
+        "places": 1,
+        "told": 1,
     }
     assert found["upper_bounds"][-1]["bound"] is None
     assert found["notes"] == ["Two videos end before 1 s; their errors at 1 s are not counted."]
@@ -82,6 +84,16 @@ def test_the_unknown_is_described():
     found = to_document(unknown())
     assert found["verdict"] == "unknown"
     assert found["description"]["explained"] == 0.61
+    assert found["tried"][0] == {
+        "name": "pair_force",
+        "gain": 4.2,
+        "gain_se": 3.1,
+        "gain_needed": 5.99,
+        "probability": 0.21,
+        "probability_needed": 0.8,
+        "why": "it gains too little",
+    }
+    assert {one["name"] for one in found["tried"]}.isdisjoint(cause["name"] for cause in found["causes"])
     assert found["description"]["formula"].startswith("a_x = ")
     assert to_document(nothing())["description"] is None
 

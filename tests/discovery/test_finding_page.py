@@ -125,6 +125,16 @@ def test_the_unknown_is_marked_as_a_description():
     assert "A description, not a cause" in text_of(render(with_a_rest()))
 
 
+def test_what_was_tried_and_not_established_is_told_with_what_it_would_need():
+    text = text_of(render(unknown()))
+    assert "Tried and not established" in text
+    assert "by 6.0 nats, and to have a probability of 80 % against" in text
+    assert "pair force +4.2 ± 3.1 21 % it gains too little" in text
+    told = "Tried and not established: pair force (+4.2 ± 3.1) and friction patch"
+    assert any(line.startswith(told) and line.endswith("6.0 are needed.") for line in lines(unknown()))
+    assert "Tried and not established" not in text_of(render(named()))
+
+
 def test_answers_that_change_lead_and_those_that_do_not_are_left_out():
     page = render(with_answers())
     stops, happens = (page.index(answer.question) for answer in ANSWERS[:2])

@@ -3,12 +3,14 @@
 from dataclasses import replace
 from unittest.mock import Mock, create_autospec
 
+import numpy as np
 import pytest
 
 from tests.discovery.findings import TILT, WIND
-from vrdp_prob.discovery import discover
+from vrdp_prob.discovery import discover, tried
 from vrdp_prob.discovery.finding import Check, Verdict
 from vrdp_prob.discovery.search import Search
+from vrdp_prob.discovery.trials import Trial
 
 
 def _checks(failing: int, p_value: float = 1e-9) -> list[Check]:
@@ -57,5 +59,36 @@ def test_the_verdict(
 
 def test_a_cause_that_may_take_the_place_of_several_is_told_once() -> None:
     other, rival = replace(WIND, named=False, probability=0.07), replace(WIND, named=False, probability=0.12)
-    assert discover._each_once([TILT, other, rival]) == [TILT, rival]
-    assert discover._each_once([TILT, replace(TILT, named=False, probability=1.0)]) == [TILT]
+    assert discover._in_order([TILT, other, rival]) == [TILT, rival]
+    assert discover._in_order([TILT, replace(TILT, named=False, probability=1.0)]) == [TILT]
+
+
+def test_causes_stand_named_ones_first_and_by_probability_doubted_ones_among_the_others() -> None:
+    rival, doubted = (replace(WIND, name=name, named=False) for name in ("rival", "doubted"))
+    rival, doubted = replace(rival, probability=0.1), replace(doubted, probability=0.6)
+    sure, less = replace(TILT, name="sure", probability=0.99), replace(TILT, probability=0.85)
+    assert discover._in_order([less, sure, rival, doubted]) == [sure, less, doubted, rival]
+
+
+@pytest.mark.parametrize(
+    ("gain", "patches", "why"),
+    [
+        ((2.0, 1.0), False, "it gains too little"),
+        ((30.0, 40.0), False, "too few videos speak for it"),
+        ((90.0, 1.0), True, "it mends videos and explains none of them"),
+    ],
+)
+def test_what_was_tried_is_told_with_what_it_would_have_needed(
+    gain: tuple[float, float], why: str, *, patches: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    found = _search(())
+    trials = [create_autospec(Trial, instance=True) for _ in range(3)]
+    for trial, name in zip(trials, ("drag", "drag", "named before"), strict=True):
+        trial.causes = (Mock(),)
+        trial.causes[0].name = name
+        trial.patches.return_value = patches
+    found.refits, found.needed, found.overdispersion = Mock(made=lambda _trial: trials), 6.0, np.ones(3)
+    monkeypatch.setattr(tried, "gain", lambda *_given: gain)
+    monkeypatch.setattr(tried, "weights", lambda *_given, **_named: np.array([0.5, 0.5]))
+    (one,) = tried.tried_causes(found, ["named before"], seed=0)
+    assert (one.name, one.gain, one.gain_se, one.gain_needed, one.why) == ("drag", *gain, 6.0, why)

@@ -27,8 +27,6 @@ from vrdp_prob.scene import Body, Shape
 REBOUND = "restitution against approach speed"
 LARGEST_SD = 0.3
 """Values that are known no better (standard deviation of the logarithm) tell nothing."""
-SLOWEST = 1e-3
-"""Slowest approach in m/s that is told apart."""
 
 
 @dataclass(frozen=True)
@@ -97,7 +95,7 @@ class Rebounds:
                 row[[place[index, body] for body in pair.tolist() if (index, body) in place]] = 1.0
                 owners.append(row)
                 met = (one.bodies == pair).all(axis=1)
-                speeds.append(float(np.exp(np.log(np.maximum(one.events.closing_speed[met], SLOWEST)).mean())))
+                speeds.append(float(np.exp(one.log_speed[met].mean())))
         rows = np.array(owners).reshape(len(owners), len(own.values))
         covariance = rows @ own.covariance @ rows.T
         known = np.flatnonzero(np.diag(covariance) < LARGEST_SD**2)

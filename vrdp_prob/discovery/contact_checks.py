@@ -1,17 +1,22 @@
-"""Whether contacts follow the model: how they rebound, rub and turn, at which distance, and kicks without a partner.
+"""Whether contacts follow the model: how they rub and turn, at which distance, and kicks without a partner.
+
+Contacts of bodies with each other and with stated walls are asked alike, each kind beside the other. How bodies rebound
+from each other shows in their fitted restitutions (see `body_checks`); how they rebound from walls is asked here, since
+one body meets walls at many speeds.
 
 What could act at contacts is carried through the rest of the motion like any other small change, beside all patterns
 of free flight and all that the fit can absorb. Where a cube's yaw is not measured its contacts may do anything: the
 direction of their impulse is known from the motion after them alone.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float
 from scipy.stats import chi2
 
+from vrdp_prob.discovery.body_checks import REBOUND
 from vrdp_prob.discovery.finding import Check
 from vrdp_prob.discovery.fitted_contacts import FittedContacts
 from vrdp_prob.discovery.fitted_motion import REACH, FittedMotion, Kicks
@@ -21,10 +26,16 @@ from vrdp_prob.discovery.linear import Score
 from vrdp_prob.discovery.replications import anywhere, independent_places
 from vrdp_prob.discovery.residual_model import ResidualModel, joined
 from vrdp_prob.discovery.words import number, opposite
+from vrdp_prob.models.simulator.events import RolloutEventKind
 
 RUBBING = "tangential against normal impulse"
 DISTANCE = "centre distance at contact"
 KICK = "sudden change of velocity without a partner"
+AT_CONTACTS, AT_WALLS = "at contacts", "at walls"
+RUBBING_AT_WALLS = f"{RUBBING} {AT_WALLS}"
+REBOUND_AT_WALLS = f"{REBOUND} {AT_WALLS}"
+WHERE = {AT_CONTACTS: RolloutEventKind.COLLISION, AT_WALLS: RolloutEventKind.WALL}
+"""Where bodies touch each other, and stated walls."""
 FEWEST_FRAMES = 4
 """Frames of a body before and after a kick without which it does not show."""
 
@@ -43,40 +54,72 @@ def contact_checks(
     replicas
         What noise leaves of each video beside them, for the kick that is looked for everywhere.
     """
-    contacts = [FittedContacts.of(video.motion) for video in model.videos]
-    if any(len(one) for one in contacts):
+    contacts = {
+        where: found
+        for where, kind in WHERE.items()
+        if any(map(len, found := [FittedContacts.of(video.motion, kind) for video in model.videos]))
+    }
+    if contacts:
         yield from _patterns(model, flight, contacts)
     yield from _kick_without_partner(flight.beside, replicas)
 
 
-def _patterns(model: ResidualModel, flight: FreeFlight, contacts: Sequence[FittedContacts]) -> Iterator[Check]:
+def _patterns(
+    model: ResidualModel, flight: FreeFlight, contacts: Mapping[str, Sequence[FittedContacts]]
+) -> Iterator[Check]:
+    """What acts at contacts, by where they are; what may act elsewhere is beside it."""
     motions = [video.motion for video in model.videos]
-    beside = model.sharing(flight.rows)
-    clear = [one.where(one.known_normal) for one in contacts]
-    vague = [one.where(~one.known_normal) for one in contacts]
-    changes = {
-        "anything": _one_after_another([one.pushed_anyhow() for one in vague]),
-        "rub": _one_after_another([_rubbing_each(one) for one in clear]),
-        "slip": [_slipping(one) for one in clear],
-        "turn": [_slipping(one, moving=False) for one in clear],
-        "grow": [motion.growth[..., None] for motion in motions],
-        "together": _one_after_another([one.pushed_together(_unbalanced(one)) for one in clear]),
-    }
-    rows = {
+    changes = {"grow": [motion.growth[..., None] for motion in motions]}
+    for where, some in contacts.items():
+        clear = [one.where(one.known_normal) for one in some]
+        changes |= {
+            f"anything {where}": _anything_where_vague(some),
+            f"rub {where}": _one_after_another([_rubbing_each(one) for one in clear]),
+            f"slip {where}": [_slipping(one) for one in clear],
+            f"turn {where}": [_slipping(one, moving=False) for one in clear],
+        }
+        if where == AT_CONTACTS:
+            changes["together"] = _one_after_another([one.pushed_together(_unbalanced(one)) for one in clear])
+        else:
+            changes["bounce"] = [_bouncing(one) for one in clear]
+    score, places = joined(model.sharing(flight.rows), _rows(model, changes))
+
+    def columns(*names: str) -> list[int]:
+        return [k for name in names for k in places[name]]
+
+    def part(name: str, *given: str) -> Score:
+        return score.of(places[name], columns(*(f"anything {where}" for where in contacts), *given))
+
+    turning = all(motion.tracks.angles is not None for motion in motions)
+    rub = [f"rub {where}" for where in contacts]
+    for where in contacts:
+        beside = ("grow", *(f"{'slip' if turning else 'rub'} {other}" for other in contacts if other != where))
+        if turning:
+            yield from _slip_check(part(f"slip {where}", *beside), where)
+            yield from _turn_check(part(f"turn {where}", *beside), where)
+        else:
+            yield from _rub_check(part(f"rub {where}", *beside), where)
+    if AT_CONTACTS in contacts:
+        yield from _distance_check(part("grow", *rub), contacts[AT_CONTACTS])
+        clear = [one.where(one.known_normal) for one in contacts[AT_CONTACTS]]
+        yield from _momentum_check(part("together", *rub, "grow"), sum(map(len, clear)))
+    if AT_WALLS in contacts:
+        yield from _bounce_check(part("bounce", *rub, "grow"))
+
+
+def _anything_where_vague(contacts: Sequence[FittedContacts]) -> list[Float[np.ndarray, "_ _ 3 column"]]:
+    """Kicks of all bodies at contacts of which nobody knows the direction."""
+    return _one_after_another([one.where(~one.known_normal).pushed_anyhow() for one in contacts])
+
+
+def _rows(
+    model: ResidualModel, changes: Mapping[str, Sequence[Float[np.ndarray, "_ _ 3 _"]]]
+) -> dict[str, list[Float[np.ndarray, "_ _"]]]:
+    """What patterns do to the residuals of each video."""
+    return {
         name: [video.rows(one) for video, one in zip(model.videos, parts, strict=True)]
         for name, parts in changes.items()
     }
-    score, places = joined(beside, rows)
-
-    def part(name: str, *given: str) -> Score:
-        return score.of(places[name], [k for other in ("anything", *given) for k in places[other]])
-
-    turning = all(motion.tracks.angles is not None for motion in motions)
-    yield from _slip_check(part("slip", "grow")) if turning else _rub_check(part("rub", "grow"))
-    if turning:
-        yield from _turn_check(part("turn", "grow"))
-    yield from _distance_check(part("grow", "rub"), contacts)
-    yield from _momentum_check(part("together", "rub", "grow"), sum(len(one) for one in clear))
 
 
 @dataclass(frozen=True)
@@ -99,16 +142,11 @@ class Rubbing:
 def rubbing(model: ResidualModel, flight: FreeFlight, contacts: Sequence[FittedContacts]) -> Rubbing:
     """Tangential impulses, each by itself, beside all patterns of free flight."""
     clear = [one.where(one.known_normal) for one in contacts]
-    vague = [one.where(~one.known_normal) for one in contacts]
     changes = {
         "rub": _one_after_another([_rubbing_each(one) for one in clear]),
-        "anything": _one_after_another([one.pushed_anyhow() for one in vague]),
+        "anything": _anything_where_vague(contacts),
     }
-    rows = {
-        name: [video.rows(one) for video, one in zip(model.videos, parts, strict=True)]
-        for name, parts in changes.items()
-    }
-    score, places = joined(model.sharing(flight.rows), rows)
+    score, places = joined(model.sharing(flight.rows), _rows(model, changes))
     part = score.of(places["rub"], places["anything"])
     return Rubbing(np.concatenate([one.events.impulse for one in clear]), part.estimate, part.sd)
 
@@ -118,6 +156,12 @@ def _slipping(contacts: FittedContacts, *, moving: bool = True) -> Float[np.ndar
     sizes = np.stack([contacts.rubbing * contacts.events.impulse, -contacts.slip * contacts.common_mass], axis=1)
     chosen = sizes if moving else sizes[:, :1]
     return contacts.pushed_apart(contacts.tangent[:, :, None] * chosen[:, None], moving=moving)
+
+
+def _bouncing(contacts: FittedContacts) -> Float[np.ndarray, "time body 3 column"]:
+    """Impulses along the normal of a restitution that goes with a power of the approach speed, and of a larger one."""
+    sizes = contacts.bounce[:, None] * np.stack([contacts.log_speed, np.ones(len(contacts))], axis=1)
+    return contacts.pushed_apart(contacts.events.normal[:, :, None] * sizes[:, None])
 
 
 def _rubbing_each(contacts: FittedContacts) -> Float[np.ndarray, "time body 3 column"]:
@@ -147,18 +191,18 @@ def _one_after_another(
     return result
 
 
-def _slip_check(score: Score) -> Iterator[Check]:
+def _slip_check(score: Score, where: str) -> Iterator[Check]:
     """Rubbing where the spins, and so the directions in which bodies slip, are measured."""
     if not score.degrees:
         return
     alone = score.of([0])
     size, sd = float(alone.estimate[0]), float(alone.sd[0])
     word = opposite(size, "along", "against")
-    found = f"At contacts a tangential impulse acts {word} the slip, {number(abs(size))} of the normal one."
-    yield _check(RUBBING, size, score.p_value, found, f"{number(NORMAL_95 * sd)} of the normal one")
+    found = f"{where.capitalize()} a tangential impulse acts {word} the slip, {number(abs(size))} of the normal one."
+    yield _check(_rubbing_name(where), size, score.p_value, found, f"{number(NORMAL_95 * sd)} of the normal one")
 
 
-def _rub_check(score: Score) -> Iterator[Check]:
+def _rub_check(score: Score, where: str) -> Iterator[Check]:
     """Rubbing where nobody knows in which direction bodies slip, because nobody saw them turn."""
     if not score.degrees:
         return
@@ -167,20 +211,38 @@ def _rub_check(score: Score) -> Iterator[Check]:
     visible = NORMAL_95 * float((1 / variance).sum() ** -0.5)
     excess = float((score.estimate[known] ** 2 / variance - 1).sum() / (1 / variance).sum())
     size = float(np.sqrt(max(excess, 0.0)))
-    found = f"At contacts tangential impulses act, {number(size)} of the normal ones (root mean square)."
-    yield _check(RUBBING, size, score.p_value, found, f"{number(visible)} of the normal ones")
+    found = f"{where.capitalize()} tangential impulses act, {number(size)} of the normal ones (root mean square)."
+    yield _check(_rubbing_name(where), size, score.p_value, found, f"{number(visible)} of the normal ones")
 
 
-def _turn_check(score: Score) -> Iterator[Check]:
+def _rubbing_name(where: str) -> str:
+    return RUBBING_AT_WALLS if where == AT_WALLS else RUBBING
+
+
+def _turn_check(score: Score, where: str) -> Iterator[Check]:
     if not score.degrees:
         return
     size = float(score.estimate[0])
     found = (
-        f"Contacts change the spin of bodies as if the tangential impulse were {number(abs(size))} of the normal one, "
-        f"{opposite(size, 'along', 'against')} the slip."
+        f"{where.capitalize()} the spin of bodies changes as if the tangential impulse were {number(abs(size))} of the "
+        f"normal one, {opposite(size, 'along', 'against')} the slip."
     )
     visible = f"{number(NORMAL_95 * float(score.sd[0]))} of the normal impulse"
-    yield _check("spin change at contacts", size, score.p_value, found, visible)
+    yield _check(f"spin change {where}", size, score.p_value, found, visible)
+
+
+def _bounce_check(score: Score) -> Iterator[Check]:
+    """Restitution at walls against the approach speed, whatever it is on average."""
+    power = score.of([0], [1])
+    if not power.degrees:
+        return
+    size, sd = float(power.estimate[0]), float(power.sd[0])
+    found = (
+        f"{AT_WALLS.capitalize()} restitution {opposite(size, 'falls', 'grows')} with the approach speed, to the power "
+        f"{number(size)}."
+    )
+    visible = f"a power of {number(NORMAL_95 * sd)} of the approach speed"
+    yield _check(REBOUND_AT_WALLS, size, power.p_value, found, visible)
 
 
 def _distance_check(score: Score, contacts: Sequence[FittedContacts]) -> Iterator[Check]:

@@ -11,13 +11,14 @@ from vrdp_prob.discovery.checking import check_video_count
 from vrdp_prob.discovery.checks import run_checks
 from vrdp_prob.discovery.describe import describe
 from vrdp_prob.discovery.doubts import Doubt, doubts
-from vrdp_prob.discovery.estimates import cause_sentence, estimates, upper_bounds
+from vrdp_prob.discovery.estimates import cause_sentence, estimates, mass_scale_notes, upper_bounds
 from vrdp_prob.discovery.figures import residual_figures
 from vrdp_prob.discovery.finding import Check, Finding, FoundCause, Gain, UpperBound, Verdict
 from vrdp_prob.discovery.free_flight import NORMAL_95
 from vrdp_prob.discovery.mimics import Unlisted, laws_of, without_mimics
 from vrdp_prob.discovery.search import Search, search
 from vrdp_prob.discovery.trials import Trial, gain, gains, weights
+from vrdp_prob.discovery.tried import tried_causes
 from vrdp_prob.inference import default_model
 from vrdp_prob.inference.parallel import linear_algebra_in_one_thread, several_processes
 from vrdp_prob.inference.several_videos.fitting import fit_together
@@ -97,7 +98,8 @@ def discover(
             found = found.without(list(doubted)) if other is None else other
             after = _checks_after(found, checks, seed)
         verdict = Verdict.UNKNOWN if unlisted is not None or reasons else _verdict(found, checks, after)
-        causes = _each_once([*_causes(found, {}, seed), *not_named])
+        causes = _in_order([*_causes(found, {}, seed), *not_named])
+        tried = tried_causes(found, {cause.name for cause in causes}, seed=seed)
     return Finding(
         verdict=verdict,
         causes=tuple(causes),
@@ -108,10 +110,11 @@ def discover(
         extended=extended_model(found.best, found.overdispersion),
         videos=tuple(tracks.video for tracks in videos),
         description=describe(found.best.fit, after) if verdict is Verdict.UNKNOWN else None,
-        notes=tuple(_notes(found, reasons, unlisted)),
+        notes=(*_notes(found, reasons, unlisted), *mass_scale_notes(_told(found, causes), videos)),
         figures=residual_figures(found.base.fit, found.best.fit if found.best.causes else None),
         fit=found.best.fit,
         left_out=models_of_the_others(found.base, found.best, found.overdispersion),
+        tried=tuple(tried),
     )
 
 
@@ -158,8 +161,7 @@ def _excess(trial: Trial) -> float:
 
 def _causes(found: Search, doubted: Mapping[Effect, Sequence[Doubt]], seed: int) -> list[FoundCause]:
     """The causes of the best model, and those that could take the place of one."""
-    named: list[FoundCause] = []
-    others: list[FoundCause] = []
+    causes: list[FoundCause] = []
     for number, (lesser, rivals) in enumerate(zip(found.lesser, found.rivals, strict=True)):
         best_of = {one.causes[-1].name: one for one in reversed(rivals)}
         trials = [found.best, lesser, *best_of.values()]
@@ -170,21 +172,20 @@ def _causes(found: Search, doubted: Mapping[Effect, Sequence[Doubt]], seed: int)
         cause = found.best.causes[number]
         reasons = doubted.get(cause, ())
         probability = float(shares[0]) * math.prod(one.credible for one in reasons)
-        named.append(_cause(found.best, cause, lesser, found.overdispersion, probability, named=not reasons))
+        causes.append(_cause(found.best, cause, lesser, found.overdispersion, probability, named=not reasons))
         for rival, share in zip(best_of.values(), shares[2:], strict=True):
             if share >= LEAST_SHARE:
                 probability = float(share) * math.prod(one.credible for one in doubts(rival, rival.causes[-1]))
-                others.append(_cause(rival, rival.causes[-1], lesser, found.overdispersion, probability, named=False))
-    named.sort(key=lambda one: (not one.named, -one.probability))
-    return named + sorted(others, key=lambda one: -one.probability)
+                causes.append(_cause(rival, rival.causes[-1], lesser, found.overdispersion, probability, named=False))
+    return causes
 
 
-def _each_once(causes: Sequence[FoundCause]) -> list[FoundCause]:
-    """Causes without those that are there again, less probable: one may take the place of several."""
+def _in_order(causes: Sequence[FoundCause]) -> list[FoundCause]:
+    """Named causes first, each group by probability; one that may take the place of several stands there once."""
     first: dict[str, FoundCause] = {}
     for cause in sorted(causes, key=lambda one: (not one.named, -one.probability)):
         first.setdefault(cause.name, cause)
-    return [cause for cause in causes if first[cause.name] is cause]
+    return list(first.values())
 
 
 def _cause(
@@ -218,6 +219,12 @@ def _gain(before: Trial, after: Trial, overdispersion: Float[np.ndarray, "video"
         elpd_se=error,
         by_video=dict(zip(videos, gains(after, before, overdispersion).tolist(), strict=True)),
     )
+
+
+def _told(found: Search, causes: Sequence[FoundCause]) -> list[Effect]:
+    """The effects of some causes."""
+    names = {cause.name for cause in causes}
+    return [effect for effect in found.refits.catalogue if effect.name in names]
 
 
 def _bounds(found: Search) -> list[UpperBound]:

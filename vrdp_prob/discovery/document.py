@@ -43,6 +43,7 @@ def to_document(finding: Finding, *, model: Path | None = None) -> dict[str, Any
         "verdict": str(finding.verdict),
         "sentence": verdict_sentence(finding),
         "causes": [_cause(cause) for cause in finding.causes],
+        "tried": [asdict(one) for one in finding.tried],
         "evidence": _evidence(finding.checks),
         "evidence_after": _evidence(finding.checks_after),
         "upper_bounds": [asdict(bound) for bound in finding.upper_bounds],

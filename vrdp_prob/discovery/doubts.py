@@ -1,10 +1,10 @@
 """Reasons to doubt that what was found is the cause that it is called."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from vrdp_prob.discovery.body_checks import REBOUND, friction_against
-from vrdp_prob.discovery.contact_checks import DISTANCE, KICK, RUBBING
+from vrdp_prob.discovery.contact_checks import DISTANCE, KICK, REBOUND_AT_WALLS, RUBBING, RUBBING_AT_WALLS
 from vrdp_prob.discovery.estimates import surprise
 from vrdp_prob.discovery.finding import Check
 from vrdp_prob.discovery.measurement_checks import DISTORTION
@@ -21,16 +21,16 @@ from vrdp_prob.models.effects.speed_dependent_restitution import SpeedDependentR
 
 SURPRISING = 0.01
 """Probability below which parameters of a cause, or what is left of what it acts on, say that it is something else."""
-OWN_CHECKS = {
-    SpeedDependentRestitution.name: REBOUND,
-    ContactFriction.name: RUBBING,
-    ContactRadiusError.name: DISTANCE,
-    ExternalImpulse.name: KICK,
-    LensDistortion.name: DISTORTION,
-    MassDependentFriction.name: friction_against("mass"),
-    MaterialFriction.name: friction_against("material"),
+OWN_CHECKS: Mapping[str, tuple[str, ...]] = {
+    SpeedDependentRestitution.name: (REBOUND, REBOUND_AT_WALLS),
+    ContactFriction.name: (RUBBING, RUBBING_AT_WALLS),
+    ContactRadiusError.name: (DISTANCE,),
+    ExternalImpulse.name: (KICK,),
+    LensDistortion.name: (DISTORTION,),
+    MassDependentFriction.name: (friction_against("mass"),),
+    MaterialFriction.name: (friction_against("material"),),
 }
-"""By the name of a cause: the check that asks for what it does, and for nothing else."""
+"""By the name of a cause: the checks that ask for what it does, and for nothing else."""
 
 
 @dataclass(frozen=True)
@@ -68,11 +68,12 @@ def doubts(trial: Trial, cause: Effect, left: Sequence[Check] = ()) -> Iterator[
             f"The parameters of '{cause.name}' are far from what was expected of this cause: it may stand for "
             "something that it has as its limit, and its probability counts that.",
         )
-    own = next((one for one in left if one.name == OWN_CHECKS.get(cause.name)), None)
-    if own is not None and own.p_value < SURPRISING:
+    own = sorted((one for one in left if one.name in OWN_CHECKS.get(cause.name, ())), key=lambda one: one.p_value)
+    by_chance = len(own) * own[0].p_value if own else 1.0
+    if by_chance < SURPRISING:
         otherwise = ", or it happened more often than was found" if happens_once(cause) else ""
         yield Doubt(
-            own.p_value / SURPRISING,
-            f"With '{cause.name}' the check of {own.name} fails still, which asks for just what this cause does: its "
-            f"law is another one{otherwise}, and its probability counts that.",
+            by_chance / SURPRISING,
+            f"With '{cause.name}' the check of {own[0].name} fails still, which asks for just what this cause does: "
+            f"its law is another one{otherwise}, and its probability counts that.",
         )

@@ -1,14 +1,14 @@
 """What a fit says of the parameters of a cause, in their units, and how large a cause may be that was not named."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Mapping
 
 import numpy as np
 from jaxtyping import Float
 from scipy.stats import chi2
 
 from vrdp_prob.discovery.finding import Estimate, UpperBound
-from vrdp_prob.discovery.scores import CauseScore
+from vrdp_prob.discovery.scores import CauseScore, Largest
 from vrdp_prob.discovery.unexplained import Unexplained
 from vrdp_prob.inference.several_videos.fitting import SharedFit
 from vrdp_prob.inference.several_videos.linking import place_words
@@ -80,6 +80,25 @@ def widened(
     return wider if unexplained is None else wider * unexplained.shared_widening
 
 
+def mass_scale_notes(effects: Iterable[Effect], videos: Iterable[Tracks]) -> Iterator[str]:
+    """What limits estimates of parameters that show only as their ratio to the masses, where no mass is stated.
+
+    Parameters
+    ----------
+    effects
+        Effects whose parameters are told.
+    videos
+        What was seen.
+    """
+    if any(body.mass is not None for tracks in videos for body in tracks.bodies):
+        return
+    for name in (one.name for effect in effects for one in effect.parameters if one.goes_with_masses):
+        yield (
+            f"No mass is stated, and only the ratio of {name.replace('_', ' ')} to the masses shows: its value and its "
+            "interval are those for masses of the scale that was believed, and change in proportion with it."
+        )
+
+
 def _estimate(transform: Transform, mean: float, sd: float, unit: str) -> Estimate:
     low, high = mean - MIDDLE * sd, mean + MIDDLE * sd
     if transform is Transform.IDENTITY:
@@ -141,7 +160,7 @@ def _unit(unit: str) -> str:
 
 
 def upper_bounds(effect: Effect, score: CauseScore | None) -> list[UpperBound]:
-    """How large the strengths of a cause may be (95 %), where it would fit best.
+    """How large the strengths of a cause may be (95 %), at the place where most could have hidden.
 
     Parameters
     ----------
@@ -152,8 +171,11 @@ def upper_bounds(effect: Effect, score: CauseScore | None) -> list[UpperBound]:
     """
     names = dict.fromkeys([*effect.vanishes_at, *effect.vanishes_like]) or [effect.parameters[0].name]
     units = {parameter.name: parameter.unit for parameter in effect.parameters}
-    largest = {} if score is None else score.largest
-    return [UpperBound(effect.name, name, largest.get(name), units[name], _nothing(effect, name)) for name in names]
+    largest = {name: (score.largest if score else {}).get(name, Largest(None, 1, 0)) for name in names}
+    return [
+        UpperBound(effect.name, name, one.bound, units[name], _nothing(effect, name), one.places, one.told)
+        for name, one in largest.items()
+    ]
 
 
 def _nothing(effect: Effect, strength: str) -> float | str:

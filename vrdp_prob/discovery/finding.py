@@ -116,6 +116,33 @@ class FoundCause:
 
 
 @dataclass(frozen=True)
+class TriedCause:
+    """A cause that was tried and not established, so that it is told of nowhere else.
+
+    Parameters
+    ----------
+    name
+        Its name in the catalogue.
+    gain, gain_se
+        Difference of the log predictive density of left-out videos (nats) that it brings, and its standard error.
+    gain_needed
+        What it would have to bring.
+    probability, probability_needed
+        Against the model without it, and what that would have to be.
+    why
+        What speaks against it, as a clause for a reader.
+    """
+
+    name: str
+    gain: float
+    gain_se: float
+    gain_needed: float
+    probability: float
+    probability_needed: float
+    why: str
+
+
+@dataclass(frozen=True)
 class Check:
     """A test of what a model leaves unexplained.
 
@@ -149,9 +176,13 @@ class UpperBound:
     name, parameter
         The cause and its parameter.
     bound, unit
-        How far the parameter may be from where the cause does nothing; None where the data put no bound on it.
+        How far the parameter may be from where the cause does nothing, at the place where it may be farthest of those
+        that tell anything; None where the data put no bound on it.
     vanishes_at
         Where that is: a value, or the name of the parameter that it is then equal to.
+    places, told
+        Number of places (points of a search, bodies or videos) at which it was looked for, and of those that tell
+        anything: nobody was at the others.
     """
 
     name: str
@@ -159,6 +190,8 @@ class UpperBound:
     bound: float | None
     unit: str
     vanishes_at: float | str = 0.0
+    places: int = 1
+    told: int = 1
 
 
 @dataclass(frozen=True)
@@ -274,6 +307,8 @@ class Finding:
     figures
         What the model misses, and the extended one: an SVG element as text by its title. One whose root has the class
         `themed` uses the page's colours (`var(--ink)`, `var(--accent)`, ...); any other stands on white.
+    tried
+        Further causes that were tried on the extended model and not established.
     answers
         Answers to questions about the videos under both models; None where nothing was asked or nothing is named.
     fit
@@ -297,6 +332,7 @@ class Finding:
     answers: tuple[ComparedAnswer, ...] | None = None
     fit: SharedFit | None = None
     left_out: Mapping[str, tuple[PhysicsModel, PhysicsModel]] = field(default_factory=dict)
+    tried: tuple[TriedCause, ...] = ()
 
     @property
     def named(self) -> tuple[FoundCause, ...]:

@@ -1,7 +1,7 @@
-"""The contacts between bodies that a fit believes in: where, how fast, and how anything that acts there would show."""
+"""The contacts that a fit believes in: where, how fast, and how anything that acts there would show."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -13,11 +13,15 @@ from vrdp_prob.scene import Shape
 
 CREEP = 0.02
 """Slip in m/s below which the direction of rubbing is smoothed."""
+SLOWEST = 1e-3
+"""Slowest approach in m/s that is told apart."""
 
 
 @dataclass(frozen=True)
 class FittedContacts:
-    """Contacts between two bodies of one video.
+    """Contacts of bodies in one video, with each other or with stated walls.
+
+    A contact has a side for each body that takes part: two, or one at a wall, which does not move.
 
     Parameters
     ----------
@@ -25,19 +29,22 @@ class FittedContacts:
         The motion.
     events
         The contacts.
+    kind
+        What the bodies touch: each other (`COLLISION`) or a wall (`WALL`).
     """
 
     motion: FittedMotion
     events: EventTable
+    kind: RolloutEventKind = RolloutEventKind.COLLISION
 
     @classmethod
-    def of(cls, motion: FittedMotion) -> "FittedContacts":
+    def of(cls, motion: FittedMotion, kind: RolloutEventKind = RolloutEventKind.COLLISION) -> "FittedContacts":
         """The contacts of a motion."""
-        return cls(motion, motion.events.of_kind(RolloutEventKind.COLLISION))
+        return cls(motion, motion.events.of_kind(kind), kind)
 
     def where(self, keep: Bool[np.ndarray, "contact"]) -> "FittedContacts":
         """Some of the contacts."""
-        return FittedContacts(self.motion, self.events.where(keep))
+        return replace(self, events=self.events.where(keep))
 
     @property
     def known_normal(self) -> Bool[np.ndarray, "contact"]:
@@ -49,9 +56,19 @@ class FittedContacts:
         return len(self.events)
 
     @property
-    def bodies(self) -> Int[np.ndarray, "contact 2"]:
-        """The two bodies."""
-        return np.stack([self.events.first, self.events.second], axis=1)
+    def sides(self) -> Float[np.ndarray, "side"]:
+        """For each body of a contact: on which end of the normal it is, -1 or 1."""
+        return np.array([-1.0, 1.0])[: 2 if self.kind is RolloutEventKind.COLLISION else 1]
+
+    @property
+    def bodies(self) -> Int[np.ndarray, "contact side"]:
+        """The bodies."""
+        return np.stack([self.events.first, self.events.second], axis=1)[:, : len(self.sides)]
+
+    @property
+    def log_speed(self) -> Float[np.ndarray, "contact"]:
+        """Logarithms of the approach speeds in m/s."""
+        return np.asarray(np.log(np.maximum(self.events.closing_speed, SLOWEST)))
 
     @cached_property
     def before(self) -> Int[np.ndarray, "contact"]:
@@ -60,13 +77,13 @@ class FittedContacts:
 
     @cached_property
     def tangent(self) -> Float[np.ndarray, "contact 2"]:
-        """Unit vector to the left of the normal from the first to the second body."""
+        """Unit vector to the left of the normal, which points from the first to the second body or to the wall."""
         normal = self.events.normal
         return np.stack([-normal[:, 1], normal[:, 0]], axis=1)
 
     @cached_property
-    def lever(self) -> Float[np.ndarray, "contact 2 2"]:
-        """From the middle of each of the two bodies to the touching point, in m."""
+    def lever(self) -> Float[np.ndarray, "contact side 2"]:
+        """From the middle of each of the bodies to the touching point, in m."""
         frame = self.before[:, None]
         since = (self.events.time - self.motion.times[self.before])[:, None, None]
         moved = self.motion.position[frame, self.bodies] + since * self.motion.velocity[frame, self.bodies]
@@ -74,28 +91,36 @@ class FittedContacts:
 
     @cached_property
     def slip(self) -> Float[np.ndarray, "contact"]:
-        """Speed in m/s of the second body's touching point past the first's, along the tangent, before the contact."""
+        """Speed in m/s of the second touching point past the first body's, along the tangent, before the contact."""
         frame = self.before[:, None]
         spin = self.motion.spin[frame, self.bodies]
         turning = spin[..., None] * np.stack([-self.lever[..., 1], self.lever[..., 0]], axis=-1)
         surface = self.motion.velocity[frame, self.bodies] + turning
-        return ((surface[:, 1] - surface[:, 0]) * self.tangent).sum(axis=1)
+        return ((self.sides @ surface) * self.tangent).sum(axis=1)
 
     @cached_property
     def rubbing(self) -> Float[np.ndarray, "contact"]:
-        """Direction along the tangent, 1 or -1, in which rubbing pushes the second body; near 0 where nothing slips."""
+        """Direction along the tangent, 1 or -1, of the impulse of rubbing; near 0 where nothing slips."""
         return -self.slip / np.hypot(self.slip, CREEP)
 
     @cached_property
     def common_mass(self) -> Float[np.ndarray, "contact"]:
-        """Reduced mass of the two bodies in kg."""
-        first, second = self.motion.mass[self.bodies].T
-        return first * second / (first + second)
+        """Reduced mass of the bodies in kg."""
+        return np.asarray(1 / (1 / self.motion.mass[self.bodies]).sum(axis=1))
+
+    @cached_property
+    def bounce(self) -> Float[np.ndarray, "contact"]:
+        """Part of the normal impulse (kg m/s) that restitution adds to what ends the approach."""
+        turning = (
+            self.lever[..., 0] * self.events.normal[:, None, 1] - self.lever[..., 1] * self.events.normal[:, None, 0]
+        )
+        per_impulse = (1 / self.motion.mass[self.bodies] + turning**2 / self.motion.inertia[self.bodies]).sum(axis=1)
+        return np.maximum(self.events.impulse - self.events.closing_speed / per_impulse, 0.0)
 
     def pushed_apart(
         self, impulse: Float[np.ndarray, "contact 2 column"], *, moving: bool = True, turning: bool = True
     ) -> Float[np.ndarray, "time body 3 column"]:
-        """Changes of what is measured by impulses (kg m/s) on the second body, and their opposites on the first.
+        """Changes of what is measured by impulses (kg m/s) on the second body or wall, their opposites on the first.
 
         Parameters
         ----------
@@ -104,11 +129,11 @@ class FittedContacts:
         moving, turning
             Whether velocities, and whether spins change.
         """
-        both = np.stack([-impulse, impulse], axis=1)
+        both = self.sides[:, None, None] * impulse[:, None]
         mass, inertia = self.motion.mass[self.bodies], self.motion.inertia[self.bodies]
         lever = self.lever[..., None]
         torque = lever[:, :, 0] * both[:, :, 1] - lever[:, :, 1] * both[:, :, 0]
-        changes = np.zeros((len(self), 2, 3, impulse.shape[-1]))
+        changes = np.zeros((*self.bodies.shape, 3, impulse.shape[-1]))
         changes[:, :, :2] = moving * both / mass[..., None, None]
         changes[:, :, 2] = turning * torque / inertia[..., None]
         return self._kicked(changes)
@@ -116,17 +141,22 @@ class FittedContacts:
     def pushed_together(
         self, directions: Sequence[Float[np.ndarray, "contact 2"]]
     ) -> Float[np.ndarray, "time body 3 column"]:
-        """Changes of what is measured if both bodies leave a contact by 1 m/s faster along each of some directions."""
+        """Changes of what is measured if all bodies leave a contact by 1 m/s faster along each of some directions."""
         count = len(self)
-        changes = np.zeros((count, 2, 3, len(directions), count))
+        changes = np.zeros((*self.bodies.shape, 3, len(directions), count))
         for place, direction in enumerate(directions):
             changes[np.arange(count), :, :2, place, np.arange(count)] = direction[:, None]
-        return self._kicked(changes.reshape(count, 2, 3, len(directions) * count))
+        return self._kicked(changes.reshape(*self.bodies.shape, 3, len(directions) * count))
 
     def pushed_anyhow(self) -> Float[np.ndarray, "time body 3 column"]:
-        """Changes of what is measured by kicks of both bodies along x and along y, each by itself."""
-        return self.motion.kicked(Kicks.single(np.repeat(self.events.time, 2), self.bodies.ravel()))
+        """Changes of what is measured by kicks of all bodies along x and along y, each by itself."""
+        return self.motion.kicked(Kicks.single(self._times, self.bodies.ravel()))
 
-    def _kicked(self, changes: Float[np.ndarray, "contact 2 3 column"]) -> Float[np.ndarray, "time body 3 column"]:
-        flat = changes.reshape(2 * len(self), 3, changes.shape[-1])
-        return self.motion.kicked(Kicks(np.repeat(self.events.time, 2), self.bodies.ravel(), flat))
+    def _kicked(self, changes: Float[np.ndarray, "contact side 3 column"]) -> Float[np.ndarray, "time body 3 column"]:
+        flat = changes.reshape(self.bodies.size, 3, changes.shape[-1])
+        return self.motion.kicked(Kicks(self._times, self.bodies.ravel(), flat))
+
+    @property
+    def _times(self) -> Float[np.ndarray, "kick"]:
+        """Time in s at which each body of each contact is in touch."""
+        return np.repeat(self.events.time, len(self.sides))

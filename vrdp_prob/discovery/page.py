@@ -25,6 +25,7 @@ from vrdp_prob.discovery.wording import (
     p_words,
     parameter_words,
     title,
+    tried_words,
     typeset,
     with_unit,
 )
@@ -54,6 +55,7 @@ def render(finding: Finding) -> str:
         "causes": [{**_cause(cause, finding), "videos": video_figure(cause.gain)} for cause in named],
         "answers": None if finding.answers is None else rows(finding.answers),
         **_others(finding),
+        "tried": _tried(finding),
         "coverage": _coverage(named),
         "checks": _checks(finding),
         "figures": [(name, _inline(figure, index)) for index, (name, figure) in enumerate(finding.figures.items())],
@@ -101,6 +103,21 @@ def _others(finding: Finding) -> dict[str, Any]:
         "possible_title": "Also possible" if finding.named else "Not excluded",
         "possible_words": ALIKE if finding.named else NOT_EXCLUDED,
         "rejected": [_cause(cause, finding) for cause in rejected],
+    }
+
+
+def _tried(finding: Finding) -> dict[str, Any] | None:
+    """Causes that were tried and not established, with what they would have needed."""
+    if not finding.tried:
+        return None
+    first = finding.tried[0]
+    return {
+        "needed": number(first.gain_needed),
+        "probability_needed": _percent(first.probability_needed),
+        "rows": [
+            {"title": title(one.name), "gain": tried_words(one), "chance": chance(one.probability), "why": one.why}
+            for one in finding.tried
+        ],
     }
 
 

@@ -74,7 +74,7 @@ def probes(
         for place, entry in enumerate(entries)
         if entry.field in vanishing
     }
-    if not strengths:
+    if not strengths or not points:
         return []
     batch = []
     for values in points:

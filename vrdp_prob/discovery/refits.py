@@ -94,6 +94,10 @@ class Refits:
         """Refits of a model, the best first."""
         return self._made[trial] if trial in self._made else self._keep(trial, self._new(trial))
 
+    def made(self, trial: Trial) -> Sequence[Trial]:
+        """Refits of a model as far as any were made, the best first."""
+        return self._made.get(trial, ())
+
     def _keep(self, trial: Trial, found: Sequence[Trial]) -> list[Trial]:
         """Refits of a model, the best first, as which they count from now on."""
         self._made[trial] = sorted(found, key=merit, reverse=True)

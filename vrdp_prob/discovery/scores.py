@@ -5,6 +5,7 @@ time that exists only where the cause does, the largest statistic of a scan with
 Davies, Hypothesis testing when a nuisance parameter is present only under the alternative, Biometrika 64 (1977).
 """
 
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -20,7 +21,7 @@ from vrdp_prob.inference.parallel import in_parallel, in_processes
 from vrdp_prob.inference.several_videos.fitting import SharedFit
 from vrdp_prob.inference.several_videos.linking import Key
 from vrdp_prob.models.effects.effect import Effect
-from vrdp_prob.models.parameters import Scope, Transform
+from vrdp_prob.models.parameters import Parameter, Scope, Transform
 
 REPLICATIONS = 400
 TAIL = 0.05
@@ -57,6 +58,24 @@ class Site:
 
 
 @dataclass(frozen=True)
+class Largest:
+    """How large a strength may be that was looked for at several places (bodies, videos, points of a search).
+
+    Parameters
+    ----------
+    bound
+        How far (95 %) it may be from where it vanishes, at the place where it may be largest of those that tell
+        anything; None where none does.
+    places, told
+        Number of places, and of those that tell anything.
+    """
+
+    bound: float | None
+    places: int
+    told: int
+
+
+@dataclass(frozen=True)
 class CauseScore:
     """What the residuals say of a cause that the model does not have.
 
@@ -73,8 +92,8 @@ class CauseScore:
     p_value
         Probability of a statistic as large anywhere if the cause is absent.
     largest
-        By the name of a strength: how far (95 %) it may be from where it vanishes, at the best place of each body or
-        video that it may belong to and that tells anything of it; None where none does.
+        By the name of a strength: how large it may be, at any searched point if videos share it, else at the best one
+        of each body or video that it may belong to.
     places
         Number of bodies or videos among which the sites were chosen.
     """
@@ -85,7 +104,7 @@ class CauseScore:
     chi_square: float
     degrees: int
     p_value: float
-    largest: Mapping[str, float | None]
+    largest: Mapping[str, Largest]
     places: int = 1
 
     @property
@@ -112,11 +131,11 @@ def _scanned(fit: SharedFit, model: ResidualModel, seed: int, effect: Effect) ->
 
 
 def _probed(
-    fit: SharedFit, model: ResidualModel, effect: Effect
-) -> tuple[Sequence[Mapping[str, float]], list[list[Probe]]]:
-    points = effect.search_points(fit.tracks)
-    return points, in_parallel(
-        lambda index: probes(fit, index, model.videos[index].noise, effect, points), range(len(fit.fits))
+    fit: SharedFit, model: ResidualModel, effect: Effect, points: Sequence[Sequence[Mapping[str, float]]]
+) -> list[list[Probe]]:
+    """What a cause does in each video, at search points of that video."""
+    return in_parallel(
+        lambda index: probes(fit, index, model.videos[index].noise, effect, points[index]), range(len(fit.fits))
     )
 
 
@@ -124,7 +143,8 @@ def _scan_shared(
     fit: SharedFit, model: ResidualModel, effect: Effect, generator: np.random.Generator
 ) -> CauseScore | None:
     """The largest score of strengths that all videos share."""
-    points, probed = _probed(fit, model, effect)
+    points = effect.search_points(fit.tracks)
+    probed = _probed(fit, model, effect, [points] * len(fit.fits))
     columns: dict[Key, int] = {}
     for index, video in enumerate(probed):
         for probe in video:
@@ -150,21 +170,41 @@ def _scan_shared(
         linear_video.without_own(linear_video.padded(one.reshape(len(one), -1))).reshape(-1, *one.shape[1:])
         for linear_video, one in zip(model.linear.videos, directions, strict=True)
     ]
-    p_value = min(1.0, _independent(blocks, degrees, generator) * float(chi2.sf(statistics[best], degrees)))
+    alone = _p_value(scores[best], names, effect)
+    p_value = min(1.0, _independent(blocks, degrees, generator) * alone)
     estimate = dict(zip(names, scores[best].estimate.tolist(), strict=True))
     start = dict(points[best]) | (_starting(effect, estimate) if len(estimate) == len(names) else {})
-    largest = _largest(zip(names, scores[best].estimate, scores[best].sd, strict=True))
+    largest = _largest([zip(names, score.estimate, score.sd, strict=True) for score in scores], effect)
     return CauseScore(effect, start, (), float(statistics[best]), degrees, p_value, largest)
 
 
-def _largest(strengths: Iterable[tuple[str, float, float]]) -> dict[str, float | None]:
-    """How far (95 %) strengths may be from where they vanish, by name, from estimates and standard deviations."""
-    found: dict[str, float | None] = {}
-    for name, estimate, sd in strengths:
-        bound = abs(float(estimate)) + ONE_SIDED * float(sd) if sd > 0 else None
-        known = [one for one in (found.get(name), bound) if one is not None]
-        found[name] = max(known, default=None)
-    return found
+def _largest(places: Sequence[Iterable[tuple[str, float, float]]], effect: Effect) -> dict[str, Largest]:
+    """How large strengths may be, by name, from estimates and standard deviations at several places.
+
+    A place where next to nothing was seen, of which less is told than is believed beforehand, tells nothing, unless no
+    other tells more.
+    """
+    found: dict[str, list[tuple[int, float, float]]] = {}
+    for place, strengths in enumerate(places):
+        for name, estimate, sd in strengths:
+            found.setdefault(name, []).append((place, float(estimate), float(sd)))
+    expected = {parameter.name: _expected_size(parameter, effect) for parameter in effect.parameters}
+    largest = {}
+    for name, rows in found.items():
+        seen = [row for row in rows if row[2] > 0]
+        enough = max(expected[name], min((sd for *_, sd in seen), default=0.0))
+        told = [row for row in seen if row[2] <= enough]
+        bound = max((abs(estimate) + ONE_SIDED * sd for _, estimate, sd in told), default=None)
+        largest[name] = Largest(bound, len({row[0] for row in rows}), len({row[0] for row in told}))
+    return largest
+
+
+def _expected_size(parameter: Parameter, effect: Effect) -> float:
+    """How far a strength is believed to be from where it vanishes, in its unit."""
+    if parameter.transform is Transform.IDENTITY:
+        return parameter.prior.sd
+    usual = effect.vanishes_at.get(parameter.name) or math.exp(parameter.prior.mean)
+    return usual * parameter.prior.sd
 
 
 def _name(probe: Probe, video: int) -> Key:
@@ -172,13 +212,35 @@ def _name(probe: Probe, video: int) -> Key:
     return probe.key or (probe.field, (f"video {video}", str(probe.owner)))
 
 
-def _one_sided(score: Score, names: Sequence[str], effect: Effect) -> Score:
-    """The score with strengths that cannot be negative at zero where the data ask for less than none of them."""
-    positive = {
+def _positive(effect: Effect) -> set[str]:
+    """Strengths that cannot be less than where they vanish: what slips is slowed no less than what rolls."""
+    return {
         one.name
         for one in effect.parameters
-        if one.transform is Transform.LOG and effect.vanishes_at.get(one.name) == 0.0
+        if one.transform is Transform.LOG
+        and (effect.vanishes_at.get(one.name) == 0.0 or one.name in effect.vanishes_like)
     }
+
+
+def _p_value(score: Score, names: Sequence[str], effect: Effect) -> float:
+    """Probability of as large a statistic of strengths, some of which cannot be negative, if there is nothing.
+
+    With one of these it is chi-square with all degrees half of the time, else with one less; with more the same is an
+    upper bound. Source: M. D. Perlman, One-sided testing problems in multivariate analysis, Ann. Math. Statist. 40
+    (1969).
+    """
+    positive = _positive(effect)
+    if not any(name in positive and sd > 0 for name, sd in zip(names, score.sd, strict=True)):
+        return score.p_value
+    if score.chi_square <= 0:
+        return 1.0
+    laws = [float(chi2.sf(score.chi_square, degrees)) for degrees in (score.degrees, score.degrees - 1) if degrees]
+    return sum(laws) / 2
+
+
+def _one_sided(score: Score, names: Sequence[str], effect: Effect) -> Score:
+    """The score with strengths that cannot be negative at zero where the data ask for less than none of them."""
+    positive = _positive(effect)
     left = list(range(len(names)))
     while True:
         bounded = np.zeros(len(names))
@@ -221,9 +283,10 @@ def _scan_once(
     fit: SharedFit, model: ResidualModel, effect: Effect, generator: np.random.Generator
 ) -> CauseScore | None:
     """The largest scores of strengths of single videos, and where they are."""
-    points, probed = _probed(fit, model, effect)
+    points = [effect.search_points([tracks]) for tracks in fit.tracks]
+    probed = _probed(fit, model, effect, points)
     sites, all_degrees = [], []
-    strengths: list[tuple[str, float, float]] = []
+    strengths: list[Iterable[tuple[str, float, float]]] = []
     for index, video in enumerate(probed):
         for owner in sorted({probe.owner for probe in video}, key=str):
             mine = [probe for probe in video if probe.owner == owner]
@@ -235,10 +298,10 @@ def _scan_once(
             statistic = scores[best].chi_square
             p_value = min(1.0, _independent([block], degrees, generator) * float(chi2.sf(statistic, degrees)))
             fields = [probe.field for probe in mine]
-            values = {**points[best], **dict(zip(fields, scores[best].estimate.tolist(), strict=True))}
+            values = {**points[index][best], **dict(zip(fields, scores[best].estimate.tolist(), strict=True))}
             sites.append(Site(index, owner, values, statistic, p_value))
             all_degrees.append(degrees)
-            strengths += zip(fields, scores[best].estimate, scores[best].sd, strict=True)
+            strengths.append(zip(fields, scores[best].estimate, scores[best].sd, strict=True))
     if not sites:
         return None
     order = sorted(range(len(sites)), key=lambda k: (sites[k].p_value, -sites[k].chi_square))
@@ -246,4 +309,4 @@ def _scan_once(
     p_value = min(1.0, first.p_value * len(sites))
     clear = tuple(sites[k] for k in order if sites[k].p_value * len(sites) < SITE_LEVEL)
     degrees = all_degrees[order[0]]
-    return CauseScore(effect, {}, clear, first.chi_square, degrees, p_value, _largest(strengths), len(sites))
+    return CauseScore(effect, {}, clear, first.chi_square, degrees, p_value, _largest(strengths, effect), len(sites))

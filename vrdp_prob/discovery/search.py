@@ -124,6 +124,11 @@ class Search:
         return replace(self, best=best if best.causes else self.base, lesser=lesser, rivals=tuple(() for _ in lesser))
 
 
+def gain_needed(causes: int) -> float:
+    """Gain (nats) in the predictive density that a cause must bring where so many are looked for."""
+    return float(np.log(max(causes, 1) / FALSE_ALARM))
+
+
 def search(
     fit: SharedFit, catalogue: Sequence[Effect], *, seed: int, progress: ProgressDisplay | None = None
 ) -> Search:
@@ -140,7 +145,7 @@ def search(
     progress
         Told how far the work is.
     """
-    needed = float(np.log(len(catalogue) / FALSE_ALARM))
+    needed = gain_needed(len(catalogue))
     with (progress or SilentProgress()).stage("Trying causes", total=None) as advance:
         searcher = _Searcher(Refits(tuple(catalogue), seed, needed, advance))
         chain = [Trial((), with_own_population(fit), stated=fit.model.beliefs).continued()]

@@ -4,7 +4,7 @@ import re
 from collections.abc import Sequence
 
 from vrdp_prob.discovery.changed_answers import answers_sentence
-from vrdp_prob.discovery.finding import Check, Finding, FoundCause, Gain, UpperBound, Verdict
+from vrdp_prob.discovery.finding import Check, Finding, FoundCause, Gain, TriedCause, UpperBound, Verdict
 from vrdp_prob.discovery.wording import (
     bound_words,
     chance,
@@ -13,6 +13,7 @@ from vrdp_prob.discovery.wording import (
     length_unit,
     number,
     title,
+    tried_words,
     with_unit,
 )
 from vrdp_prob.report.wording import counted, listed, number_word, sentence
@@ -43,6 +44,8 @@ def summary(finding: Finding) -> list[str]:
     told = [_gains(finding.named)] if finding.named else []
     if others := possible(finding):
         told.append(_others(others, beside=finding.named))
+    if finding.verdict is Verdict.UNKNOWN and finding.tried:
+        told.append(_tried(finding.tried))
     told += [f"{sentence(line)}." for line in _lines(finding) if line]
     if finding.verdict is Verdict.NONE:
         told.append(
@@ -130,6 +133,12 @@ def _gain_line(gain: Gain) -> str:
 def _others(others: Sequence[FoundCause], *, beside: Sequence[FoundCause]) -> str:
     told = listed(f"{title(cause.name)} ({chance(cause.probability)})" for cause in others)
     return f"{'Also possible' if beside else 'Not excluded'}: {told}."
+
+
+def _tried(tried: Sequence[TriedCause]) -> str:
+    words = listed(f"{title(one.name)} ({tried_words(one)})" for one in tried)
+    needed = number(tried[0].gain_needed)
+    return f"Tried and not established: {words}; nats in left-out videos, of which {needed} are needed."
 
 
 def _checks(finding: Finding) -> str:

@@ -4,7 +4,7 @@ import math
 import re
 from collections.abc import Iterable
 
-from vrdp_prob.discovery.finding import Estimate, Gain, UpperBound
+from vrdp_prob.discovery.finding import Estimate, Gain, TriedCause, UpperBound
 from vrdp_prob.models.effects.effect import Effect
 from vrdp_prob.models.model_file import known_effects
 from vrdp_prob.models.physics import PhysicsModel
@@ -82,13 +82,28 @@ def estimate_words(estimate: Estimate) -> tuple[str, str]:
 
 def difference_words(gain: Gain) -> str:
     """The elpd difference with its standard error: `+231 ± 24`."""
-    return f"{signed(gain.elpd_difference, gain.elpd_se)} ± {number(gain.elpd_se)}"
+    return _with_error(gain.elpd_difference, gain.elpd_se)
+
+
+def tried_words(tried: TriedCause) -> str:
+    """What a cause gains that was tried, with its standard error: `+3.1 ± 2.0`."""
+    return _with_error(tried.gain, tried.gain_se)
+
+
+def _with_error(value: float, error: float) -> str:
+    return f"{signed(value, error)} ± {number(error)}"
 
 
 def bound_words(bound: UpperBound) -> str:
-    """An upper bound with its unit, from where it counts if that is not 0, or that there is none."""
+    """An upper bound with its unit, from where it counts if that is not 0, and where; or that there is none."""
     if bound.bound is None or not math.isfinite(bound.bound):
         return "no bound"
+    where = f" at {bound.told} of {bound.places} places, the others tell nothing" if bound.told < bound.places else ""
+    return f"{_bound_size(bound)}{where}"
+
+
+def _bound_size(bound: UpperBound) -> str:
+    assert bound.bound is not None
     digits, times, power = number(bound.bound, bound.bound / 10).partition(TIMES)
     if "." in digits:
         digits = digits.rstrip("0").rstrip(".")

@@ -132,6 +132,8 @@ class Parameter:
         Shapes of the bodies whose motion depends on it; all where none are given.
     needs_walls
         Whether motion depends on it only where there is something fixed to touch.
+    goes_with_masses
+        Whether motion depends on its ratio to the masses alone, so that it is as unknown as their scale.
     """
 
     name: str
@@ -143,6 +145,7 @@ class Parameter:
     scope: Scope = Scope.SHARED
     shapes: frozenset[Shape] = frozenset(Shape)
     needs_walls: bool = False
+    goes_with_masses: bool = False
 
     def __post_init__(self) -> None:
         low, high = self.transform.support

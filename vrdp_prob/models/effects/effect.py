@@ -142,7 +142,8 @@ class Effect:
     def search_points(self, videos: Sequence[Tracks]) -> Sequence[Mapping[str, float]]:
         """Values of parameters from which a search for the effect begins, for an effect that has a place or a time.
 
-        Parameters that are left out begin at the value at which the effect vanishes, or at their default.
+        Parameters that are left out begin at the value at which the effect vanishes, or at their default. Of an effect
+        that happens once in a video these are asked for each video by itself.
         """
         return ({},)
 

@@ -11,7 +11,13 @@ from vrdp_prob.models.simulator.mathematics import sqrt
 from vrdp_prob.scene import Tracks
 
 PAIR_STRENGTH = Parameter(
-    "pair_strength", "N m^2", "strength of the attraction between two bodies", Transform.IDENTITY, Prior(0.0, 0.05), 0.0
+    "pair_strength",
+    "N m^2",
+    "strength of the attraction between two bodies",
+    Transform.IDENTITY,
+    Prior(0.0, 0.05),
+    default=0.0,
+    goes_with_masses=True,
 )
 PAIR_SOFTENING = Parameter(
     "pair_softening",

@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 from typing import ClassVar
 
 from vrdp_prob.models.effects.effect import BodyView, Effect
-from vrdp_prob.models.parameters import Parameter, Prior, Transform
+from vrdp_prob.models.parameters import VIDEO_START, Parameter, Prior, Transform
 from vrdp_prob.models.simulator.formula import Scalar
 from vrdp_prob.models.simulator.mathematics import exp, maximum, minimum
 from vrdp_prob.scene import Tracks
@@ -87,6 +87,7 @@ class UnlistedMotion(Effect):
     source: ClassVar = "first terms of the expansion of any smooth law"
     parameters: ClassVar = _MOTION
     vanishes_at: ClassVar = {one.name: 0.0 for one in _MOTION}
+    reads_video_start: ClassVar = True
 
     def friction_factor(self, time: Scalar, body: BodyView, parameters: Mapping[str, Scalar]) -> Scalar:
         """Factor of the friction, by place, time, speed and direction."""
@@ -95,7 +96,7 @@ class UnlistedMotion(Effect):
         change = (
             parameters["friction_along_x"] * body.x
             + parameters["friction_along_y"] * body.y
-            + parameters["friction_in_time"] * time
+            + parameters["friction_in_time"] * (time - parameters[VIDEO_START])
             + parameters["friction_of_slow"] * exp(-squares / SLOW**2)
             + parameters["grain_x"] * (body.vx * body.vx - body.vy * body.vy) / among
             + parameters["grain_xy"] * 2 * body.vx * body.vy / among
@@ -111,7 +112,7 @@ class UnlistedMotion(Effect):
             parameters[f"push_{axis}"]
             + parameters[f"push_{axis}_by_x"] * body.x
             + parameters[f"push_{axis}_by_y"] * body.y
-            + parameters[f"push_{axis}_by_time"] * time
+            + parameters[f"push_{axis}_by_time"] * (time - parameters[VIDEO_START])
             for axis in "xy"
         )
         return push_x - drag * body.vx - turn * body.vy, push_y - drag * body.vy + turn * body.vx

@@ -25,6 +25,11 @@ samplers get stuck in the bend.
 """
 
 
+VIDEO_START = "video_start"
+"""Name of the time stamp (s) of a video's first frame, which laws that go with the time of a video read beside their
+parameters. It is known, and 0 where worlds do not state it."""
+
+
 class Scope(StrEnum):
     """What has one value of a parameter each."""
 

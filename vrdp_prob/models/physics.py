@@ -14,7 +14,7 @@ from vrdp_prob.models.effects.angular_drag import AngularDrag
 from vrdp_prob.models.effects.dry_friction import DryFriction
 from vrdp_prob.models.effects.effect import Effect
 from vrdp_prob.models.effects.normal_impact import NormalImpact
-from vrdp_prob.models.parameters import MATTER, Parameter
+from vrdp_prob.models.parameters import MATTER, VIDEO_START, Parameter
 from vrdp_prob.models.simulator.kernel import Kernel, load
 from vrdp_prob.models.simulator.laws import (
     CONSTANTS,
@@ -74,7 +74,7 @@ class PhysicsModel:
         own = {parameter.name for parameter in effect.parameters}
         if strange := sorted(set(effect.vanishes_at) - own):
             raise InputError(f"{where}: 'vanishes_at' names '{strange[0]}', which is none of its parameters.")
-        if taken := sorted(own & {*STATE, *CONSTANTS, *MATTER}):
+        if taken := sorted(own & {*STATE, *CONSTANTS, *MATTER, VIDEO_START}):
             raise InputError(f"{where}: every body has a '{taken[0]}' already; give the parameter another name.")
         stated = {parameter.name: parameter for parameter in self._stated_parameters()}
         for parameter in effect.parameters:
@@ -160,7 +160,7 @@ class PhysicsModel:
     @cached_property
     def layout(self) -> Layout:
         """Order of the numbers that the compiled kernel takes."""
-        return Layout.of(self.parameters)
+        return Layout.of(self.parameters, self.effects)
 
     @cached_property
     def is_coupled(self) -> bool:

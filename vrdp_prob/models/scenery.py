@@ -8,6 +8,7 @@ import torch
 from jaxtyping import Float
 from torch import Tensor
 
+from vrdp_prob.models.parameters import VIDEO_START
 from vrdp_prob.models.physics import PhysicsModel
 from vrdp_prob.models.simulator.worlds import Worlds
 from vrdp_prob.scene import Shape, Tracks
@@ -33,6 +34,8 @@ class Scenery:
         Radius in m (half side of a cube).
     walls
         End points (x1, y1, x2, y2) in m.
+    start
+        Time stamp in s of the first frame.
     inertia
         Known moments of inertia (kg m^2), NaN where they follow from mass and shape; None where none is known.
     """
@@ -41,6 +44,7 @@ class Scenery:
     release_time: Float[Tensor, "body"]
     radius: Float[Tensor, "body"]
     walls: Float[Tensor, "wall 4"]
+    start: float
     inertia: Float[Tensor, "body"] | None
 
     @classmethod
@@ -54,12 +58,14 @@ class Scenery:
             release_time=torch.from_numpy(tracks.first_seen),
             radius=torch.tensor(radii, dtype=torch.float64),
             walls=torch.from_numpy(walls),
+            start=float(tracks.times[0]),
             inertia=None if np.isnan(known).all() else torch.tensor(known, dtype=torch.float64),
         )
 
     def worlds(self, model: PhysicsModel, quantities: Quantities) -> Worlds:
         """The worlds of some values of all quantities."""
         count = len(quantities["x"])
+        start = torch.full((count,), self.start, dtype=torch.float64)
         return Worlds(
             shapes=self.shapes,
             position=torch.stack([quantities["x"], quantities["y"]], dim=-1),
@@ -74,7 +80,8 @@ class Scenery:
             parameters={
                 one.name: quantities[one.name][:, 0] if one.scope.per_video else quantities[one.name]
                 for one in model.parameters
-            },
+            }
+            | ({VIDEO_START: start} if VIDEO_START in model.layout.shared else {}),
             walls=self.walls,
             wall_restitution=quantities["wall_restitution"],
             inertia=None if self.inertia is None else self.inertia.expand(count, -1),

@@ -126,6 +126,8 @@ class Effect:
     """Values of parameters at which the effect is gone, so that the model without it is nested."""
     vanishes_like: ClassVar[Mapping[str, str]] = {}
     """Parameters, each with the one of another effect that leaves nothing of this one where both are equal."""
+    reads_video_start: ClassVar[bool] = False
+    """Whether its laws read `vrdp_prob.models.parameters.VIDEO_START` beside their parameters."""
     stepwise: ClassVar[frozenset[str]] = frozenset()
     """Parameters on which the motion depends in steps, without a slope: they are found by a scan, and held there."""
 

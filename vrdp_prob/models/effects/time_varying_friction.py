@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from typing import ClassVar
 
 from vrdp_prob.models.effects.effect import BodyView, Effect
-from vrdp_prob.models.parameters import Parameter, Prior, Transform
+from vrdp_prob.models.parameters import VIDEO_START, Parameter, Prior, Transform
 from vrdp_prob.models.simulator.formula import Scalar
 from vrdp_prob.models.simulator.mathematics import maximum
 
@@ -22,11 +22,12 @@ class TimeVaryingFriction(Effect):
         "The table becomes rougher in the course of the video.",
         "The table becomes smoother in the course of the video.",
     )
-    law: ClassVar = "mu(t) = mu (1 + friction_trend t), at least 0"
+    law: ClassVar = "mu(t) = mu (1 + friction_trend t), at least 0, t since the first frame of the video"
     source: ClassVar = "first order of any slow change"
     parameters: ClassVar = (FRICTION_TREND,)
     vanishes_at: ClassVar = {"friction_trend": 0.0}
+    reads_video_start: ClassVar = True
 
     def friction_factor(self, time: Scalar, body: BodyView, parameters: Mapping[str, Scalar]) -> Scalar:
-        """Factor of the friction, 1 at time 0."""
-        return maximum(0.0, 1 + parameters["friction_trend"] * time)
+        """Factor of the friction, 1 in the first frame."""
+        return maximum(0.0, 1 + parameters["friction_trend"] * (time - parameters[VIDEO_START]))

@@ -10,6 +10,7 @@ from jaxtyping import Float, Int
 from torch import Tensor
 
 from vrdp_prob.errors import InputError
+from vrdp_prob.models.parameters import VIDEO_START
 from vrdp_prob.models.simulator.laws import CONSTANTS, Layout
 from vrdp_prob.models.simulator.motion import slips
 from vrdp_prob.models.simulator.obstacle import Obstacle
@@ -47,10 +48,11 @@ def kernel_arrays(worlds: Worlds, effects: "Sequence[Effect]", layout: Layout, f
     InputError
         If a parameter of the model is missing.
     """
-    missing = [name for name in (*layout.shared, *layout.constants[len(CONSTANTS) :]) if name not in worlds.parameters]
+    known = {VIDEO_START: torch.zeros(len(worlds)), **worlds.parameters}
+    missing = [name for name in (*layout.shared, *layout.constants[len(CONSTANTS) :]) if name not in known]
     if missing:
         raise InputError(f"worlds: the model needs the parameter {missing[0]}; add it to 'parameters'.")
-    shared = [worlds.parameters[name].to(torch.float64) for name in layout.shared]
+    shared = [known[name].to(torch.float64) for name in layout.shared]
     bodies, start = _body_constants(worlds, effects, layout), _body_starts(worlds, effects)
     fixed = fixed_things(worlds, effects)
     if fixed:

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from vrdp_prob.models.effects.effect import BodyView, Effect
-from vrdp_prob.models.parameters import Parameter
+from vrdp_prob.models.parameters import VIDEO_START, Parameter
 from vrdp_prob.models.simulator.contact import ContactKind, Feature, contact, contact_geometry, room_on_feature
 from vrdp_prob.models.simulator.formula import Recorder, Scalar, Symbol, depends, vector_jacobian
 from vrdp_prob.models.simulator.machine_code import ARRAY, NUMBER, law_function
@@ -39,18 +39,19 @@ class Layout:
     constants
         Constants of a body.
     shared
-        Parameters of a video.
+        Parameters of a video, and the time stamp of its first frame where a law reads it.
     """
 
     constants: tuple[str, ...]
     shared: tuple[str, ...]
 
     @classmethod
-    def of(cls, parameters: Sequence[Parameter]) -> "Layout":
-        """Layout for the parameters of a model."""
+    def of(cls, parameters: Sequence[Parameter], effects: Sequence[Effect]) -> "Layout":
+        """Layout for the parameters of a model with some effects."""
         own = tuple(parameter.name for parameter in parameters if not parameter.scope.per_video)
         shared = tuple(parameter.name for parameter in parameters if parameter.scope.per_video)
-        return cls(CONSTANTS + own, shared)
+        start = (VIDEO_START,) if any(effect.reads_video_start for effect in effects) else ()
+        return cls(CONSTANTS + own, shared + start)
 
 
 class LawInputs:

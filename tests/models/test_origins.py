@@ -1,15 +1,21 @@
-"""Where and when effects are expected, by where and when bodies were seen."""
+"""It does not matter where the origin of places and of time lies."""
+
+import math
 
 import numpy as np
 import pytest
+import torch
 
 from vrdp_prob.models.effects.bowl import Bowl
 from vrdp_prob.models.effects.effect import Effect
 from vrdp_prob.models.effects.external_impulse import ExternalImpulse
 from vrdp_prob.models.effects.surface_tilt import SurfaceTilt
+from vrdp_prob.models.effects.time_varying_friction import TimeVaryingFriction
 from vrdp_prob.models.effects.wall import Wall
+from vrdp_prob.models.likelihood import Likelihood
 from vrdp_prob.models.model_file import known_effects
 from vrdp_prob.models.physics import PhysicsModel
+from vrdp_prob.models.unknowns import Structure, unknowns
 from vrdp_prob.scene import Body, Shape, Tracks
 
 LOOKED_FOR = [effect() for effect in known_effects().values() if effect.overrides("expected")]
@@ -56,3 +62,20 @@ def test_a_model_believes_it_and_forgets_it_with_the_effect() -> None:
     assert PhysicsModel.base().with_effect(bowl).believed(bowl.parameters[1]) == bowl.parameters[1]
     assert not model.without_effect(bowl).beliefs
     assert not PhysicsModel.base().with_effect(SurfaceTilt(), videos).beliefs
+
+
+@pytest.mark.parametrize("begin", [0.0, 1000.0, 1.7e9])
+def test_friction_changes_from_the_first_frame_of_a_video_on(begin: float) -> None:
+    effect, tracks = TimeVaryingFriction(), seen(begin=begin)
+    model = PhysicsModel.base().with_effect(effect)
+    structure = Structure(moving=frozenset({0}), colliding=frozenset())
+    likelihood = Likelihood(tracks, model, unknowns(tracks, model, structure))
+    point = torch.zeros(1, len(likelihood.coordinates.entries), dtype=torch.float64)
+    values = {"velocity_x": 2.0, "sliding_friction": math.log(0.1), "air_drag": -20.0, "friction_trend": 0.25}
+    for name, value in values.items():
+        point[0, next(k for k, one in enumerate(likelihood.coordinates.entries) if one.field == name)] = value
+    places = likelihood.predicted(point)[0, :, 0, 0]
+    # v(t) = 2 - 0.981 (t + t^2 / 8) until the body stops
+    until = np.linspace(0.0, 1.4, 8)
+    expected = 2 * until - 0.981 * (until**2 / 2 + until**3 / 24)
+    np.testing.assert_allclose(places[:8], expected, atol=1e-5)

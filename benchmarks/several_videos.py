@@ -95,7 +95,7 @@ def measured(kind: str, count: int, maker: Maker, sampler: str, sets: int) -> Ro
         begin = time.process_time()
         fit = fit_together(videos, model=PhysicsModel.base(), seed=number)
         middle = time.process_time()
-        posterior = sample_together(fit, sampler=sampler, seed=number)
+        posterior = sample_together(fit, sampler=sampler, seed=number, hand_on=False)
         fitting.append(middle - begin)
         sampling.append(time.process_time() - middle)
         if before is not None:

@@ -199,6 +199,7 @@ def test_windows_end_with_the_whole_video() -> None:
 def test_the_search_says_what_it_did_not_cover() -> None:
     assert not ModeSearch(done=True, attempts=2, agreed=True).sentence
     assert "not looked for" in ModeSearch(done=False, attempts=1, agreed=True).sentence
+    assert "it was searched once" in ModeSearch(done=True, attempts=1, agreed=False).sentence
     assert "3 searches did not agree" in ModeSearch(done=True, attempts=3, agreed=False).sentence
 
 

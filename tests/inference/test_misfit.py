@@ -56,7 +56,7 @@ def test_a_small_push_is_told_whether_or_not_the_noise_is_stated(stated: bool) -
     assert not misfit.large
     assert not misfit.fits
     assert f"{misfit.ratio:.2f} times the measurement noise, and smoothly" in misfit.sentences[0]
-    assert ("Errors of measurement that are alike" in misfit.sentences[0]) is stated
+    assert ("either errors of measurement are alike" in misfit.sentences[0]) is stated
 
 
 def test_student_t_noise_that_gives_way_to_an_unknown_acceleration_is_told() -> None:

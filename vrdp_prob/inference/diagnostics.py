@@ -64,6 +64,12 @@ class Reported:
         """The coordinates themselves, by number."""
         return cls(tuple(f"coordinate {place}" for place in range(dimension)), np.eye(dimension))
 
+    @property
+    def combined(self) -> "Reported | None":
+        """Those that are made of several coordinates; None where there are none."""
+        rows = np.flatnonzero(np.count_nonzero(self.combinations, axis=1) > 1)
+        return Reported(tuple(self.names[row] for row in rows), self.combinations[rows]) if len(rows) else None
+
     def values(self, points: Float[np.ndarray, "*batch dimension"]) -> Float[np.ndarray, "*batch quantity"]:
         """The quantities of some points."""
         return points @ self.combinations.T

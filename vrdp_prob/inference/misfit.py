@@ -114,17 +114,21 @@ class Misfit:
                 f"{self.correlation:.2f})."
             )
         else:
+            smooth = f"correlation of neighbouring errors {self.correlation:.2f}; most for object {self.worst}"
             if self.ratio > LIKE_NOISE:
                 off = f"{self.residual_sd:.2g} m, {self.ratio:.2f} times the measurement noise, and smoothly"
             else:
                 off = f"no more than measurement noise ({self.residual_sd:.2g} m), but smoothly"
-            text = (
-                f"The model does not quite explain this motion: after the best fit positions are off by {off}, as "
-                f"noise would not be (correlation of neighbouring errors {self.correlation:.2f}; most for object "
-                f"{self.worst})."
-            )
             if self.noise_stated:
-                text += " Errors of measurement that are alike in neighbouring frames would look the same."
+                text = (
+                    f"After the best fit positions are off by {off} ({smooth}): either errors of measurement are alike "
+                    "in neighbouring frames, or the model does not quite explain this motion."
+                )
+            else:
+                text = (
+                    f"The model does not quite explain this motion: after the best fit positions are off by {off}, as "
+                    f"noise would not be ({smooth})."
+                )
         if self.error_acceleration is not None:
             text += (
                 f" The intervals allow for an unknown acceleration of {self.error_acceleration:.2g} m/s^2 that lasts "

@@ -26,6 +26,11 @@ class ModeSearch:
         """What the search does not cover, in plain words; empty where there is nothing to add."""
         if not self.done:
             return "Other explanations of the motion were not looked for."
+        if not self.agreed and self.attempts == 1:
+            return (
+                "The contacts of this video are hard to explain, and it was searched once: there may be a better "
+                "explanation, or others as good."
+            )
         if not self.agreed:
             return (
                 f"The contacts of this video are hard to explain: {self.attempts} searches did not agree on the most "

@@ -23,7 +23,7 @@ def of_material(seed: int, material: str) -> Tracks:
 def test_each_material_has_one_friction_in_all_videos(tmp_path: Path) -> None:
     videos = [of_material(seed, material) for seed, material in enumerate(("metal", "rubber", "metal", "rubber"))]
     posterior = infer_together(
-        videos, model=PhysicsModel.base().with_effect(MaterialFriction()), sampler="laplace", draws=400
+        videos, model=PhysicsModel.base().with_effect(MaterialFriction()), sampler="laplace", draws=400, hand_on=False
     )
     posterior.write(tmp_path / "shared.nc")
     for one in (posterior, SharedPosterior.read(tmp_path / "shared.nc")):

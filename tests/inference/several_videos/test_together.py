@@ -2,7 +2,7 @@ import os
 import subprocess
 import sys
 from dataclasses import replace
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 
 import emcee
@@ -14,15 +14,19 @@ import torch
 from tests.inference.several_videos.videos import DRAG, FRICTION, NOISE, colliding, sliding
 from vrdp_prob.errors import InputError
 from vrdp_prob.inference import Posterior
-from vrdp_prob.inference.diagnostics import chain_statistics
+from vrdp_prob.inference.diagnostics import Reported, chain_statistics
+from vrdp_prob.inference.mode_search import ModeSearch
 from vrdp_prob.inference.several_videos import (
     SharedFit,
     SharedPosterior,
     fit_together,
+    gibbs,
     infer_together,
     predictive_log_density,
     sample_together,
+    together,
 )
+from vrdp_prob.inference.several_videos.gibbs import sample_gibbs
 from vrdp_prob.models.effects.body_friction import BodyFriction
 from vrdp_prob.models.parameters import AIR_DRAG, Prior
 from vrdp_prob.models.physics import PhysicsModel
@@ -130,6 +134,47 @@ def test_each_video_has_a_posterior_that_goes_with_the_shared_draws(sampler: str
     assert posterior.video("hit 1").warnings == ()
 
 
+def test_what_is_reported_of_each_video_is_judged() -> None:
+    for sampler in ("gibbs", "laplace"):
+        assert posterior_of_two(sampler).convergence.sampler == sampler
+    shared, own = (one.convergence for one in (posterior_of_two("gibbs"), posterior_of_two("gibbs").video("hit 1")))
+    assert shared.worst in ("the sliding friction", "the air drag", "the noise scale")
+    assert own.worst is not None
+    assert own.worst.startswith("the ")
+
+
+def test_a_mass_ratio_that_is_not_known_well_enough_keeps_chains_going(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[Reported] = []
+
+    def all_but_combinations(_by_chain: object, _by_time: object, reported: Reported | None, **_goals: float) -> bool:
+        asked.extend([] if reported is None else [reported])
+        return reported is None
+
+    monkeypatch.setattr(gibbs, "settled", all_but_combinations)
+    fit = two()
+    reported = [Reported.of(p.likelihood.coordinates, p.contacts, p.likelihood.tracks.bodies) for p in fit.fits]
+    draws = sample_gibbs(fit.joint, generator=np.random.default_rng(0), rounds=1, reported=reported)
+    assert [one.names for one in asked] == [("the mass ratio of objects 0 and 1", "the restitution of objects 0 and 1")]
+    assert draws.notes == ("It stopped after 32 sweeps.",)
+
+
+def test_gibbs_goes_on_where_weights_cannot_be_trusted(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(together, "PARETO_K_GOAL", -np.inf)
+    monkeypatch.setattr(together, "sample_gibbs", partial(sample_gibbs, rounds=1))
+    handed_on = sample_together(two(), sampler="laplace", draws=100)
+    assert handed_on.convergence.sampler == "gibbs"
+    assert "The fast way could not be trusted (Pareto k " in handed_on.warnings[0]
+    kept = sample_together(two(), sampler="laplace", draws=100, hand_on=False)
+    assert kept.convergence.sampler == "laplace"
+
+
+def test_doubts_about_the_search_of_a_video_are_told() -> None:
+    fit, in_doubt = two(), ModeSearch(done=True, attempts=3, agreed=False)
+    fits = (replace(fit.fits[0], search=in_doubt), *fit.fits[1:])
+    posterior = sample_together(replace(fit, fits=fits), sampler="laplace", draws=100, hand_on=False)
+    assert f"hit 1: {in_doubt.sentence}" in posterior.warnings
+
+
 def test_intervals_narrow_with_the_root_of_the_number_of_videos_and_cover_the_truth() -> None:
     # drag is known, so that all that is learned of friction comes from the videos
     known = replace(AIR_DRAG, prior=Prior(float(np.log(DRAG)), 0.01))
@@ -162,9 +207,10 @@ def test_what_is_not_shared_stays_each_video_s_own() -> None:
     assert fit.joint.numbers.names == ("air_drag",)
     scales = [part.point[part.likelihood.coordinates.places["noise_scale", None]] for part in fit.fits]
     assert np.exp(scales[1] - scales[0]) == pytest.approx(5, rel=0.4)
-    posterior = sample_together(fit, sampler="laplace", draws=100)
+    posterior = sample_together(fit, sampler="laplace", draws=100, hand_on=False)
     assert list(posterior.shared) == ["air_drag"]
-    alone = sample_together(fit_together([sliding(1)], model=BASE, shared=[]), sampler="laplace", draws=100)
+    one = fit_together([sliding(1)], model=BASE, shared=[])
+    alone = sample_together(one, sampler="laplace", draws=100, hand_on=False)
     assert list(alone.shared) == []
     assert alone.video("slide 1").draw_count == 100
 
@@ -177,7 +223,7 @@ def test_walls_at_the_same_place_share_their_restitution() -> None:
     fit = fit_together([first, second], model=BASE)
     names = [name for name in fit.joint.numbers.names if name.startswith("wall")]
     assert names == ["wall_restitution(2, -3, 2, 3)", "wall_restitution(0, 3, 2, 3)"]
-    posterior = sample_together(fit, sampler="laplace", draws=50)
+    posterior = sample_together(fit, sampler="laplace", draws=50, hand_on=False)
     assert posterior.shared["wall_restitution"].sizes == {"chain": 1, "draw": 50, "wall": 2}
     drawn = posterior.video("second").data["posterior"]["wall_restitution"]
     np.testing.assert_allclose(drawn.values, posterior.shared["wall_restitution"].values)
@@ -241,7 +287,8 @@ def test_another_model_is_fitted_from_what_is_known() -> None:
 
 def test_a_video_that_the_model_does_not_explain_is_named() -> None:
     odd = sliding(9, friction=3 * FRICTION)
-    posterior = infer_together([sliding(1), sliding(2), sliding(3), odd], model=BASE, sampler="laplace", draws=100)
+    videos = [sliding(1), sliding(2), sliding(3), odd]
+    posterior = infer_together(videos, model=BASE, sampler="laplace", draws=100, hand_on=False)
     assert [sentence for sentence in posterior.warnings if sentence.startswith("slide 9: The model does not explain")]
 
 

@@ -203,6 +203,10 @@ def test_two_modes_of_a_video_are_visited_by_their_weight() -> None:
     draws = sample_gibbs(fit, generator=np.random.default_rng(2), rounds=2)
     assert draws.locals[0].shape[1] > 500
     sides = (draws.locals[0] > 0).astype(float)
+    assert len(draws.modes[0]) == 2
+    assert sum(mode.weight for mode in draws.modes[0]) == pytest.approx(1.0)
+    heavier = max(draws.modes[0], key=lambda mode: mode.weight)
+    assert heavier.weight == pytest.approx(positive, abs=4 * heavier.error)
     assert sides.mean() == pytest.approx(positive, abs=4 * 0.5 / np.sqrt(chain_statistics(sides).ess_bulk))
     assert draws.shared.mean() == pytest.approx(mean, abs=4 * draws.shared.std() / np.sqrt(400))
     weighted = sample_by_importance(fit, draws=2000, generator=np.random.default_rng(2))

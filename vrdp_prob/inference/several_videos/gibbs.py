@@ -6,7 +6,7 @@ at a time (per thread).
 """
 
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from typing import TypeVar
@@ -15,8 +15,8 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 from scipy.special import logsumexp
 
-from vrdp_prob.inference.diagnostics import drift, joined, ordered, settled
-from vrdp_prob.inference.samples import ESS_GOAL, R_HAT_GOAL
+from vrdp_prob.inference.diagnostics import Reported, drift, joined, ordered, settled, share_with_error
+from vrdp_prob.inference.samples import ESS_GOAL, R_HAT_GOAL, ModeWeight
 from vrdp_prob.inference.several_videos.arrow import ArrowGaussian
 from vrdp_prob.inference.several_videos.clouds import Clouds
 from vrdp_prob.inference.several_videos.joint_fit import JointFit
@@ -61,6 +61,8 @@ class JointDraws:
         R-hat of the groups' earlier against their later sweeps, over all numbers.
     evaluations
         Number of worlds simulated.
+    modes
+        Weights of the modes of each video's own numbers; empty where there is one.
     notes
         At which limit sampling has stopped, if at one.
     """
@@ -70,6 +72,7 @@ class JointDraws:
     log_density: tuple[Float[np.ndarray, "chain draw"], ...]
     drift: float
     evaluations: int
+    modes: tuple[tuple[ModeWeight, ...], ...]
     notes: tuple[str, ...] = ()
 
 
@@ -79,9 +82,24 @@ def sample_gibbs(
     generator: np.random.Generator,
     progress: ProgressDisplay | None = None,
     rounds: int = ROUNDS,
+    reported: Sequence[Reported] | None = None,
 ) -> JointDraws:
-    """Draw from the joint posterior until the goals for R-hat and effective size are met, or the rounds are over."""
-    sampler = _Sampler(fit, generator)
+    """Draw from the joint posterior until the goals for R-hat and effective size are met, or the rounds are over.
+
+    Parameters
+    ----------
+    fit
+        The joint fit.
+    generator
+        Source of randomness.
+    progress
+        Told how many sweeps are done.
+    rounds
+        Rounds after which sampling stops in any case.
+    reported
+        Quantities of each video that have to be known well enough beside all numbers; none where None.
+    """
+    sampler = _Sampler(fit, generator, reported)
     total = WARM_UP + rounds * SWEEPS_PER_ROUND
     with sampler.workers, (progress or SilentProgress()).stage("Sampling all videos", total=total) as advance:
 
@@ -177,6 +195,15 @@ class _Video:
         for series in (self._kept_labels, self.points, self.values):
             series.clear()
 
+    def modes(self) -> tuple[ModeWeight, ...]:
+        """Weights of the modes in the draws so far."""
+        if len(self._clouds.clouds) == 1:
+            return ()
+        count = len(self._clouds.clouds)
+        # one column per mode, 1 for the chains in it
+        inside = _by_chain([np.eye(count)[labels] for labels in self._kept_labels])
+        return tuple(ModeWeight(*share_with_error(inside[..., mode])) for mode in range(count))
+
     def _jumped(
         self,
         points: Float[np.ndarray, "chain local"],
@@ -229,8 +256,11 @@ class _Video:
 class _Sampler:
     """All chains, and the order in which they move. Shared numbers are whitened by the Gaussian of the fit."""
 
-    def __init__(self, fit: JointFit, generator: np.random.Generator) -> None:
+    def __init__(
+        self, fit: JointFit, generator: np.random.Generator, reported: Sequence[Reported] | None = None
+    ) -> None:
         self._fit, self._arrow, self._generator = fit, fit.gaussian, generator
+        self._reported = [one.combined for one in reported or ()]
         streams = generator.spawn(len(fit.videos))
         clouds = [Clouds.of_fit(fit, index, stream) for index, stream in enumerate(streams)]
         self._ridge = SharedRidge.of(fit, clouds, generator)
@@ -277,9 +307,8 @@ class _Sampler:
 
     def converged(self) -> bool:
         """Whether all draws since the last reshaping meet the goals."""
-        return all(
-            settled(_by_chain(series), _by_time(series), r_hat=R_HAT_GOAL, effective=MARGIN * ESS_GOAL)
-            for series in self._series()
+        return all(_met(series) for series in self._series()) and all(
+            _met(series, shown) for series, shown in self._combinations()
         )
 
     def draws(self) -> JointDraws:
@@ -290,7 +319,15 @@ class _Sampler:
             tuple(_by_chain([values[:, None] for values in video.values])[..., 0] for video in self._videos),
             max(drift(_by_time(series)) for series in self._series()),
             sum(video.looks for video in self._videos),
+            tuple(video.modes() for video in self._videos),
         )
+
+    def _combinations(self) -> Iterator[tuple[list[np.ndarray], Reported]]:
+        """Sweeps of the whole vector of each video of which combinations are reported, and which."""
+        shared = [self._arrow.shared_points(one) for one in self._kept] if any(self._reported) else []
+        for video, shown in zip(self._videos, self._reported, strict=False):
+            if shown is not None:
+                yield [video.video.points(*both) for both in zip(shared, video.points, strict=True)], shown
 
     def _series(self) -> list[list[np.ndarray]]:
         """Sweeps of the shared numbers and of each video's own."""
@@ -317,6 +354,12 @@ class _Sampler:
 
     def _each(self, task: Callable[[_Video], Result]) -> list[Result]:
         return list(self.workers.map(task, self._videos))
+
+
+def _met(sweeps: Sequence[Float[np.ndarray, "chain dimension"]], reported: Reported | None = None) -> bool:
+    """Whether sweeps meet the goals."""
+    by_chain, by_time = _by_chain(sweeps), _by_time(sweeps)
+    return settled(by_chain, by_time, reported, r_hat=R_HAT_GOAL, effective=MARGIN * ESS_GOAL)
 
 
 def _in_groups(

@@ -8,16 +8,18 @@ from jaxtyping import Float
 
 from vrdp_prob.errors import InputError
 from vrdp_prob.inference.assembly import posterior_from
-from vrdp_prob.inference.diagnostics import Statistics
+from vrdp_prob.inference.diagnostics import Reported, Statistics
 from vrdp_prob.inference.infer import check_counts, default_model
 from vrdp_prob.inference.map_fit import MapFit
+from vrdp_prob.inference.mode_weights import doubts
 from vrdp_prob.inference.posterior import Posterior
-from vrdp_prob.inference.samples import Convergence, Samples, assess
+from vrdp_prob.inference.samples import ESS_GOAL, PARETO_K_GOAL, Convergence, ModeWeight, Samples, assess
 from vrdp_prob.inference.several_videos.fitting import SharedFit, fit_together
 from vrdp_prob.inference.several_videos.gibbs import sample_gibbs
 from vrdp_prob.inference.several_videos.importance import sample_by_importance
 from vrdp_prob.inference.several_videos.parts import stream
 from vrdp_prob.inference.several_videos.posterior import SharedPosterior, VideoPosteriors
+from vrdp_prob.inference.yaw_search import unseen_yaws
 from vrdp_prob.models.physics import PhysicsModel
 from vrdp_prob.progress import ProgressDisplay
 from vrdp_prob.scene import Tracks
@@ -43,6 +45,7 @@ def infer_together(
     seed: int = 0,
     draws: int = 1000,
     model_error: bool = True,
+    hand_on: bool = True,
     progress: ProgressDisplay | None = None,
 ) -> SharedPosterior:
     """Infer what several videos share, and each video's motion, masses and restitutions with it.
@@ -65,6 +68,8 @@ def infer_together(
         Number of draws to keep.
     model_error
         Whether what the model leaves unexplained in a video is looked for, and widens its part of the density.
+    hand_on
+        Whether `gibbs` goes on where `laplace` finds that it cannot be trusted.
     progress
         Told how far the work is.
 
@@ -77,7 +82,7 @@ def infer_together(
     _check(sampler, draws, seed)
     physics = default_model() if model is None else model
     fit = fit_together(videos, model=physics, shared=shared, seed=seed, model_error=model_error, progress=progress)
-    return sample_together(fit, sampler=sampler, seed=seed, draws=draws, progress=progress)
+    return sample_together(fit, sampler=sampler, seed=seed, draws=draws, hand_on=hand_on, progress=progress)
 
 
 def sample_together(
@@ -86,18 +91,27 @@ def sample_together(
     sampler: str = "gibbs",
     seed: int = 0,
     draws: int = 1000,
+    hand_on: bool = True,
     progress: ProgressDisplay | None = None,
 ) -> SharedPosterior:
     """The posterior around a joint fit; parameters as in `infer_together`."""
     _check(sampler, draws, seed)
     generator = np.random.default_rng(seed)
+    names = [part.likelihood.tracks.video for part in fit.fits]
+    reported = [
+        Reported.of(part.likelihood.coordinates, part.contacts, part.likelihood.tracks.bodies) for part in fit.fits
+    ]
     if sampler == "gibbs":
-        drawn = _by_gibbs(fit, generator, progress)
+        drawn = _by_gibbs(fit, reported, generator, progress)
     else:
         drawn = _by_importance(fit, draws, generator, progress)
-    names = [part.likelihood.tracks.video for part in fit.fits]
-    each = {name: assess(sampler, samples) for name, samples in zip(names, drawn.videos, strict=True)}
-    convergence = assess(sampler, drawn.shared) if len(fit.joint.numbers) else _nothing_shared(sampler, each)
+        if hand_on and (reason := _distrust(drawn.shared, draws)):
+            drawn = _by_gibbs(fit, reported, generator, progress, reason=reason)
+    each = {
+        name: assess(sampler, samples, shown)
+        for name, samples, shown in zip(names, drawn.videos, reported, strict=True)
+    }
+    convergence = _of_shared(sampler, fit, drawn.shared) if len(fit.joint.numbers) else _nothing_shared(sampler, each)
     return SharedPosterior(
         model=fit.model,
         seed=seed,
@@ -122,17 +136,34 @@ def _check(sampler: str, draws: int, seed: int) -> None:
     check_counts(draws, seed)
 
 
-def _by_gibbs(fit: SharedFit, generator: np.random.Generator, progress: ProgressDisplay | None) -> _Drawn:
-    found = sample_gibbs(fit.joint, generator=generator, progress=progress)
+def _by_gibbs(
+    fit: SharedFit,
+    reported: Sequence[Reported],
+    generator: np.random.Generator,
+    progress: ProgressDisplay | None,
+    *,
+    reason: str | None = None,
+) -> _Drawn:
+    """Draws of chains, which go on for a reason where they were not asked for."""
+    found = sample_gibbs(fit.joint, generator=generator, progress=progress, reported=reported)
     shape = found.shared.shape
     log_prior = fit.joint.numbers.log_prior(found.shared.reshape(-1, shape[-1])).reshape(shape[:2])
+    notes = found.notes if reason is None else (reason, *found.notes)
 
-    def samples(points: Float[np.ndarray, "chain draw dimension"], values: Float[np.ndarray, "chain draw"]) -> Samples:
-        return Samples(points, values, r_hat=found.drift, notes=found.notes)
+    def samples(
+        points: Float[np.ndarray, "chain draw dimension"],
+        values: Float[np.ndarray, "chain draw"],
+        modes: tuple[ModeWeight, ...] = (),
+    ) -> Samples:
+        return Samples(
+            points, values, r_hat=found.drift, notes=notes, modes=modes, doubts=doubts(modes), sampler="gibbs"
+        )
 
     shared = samples(found.shared, log_prior + np.sum(found.log_density, axis=0))
-    parts = zip(fit.joint.videos, found.locals, found.log_density, strict=True)
-    videos = tuple(samples(video.points(found.shared, own), log_prior + value) for video, own, value in parts)
+    parts = zip(fit.joint.videos, found.locals, found.log_density, found.modes, strict=True)
+    videos = tuple(
+        samples(video.points(found.shared, own), log_prior + value, modes) for video, own, value, modes in parts
+    )
     return _Drawn(shared, videos, fit.log_evidence)
 
 
@@ -150,6 +181,25 @@ def _by_importance(
     parts = zip(fit.joint.videos, found.locals, found.log_density, strict=True)
     videos = tuple(samples(video.points(found.shared, own), log_prior + value) for video, own, value in parts)
     return _Drawn(shared, videos, found.log_evidence)
+
+
+def _distrust(shared: Samples, draws: int) -> str | None:
+    """Why importance weights cannot be trusted, if so; half of the draws are enough where these are few."""
+    if shared.pareto_k is None or shared.known is None:
+        return None
+    worth = shared.known.ess_bulk
+    if shared.pareto_k <= PARETO_K_GOAL and worth >= min(ESS_GOAL, draws / 2):
+        return None
+    return (
+        f"The fast way could not be trusted (Pareto k {shared.pareto_k:.2f}, {worth:.0f} effective draws), so gibbs "
+        "was run."
+    )
+
+
+def _of_shared(sampler: str, fit: SharedFit, samples: Samples) -> Convergence:
+    """Convergence of the shared numbers."""
+    names = tuple(f"the {name.replace('_', ' ')}" for name in fit.joint.numbers.names)
+    return assess(sampler, samples, Reported(names, np.eye(len(names))))
 
 
 def _maker(part: MapFit, samples: Samples, convergence: Convergence, seed: int) -> Callable[[], Posterior]:
@@ -171,11 +221,22 @@ def _warnings(fit: SharedFit, convergence: Convergence, each: Mapping[str, Conve
     sentences = []
     if not fit.joint.converged:
         sentences.append("The search for the most probable values of all videos ended before it had converged.")
-    if not convergence.converged and len(fit.joint.numbers):
-        sentences.append(convergence.sentence)
+    if len(fit.joint.numbers):
+        sentences += convergence.notes if convergence.converged else (convergence.sentence,)
     for part in fit.fits:
         name = part.likelihood.tracks.video
-        sentences += [f"{name}: {sentence}" for sentence in part.misfit.sentences]
+        about = [*part.misfit.sentences, part.search.sentence, _yaws_by_contacts(part)]
+        sentences += [f"{name}: {sentence}" for sentence in about if sentence]
         if not each[name].converged:
             sentences.append(f"{name}: {each[name].sentence}")
     return sentences
+
+
+def _yaws_by_contacts(part: MapFit) -> str:
+    """A sentence about cubes whose yaw only contacts tell; empty where there are none."""
+    bodies = part.likelihood.tracks.bodies
+    cubes = [bodies[body].id for body, _ in unseen_yaws(part.likelihood, part.point)]
+    if not cubes:
+        return ""
+    yaws = f"The yaw of cube {cubes[0]} was" if len(cubes) == 1 else f"The yaws of the cubes {', '.join(cubes)} were"
+    return f"{yaws} not measured: contacts tell of it on islands of which the draws may leave some out."

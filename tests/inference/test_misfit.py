@@ -79,6 +79,13 @@ def test_residuals_that_are_larger_than_the_noise_are_not_said_to_be_within_it(r
     assert words in smooth.sentences[0]
 
 
+@pytest.mark.parametrize(("stated", "fits"), [(True, True), (False, False)])
+def test_errors_of_a_camera_that_stay_within_its_stated_noise_are_no_misfit(stated: bool, fits: bool) -> None:
+    smooth = Misfit(0.008, 0.01, stated, 0.85, "0", 0.008, 0, True, 0.1, 0.2)
+    assert smooth.fits is fits
+    assert bool(smooth.sentences) is not fits
+
+
 def test_gaussian_noise_counts_what_stands_out() -> None:
     fit = fitted(observe(chain(), noise=0.005, seed=2))
     assert fit.misfit.ratio == pytest.approx(1.0, abs=0.15)

@@ -77,8 +77,13 @@ class Misfit:
 
     @property
     def fits(self) -> bool:
-        """Whether nothing speaks against the model."""
-        return not self.large and self.error_acceleration is None
+        """Whether nothing speaks against the model.
+
+        Errors within the stated noise that are alike in neighbouring frames are what a camera makes; an unknown
+        acceleration that they look like widens the intervals, and speaks against nothing.
+        """
+        within_stated_noise = self.noise_stated and self.ratio <= LIKE_NOISE
+        return not self.large and (self.error_acceleration is None or within_stated_noise)
 
     @property
     def sentences(self) -> tuple[str, ...]:

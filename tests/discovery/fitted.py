@@ -1,10 +1,16 @@
 """Joint fits of generated videos, made once for all tests that look at them."""
 
+from collections.abc import Sequence
+from dataclasses import replace
 from functools import cache
+
+import numpy as np
+from jaxtyping import Float
 
 from tests.discovery.data_set import DataSet, Wanted, draw
 from tests.discovery.measurement import Measurement
 from tests.discovery.scenes import Setting
+from vrdp_prob.discovery.residual_model import ResidualModel
 from vrdp_prob.inference.several_videos.fitting import SharedFit, fit_together
 from vrdp_prob.models.effects.body_friction import BodyFriction
 from vrdp_prob.models.physics import PhysicsModel
@@ -26,3 +32,20 @@ def fitted(
     data = draw(wanted, seed=seed, setting=setting, measurement=measurement)
     model = PhysicsModel.base().with_effect(BodyFriction())
     return data, fit_together(data.tracks, model=model, model_error=False)
+
+
+def moved(model: ResidualModel, changes: Sequence[Float[np.ndarray, "time body number"]]) -> ResidualModel:
+    """What a fit would leave, to first order, if all that is measured of each video were elsewhere by some changes.
+
+    Parameters
+    ----------
+    model
+        What it leaves.
+    changes
+        Of all places in m, and of angles in rad where these are measured.
+    """
+    videos = []
+    for video, change in zip(model.videos, changes, strict=True):
+        rows = video.linear.padded(video.rows(change[..., None]))
+        videos.append(replace(video, linear=replace(video.linear, residuals=video.linear.residuals - rows[:, 0])))
+    return ResidualModel(replace(model.linear, videos=tuple(one.linear for one in videos)), tuple(videos))

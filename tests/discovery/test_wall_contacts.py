@@ -1,13 +1,13 @@
 """What the checks say of contacts with stated walls."""
 
 from collections.abc import Mapping
-from dataclasses import replace
 from functools import cache
 
 import numpy as np
 import pytest
 from scipy.stats import kstest
 
+from tests.discovery.fitted import moved
 from tests.discovery.laws import Laws
 from tests.discovery.measurement import Measurement, measure
 from tests.discovery.test_checks import by_name, noise_in_place
@@ -67,13 +67,9 @@ def bouncing() -> tuple[tuple[Video, ...], ResidualModel]:
 def with_effect(**numbers: float) -> ResidualModel:
     """The same with what other numbers in the laws change in the motion, to first order: no contact comes earlier."""
     videos, model = bouncing()
-    left = []
-    for video, one in zip(videos, model.videos, strict=True):
-        little = video.governed_by(**{name: FAINT * value for name, value in numbers.items()})
-        change = (little.motion.states - video.motion.states) / FAINT
-        rows = one.linear.padded(one.rows(change[:, :, [0, 1, 4], None]))
-        left.append(replace(one, linear=replace(one.linear, residuals=one.linear.residuals - rows[:, 0])))
-    return ResidualModel(replace(model.linear, videos=tuple(one.linear for one in left)), tuple(left))
+    faint = [video.governed_by(**{name: FAINT * value for name, value in numbers.items()}) for video in videos]
+    changes = [(one.motion.states - video.motion.states) / FAINT for one, video in zip(faint, videos, strict=True)]
+    return moved(model, [one[..., [0, 1, 4]] for one in changes])
 
 
 def checked(model: ResidualModel, generator: np.random.Generator | None = None) -> Mapping[str, Check]:

@@ -111,7 +111,11 @@ def discover(
         videos=tuple(tracks.video for tracks in videos),
         description=describe(found.best.fit, after) if verdict is Verdict.UNKNOWN else None,
         notes=(*_notes(found, reasons, unlisted), *mass_scale_notes(_told(found, causes), videos)),
-        figures=residual_figures(found.base.fit, found.best.fit if found.best.causes else None),
+        figures=residual_figures(
+            found.base.fit,
+            found.best.fit if found.best.causes else None,
+            failing={check.name for check in (*checks, *after) if check.significant},
+        ),
         fit=found.best.fit,
         left_out=models_of_the_others(found.base, found.best, found.overdispersion),
         tried=tuple(tried),

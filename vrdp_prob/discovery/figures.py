@@ -1,6 +1,6 @@
 """What a model misses, drawn: over the plane, against speed and time, and at contacts; before and after extension."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,6 +14,7 @@ from vrdp_prob.discovery.measurement_checks import roughness
 from vrdp_prob.discovery.missing_acceleration import Windows, missing_acceleration
 from vrdp_prob.discovery.plots import AFTER, BEFORE, Plot, side_by_side
 from vrdp_prob.discovery.residual_model import ResidualModel
+from vrdp_prob.discovery.residual_panels import Remainder, panels
 from vrdp_prob.discovery.words import number
 from vrdp_prob.inference.several_videos.fitting import SharedFit
 from vrdp_prob.report.axes import Axis, linear_axis
@@ -38,6 +39,7 @@ class _Seen:
     windows: Windows
     rebounds: Rebounds
     rubbing: Rubbing
+    remainder: Remainder
     colour: str
     name: str
 
@@ -47,10 +49,11 @@ class _Seen:
         flight = FreeFlight.of(model)
         contacts = [FittedContacts.of(video.motion) for video in model.videos]
         windows = missing_acceleration(flight.model, roughness(model))
-        return cls(windows, Rebounds.of(fit, contacts), rubbing(model, flight, contacts), colour, name)
+        rubbed = rubbing(model, flight, contacts)
+        return cls(windows, Rebounds.of(fit, contacts), rubbed, Remainder.of(model, colour, name), colour, name)
 
 
-def residual_figures(before: SharedFit, after: SharedFit | None) -> dict[str, str]:
+def residual_figures(before: SharedFit, after: SharedFit | None, *, failing: Collection[str] = ()) -> dict[str, str]:
     """Figures of what a model misses, and of what is left when it is extended.
 
     Parameters
@@ -59,6 +62,8 @@ def residual_figures(before: SharedFit, after: SharedFit | None) -> dict[str, st
         Fit of the model that was given.
     after
         Fit of the extended model; None where nothing was added.
+    failing
+        Names of the checks that fail: some have a figure of their own.
 
     Returns
     -------
@@ -75,7 +80,7 @@ def residual_figures(before: SharedFit, after: SharedFit | None) -> dict[str, st
         figures["Restitution against approach speed"] = _restitution(seen)
     if all(len(one.rubbing.normal) > 1 for one in seen):
         figures["Tangential against normal impulse"] = _impulses(seen)
-    return figures
+    return figures | panels([one.remainder for one in seen], failing)
 
 
 def _map(seen: Sequence[_Seen]) -> str:

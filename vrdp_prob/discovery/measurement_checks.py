@@ -15,6 +15,7 @@ from vrdp_prob.discovery.residual_model import ResidualModel, VideoResiduals
 from vrdp_prob.discovery.words import number, opposite
 from vrdp_prob.models.roughness import CUBIC_NOISE_GAIN, NORMAL_MAD
 
+LOST, SINGLE, OUTLIERS = "time stamps: lost frames", "time stamps: single frames", "outliers"
 MEMORY, SIZE = GENERAL = ("memory of the residuals", "size of the residuals")
 """Checks that say that something is wrong, and not what."""
 DISTORTION = "distortion of positions"
@@ -75,7 +76,7 @@ def _clock_checks(model: ResidualModel, replicas: Replicas) -> Iterator[Check]:
         if p_value < SEEN
         else "No jump of all bodies along their paths was seen."
     )
-    yield Check("time stamps: lost frames", abs(strongest[1]), p_value, False, sentence)
+    yield Check(LOST, abs(strongest[1]), p_value, False, sentence)
     p_value = sum_p_value(jitter, jitter_replicas)
     spread = float(np.sqrt(max(squares, 0.0) / weights)) if weights else 0.0
     sentence = (
@@ -83,7 +84,7 @@ def _clock_checks(model: ResidualModel, replicas: Replicas) -> Iterator[Check]:
         if p_value < SEEN
         else "No frame comes too early or too late for all bodies."
     )
-    yield Check("time stamps: single frames", spread, p_value, False, sentence)
+    yield Check(SINGLE, spread, p_value, False, sentence)
 
 
 class _Scan:
@@ -177,7 +178,7 @@ def _outlier_check(model: ResidualModel, count: int, generator: np.random.Genera
         if p_value < SEEN
         else f"{found} of {total} positions lie far off those before and after, as many as the noise puts there."
     )
-    yield Check("outliers", share, p_value, False, sentence)
+    yield Check(OUTLIERS, share, p_value, False, sentence)
 
 
 def _gross(

@@ -78,6 +78,12 @@ class Plot:
         ends = [self.at(self.x.low, y), self.at(self.x.high, y)]
         self._marks.insert(0, _line(ends, MUTED, 1))
 
+    def band(self, ends: Sequence[tuple[float, float, float]]) -> None:
+        """A grey band between two heights, given at some places from left to right."""
+        outline = [*((x, low) for x, low, _ in ends), *((x, high) for x, _, high in reversed(ends))]
+        points = " ".join(f"{u:g},{v:g}" for u, v in (self.at(*point) for point in outline))
+        self._marks.append(f'<polygon points="{points}" style="fill:{MUTED};opacity:0.2"/>')
+
     def note(self, x: float, y: float, text: str) -> None:
         """A few words."""
         u, v = self.at(x, y)

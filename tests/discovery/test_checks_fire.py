@@ -1,0 +1,123 @@
+"""Checks fire on what they are for: the generator's change of the measured places, on top of what a null leaves."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+from jaxtyping import Float
+
+from tests.discovery.fitted import fitted, moved
+from tests.discovery.test_checks import by_name
+from tests.discovery.videos import Video, move, recorded
+from vrdp_prob.discovery.contact_checks import DISTANCE, KICK, contact_checks
+from vrdp_prob.discovery.finding import Check
+from vrdp_prob.discovery.free_flight import FreeFlight
+from vrdp_prob.discovery.measurement_checks import DISTORTION, LOST, OUTLIERS, SINGLE, measurement_checks
+from vrdp_prob.discovery.residual_model import ResidualModel
+
+REPLICAS = 60
+FAINT = 1e-3
+"""Share of an effect of which the change of the motion is taken, so that no contact comes earlier."""
+CHANCE = 1e-3
+"""Probability below which a check fires: there are some twenty."""
+
+Changes = Callable[[Video], Float[np.ndarray, "time body 2"]]
+
+
+@cache
+def null() -> tuple[tuple[Video, ...], ResidualModel]:
+    data, fit = fitted(seed=1)
+    return data.truth.videos, ResidualModel.of(fit)
+
+
+def checked(model: ResidualModel) -> Mapping[str, Check]:
+    """Checks of contacts and of the measurement, by name."""
+    generator = np.random.default_rng(0)
+    flight = FreeFlight.of(model)
+    replicas, beside = (one.replicas(REPLICAS, generator) for one in (model, flight.beside))
+    measured = measurement_checks(model, replicas, flight, beside, generator)
+    return by_name((*contact_checks(model, flight, beside), *measured))
+
+
+def faintly(video: Video, other: Video) -> Float[np.ndarray, "time body 2"]:
+    return np.asarray(other.motion.states[..., :2] - video.motion.states[..., :2]) / FAINT
+
+
+def larger(video: Video) -> Float[np.ndarray, "time body 2"]:
+    return 0.02 * faintly(video, replace(video, touching=1 + FAINT))
+
+
+def kicked(video: Video) -> Float[np.ndarray, "time body 2"]:
+    """A kick of the first body that moves for long."""
+    speed = np.linalg.norm(video.motion.states[..., 2:4], axis=-1)
+    body = int(speed.min(axis=0).argmax())
+    return faintly(video, video.governed_by(kick_time=1.0, kick_body=float(body), kick_x=0.2 * FAINT, kick_y=0.0))
+
+
+def lost(video: Video) -> Float[np.ndarray, "time body 2"]:
+    late = np.where(video.stamps > 0.8, 0.02, 0.0)
+    return np.asarray(move(video, video.stamps + late).states[..., :2] - video.motion.states[..., :2])
+
+
+def irregular(video: Video) -> Float[np.ndarray, "time body 2"]:
+    late = 0.008 * np.random.default_rng(3).standard_normal(video.frames)
+    late[0] = 0.0
+    return np.asarray(move(video, video.stamps + late).states[..., :2] - video.motion.states[..., :2])
+
+
+def bent(video: Video) -> Float[np.ndarray, "time body 2"]:
+    places = video.motion.states[..., :2]
+    return np.asarray(recorded(replace(video, distortion=0.04), places) - places)
+
+
+def test_none_fires_where_nothing_is_wrong() -> None:
+    found = checked(null()[1])
+    assert {DISTANCE, KICK, LOST, SINGLE, DISTORTION, OUTLIERS} <= set(found)
+    assert min(check.p_value for check in found.values()) > CHANCE
+
+
+@pytest.mark.parametrize(
+    ("name", "change", "says"),
+    [
+        (DISTANCE, larger, "farther apart than the sum of their radii"),
+        (KICK, kicked, "Without a partner in reach"),
+        (LOST, lost, "jump ahead along their paths together"),
+        (SINGLE, irregular, "too early or too late for all bodies"),
+        (DISTORTION, bent, "away from the middle of the picture"),
+    ],
+)
+def test_a_check_fires_on_what_it_is_for(name: str, change: Changes, says: str) -> None:
+    videos, model = null()
+    found = checked(moved(model, [change(video) for video in videos]))
+    assert found[name].p_value < CHANCE
+    assert says in found[name].sentence
+    assert found[name].p_value == min(found[one].p_value for one in (DISTANCE, KICK, LOST, SINGLE, DISTORTION))
+
+
+def test_positions_that_are_grossly_wrong_are_counted() -> None:
+    _, model = null()
+    generator = np.random.default_rng(0)
+    videos = []
+    for video in model.videos:
+        raw = video.raw.copy()
+        wrong = generator.random(len(raw)) < 0.03
+        raw[wrong] += generator.normal(0, 0.3, (int(wrong.sum()), 2))
+        videos.append(replace(video, raw=raw))
+    found = checked(replace(model, videos=tuple(videos)))[OUTLIERS]
+    assert found.p_value < 1e-6
+    assert 0.01 < found.statistic < 0.05
+
+
+def test_a_clock_that_is_fast_throughout_and_the_scale_of_all_masses_leave_nothing() -> None:
+    _, model = null()
+    rates = [video.motion.times[:, None, None] * video.motion.velocity for video in model.videos]
+    rows = [video.rows(change[..., None]) for video, change in zip(model.videos, rates, strict=True)]
+    told, whole = model.score(rows).information.item(), sum(float((one**2).sum()) for one in rows)
+    assert told < 1e-5 * whole
+    for video in model.videos:
+        entries = [video.likelihood.coordinates.entries[place] for place in video.own_places]
+        masses = [k for k, entry in enumerate(entries) if entry.field == "mass"]
+        columns = video.linear.own[: video.linear.data, masses]
+        assert np.linalg.norm(columns.sum(axis=1)) < 1e-3 * np.linalg.norm(columns)

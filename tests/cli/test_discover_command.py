@@ -9,11 +9,14 @@ import pytest
 from command_line import OBJECTS, TRACKS_HEADER, refused, two_discs
 
 from tests.discovery.findings import EVERY_KIND, named, nothing, unknown
+from tests.discovery.hidden import hide
+from tests.discovery.scenes import Setting
 from vrdp_prob import InputError, PhysicsModel, cli
 from vrdp_prob.discovery import document
 from vrdp_prob.discovery.finding import Finding
 from vrdp_prob.discovery.wording import MINUS
 from vrdp_prob.report import schema
+from vrdp_prob.scene import Shape
 
 FILES = ["finding.html", "finding.json", "model.toml"]
 
@@ -253,3 +256,19 @@ def write_old_files(folder: Path) -> dict[str, str]:
     for name in FILES:
         (folder / name).write_text("old")
     return dict.fromkeys(FILES, "old")
+
+
+def test_finds_what_is_hidden_in_a_folder(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """From the folder to the files, with nothing in the place of the search."""
+    setting = Setting(videos=3, bodies=2, frames=40, shapes=(Shape.CYLINDER,), late=0.0)
+    hide(["surface_tilt"], seed=1, effect_size=8.0, setting=setting).write(tmp_path / "videos")
+    arguments = ["discover", str(tmp_path / "videos"), "--out", str(tmp_path / "out"), "--json", "--quiet"]
+    assert cli.run([*arguments, "--processes", "1"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    jsonschema.validate(found, schema("finding"))
+    assert (found["verdict"], found["causes"][0]["name"]) == ("named", "surface_tilt")
+    assert found["causes"][0]["held_out_gain"]["elpd_difference"] > 0
+    assert found == json.loads((tmp_path / "out" / "finding.json").read_text(encoding="utf-8"))
+    model = PhysicsModel.read(found["model"])
+    assert model.effects[-1].name == "surface_tilt"
+    assert "surface tilt" in (tmp_path / "out" / "finding.html").read_text(encoding="utf-8")

@@ -6,6 +6,7 @@ The whole grid is `benchmarks/discovery.py`.
 from collections.abc import Collection, Sequence
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from tests.discovery.data_set import Truth
@@ -14,10 +15,12 @@ from tests.discovery.scenes import Setting
 from vrdp_prob import load_all
 from vrdp_prob.discovery.discover import discover
 from vrdp_prob.discovery.finding import Finding, Verdict
+from vrdp_prob.discovery.search import gain_needed
 from vrdp_prob.models.model_file import known_effects
 from vrdp_prob.models.physics import PhysicsModel
 
 SMALL = Setting(videos=3, bodies=3)
+PAIRS = Setting(videos=3, bodies=2, frames=60)
 LARGER = Setting(videos=6, bodies=3)
 SURE = 0.9
 SMOOTH = ("surface_tilt", "linear_drag", "magnus_curl", "time_varying_friction", "contact_friction")
@@ -93,6 +96,28 @@ def test_nothing_is_found_where_nothing_is_hidden_and_the_same_seed_says_the_sam
     assert first.upper_bounds
     assert again.checks == first.checks
     assert again.upper_bounds == first.upper_bounds
+
+
+@pytest.mark.parametrize("seed", [11, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (4, 12, 13, 14, 16))])
+def test_a_cause_and_a_strength_that_a_seed_draws_are_found(seed: int, tmp_path: Path) -> None:
+    generator = np.random.default_rng(seed)
+    way, effect_size = str(generator.choice(SMOOTH)), float(generator.uniform(4.0, 8.0))
+    _, finding = finding_of(tmp_path, [way], seed=seed, effect_size=effect_size, setting=PAIRS, catalogue=SMOOTH)
+    assert finding.verdict is Verdict.NAMED
+    assert finding.causes[0].name == way
+    assert finding.causes[0].gain.elpd_difference > gain_needed(len(SMOOTH))
+
+
+def test_a_cause_needs_no_endless_gain_where_none_is_looked_for() -> None:
+    assert gain_needed(0) == gain_needed(1) > 0
+
+
+@pytest.mark.slow
+def test_with_no_cause_to_look_for_what_is_wrong_is_unknown(tmp_path: Path) -> None:
+    _, finding = finding_of(tmp_path, ["surface_tilt"], seed=1, catalogue=())
+    assert finding.verdict is Verdict.UNKNOWN
+    assert (finding.causes, finding.upper_bounds, finding.tried) == ((), (), ())
+    assert finding.extended.effects == finding.model.effects
 
 
 @pytest.mark.slow

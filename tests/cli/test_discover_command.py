@@ -272,3 +272,6 @@ def test_finds_what_is_hidden_in_a_folder(tmp_path: Path, capsys: pytest.Capture
     model = PhysicsModel.read(found["model"])
     assert model.effects[-1].name == "surface_tilt"
     assert "surface tilt" in (tmp_path / "out" / "finding.html").read_text(encoding="utf-8")
+    asked = ["ask", str(tmp_path / "videos"), "How many collisions happen?", "--video", "v01", "--sampler", "laplace"]
+    assert cli.run([*asked, "--model", found["model"], "--json", "--quiet"]) == 0
+    assert json.loads(capsys.readouterr().out)["distribution"]

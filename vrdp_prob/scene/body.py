@@ -5,6 +5,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
 
+import numpy as np
+from jaxtyping import Float
+
 from vrdp_prob.errors import InputError
 
 ATTRIBUTES = ("color", "material", "shape")
@@ -149,3 +152,9 @@ class Wall:
             raise InputError(
                 f"wall {ends}: restitution is {self.restitution:g}; give a number from 0 to 1 or leave it empty."
             )
+
+    def distance(self, place: Float[np.ndarray, "2"]) -> float:
+        """Distance in m of a place from the wall."""
+        begin, along = np.array([self.x1, self.y1]), np.array([self.x2 - self.x1, self.y2 - self.y1])
+        share = np.clip((place - begin) @ along / (along @ along), 0.0, 1.0)
+        return float(np.linalg.norm(place - begin - share * along))

@@ -43,8 +43,8 @@ class Tracks:
     ------
     InputError
         If there is no object or no position, times are not finite and strictly increasing, a position is infinite or
-        farther off than 1000 km, an object was seen fewer than two times, or two bodies overlap where they are first
-        seen together.
+        farther off than 1000 km, an object was seen fewer than two times, two bodies overlap where they are first seen
+        together, or a body overlaps a wall where it is first seen.
     """
 
     video: str
@@ -57,6 +57,7 @@ class Tracks:
         self._check_names()
         self._check_values()
         self._check_overlap()
+        self._check_walls()
 
     @classmethod
     def from_arrays(
@@ -215,6 +216,21 @@ class Tracks:
                         f"{self.video}: objects {first.id} and {second.id} overlap at {self.times[frame]:g} s "
                         f"(centres {distance:.3g} m apart, radii {first.radius:g} and {second.radius:g} m); "
                         "check positions and radii."
+                    )
+
+    def _check_walls(self) -> None:
+        for index, body in enumerate(self.bodies):
+            if body.radius is None:
+                continue
+            frame = int(self.seen[:, index].argmax())
+            place = self.positions[frame, index]
+            for wall in self.walls:
+                distance = wall.distance(place)
+                if distance < (1 - OVERLAP_TOLERANCE) * body.radius:
+                    raise InputError(
+                        f"{self.video}: object {body.id} overlaps the wall from ({wall.x1:g}, {wall.y1:g}) to "
+                        f"({wall.x2:g}, {wall.y2:g}) m at {self.times[frame]:g} s (centre {distance:.3g} m from it, "
+                        f"radius {body.radius:g} m); check positions, radii and walls."
                     )
 
 

@@ -18,8 +18,11 @@ from vrdp_prob.models.effects.effect import BodyView, Effect
 from vrdp_prob.models.effects.friction_patch import FrictionPatch
 from vrdp_prob.models.effects.surface_tilt import SurfaceTilt
 from vrdp_prob.models.model_file import known_effects
+from vrdp_prob.models.parameters import VIDEO_START
 
 LONGER = Setting(videos=6, bodies=2)
+START = 7.0
+"""Time stamp (s) of the first frame."""
 
 
 def search_that_found(cause: Effect, way: str, effect_size: float, setting: Setting) -> Search:
@@ -83,7 +86,7 @@ def test_restitution_depends_on_the_closing_speed(term: str, closing_speed: floa
 
 
 def absent(law: Effect) -> dict[str, float]:
-    return {one.name: law.vanishes_at.get(one.name, one.default) for one in law.parameters}
+    return {VIDEO_START: START} | {one.name: law.vanishes_at.get(one.name, one.default) for one in law.parameters}
 
 
 def body(**values: float) -> BodyView:
@@ -125,5 +128,5 @@ def test_each_term_does_what_it_says(
     term: str, where: dict[str, float], factor: float, acceleration: tuple[float, float]
 ) -> None:
     parameters = absent(UnlistedMotion()) | {term: 0.2}
-    assert UnlistedMotion().friction_factor(3.0, body(**where), parameters) == pytest.approx(factor, abs=1e-4)
-    assert UnlistedMotion().acceleration(3.0, body(**where), parameters) == pytest.approx(acceleration)
+    assert UnlistedMotion().friction_factor(START + 3.0, body(**where), parameters) == pytest.approx(factor, abs=1e-4)
+    assert UnlistedMotion().acceleration(START + 3.0, body(**where), parameters) == pytest.approx(acceleration)

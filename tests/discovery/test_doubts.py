@@ -1,5 +1,6 @@
 """What speaks against a cause that was found."""
 
+import numpy as np
 import pytest
 
 from tests.discovery.fitted import SMALL, fitted
@@ -10,7 +11,7 @@ from vrdp_prob.discovery.body_checks import REBOUND
 from vrdp_prob.discovery.checks import run_checks
 from vrdp_prob.discovery.contact_checks import AT_WALLS, KICK, REBOUND_AT_WALLS
 from vrdp_prob.discovery.describe import describe
-from vrdp_prob.discovery.doubts import OWN_CHECKS, Doubt, doubts
+from vrdp_prob.discovery.doubts import OWN_CHECKS, Doubt, doubts, with_doubts
 from vrdp_prob.discovery.finding import Check, Verdict
 from vrdp_prob.discovery.trials import Trial
 from vrdp_prob.inference.several_videos.fitting import SharedFit
@@ -104,3 +105,15 @@ def test_of_two_causes_only_the_doubted_one_is_left_out(monkeypatch: pytest.Monk
     assert SurfaceTilt.name not in finding.extended.text
     assert SurfaceTilt.name in {bound.name for bound in finding.upper_bounds}
     assert finding.notes.count("It is something else.") == 1
+
+
+@pytest.mark.parametrize(
+    ("doubted", "probabilities"),
+    [({}, (0.6, 0.1, 0.3)), ({2: 0.1}, (0.6 / 0.73, 0.1 / 0.73, 0.03 / 0.73)), ({0: 0.1, 2: 0.1}, (0.06, 0.1, 0.03))],
+    ids=["nothing is doubted", "a rival is doubted", "the best model and a rival are doubted"],
+)
+def test_what_a_doubted_rival_loses_the_others_have(
+    doubted: dict[int, float], probabilities: tuple[float, ...]
+) -> None:
+    reasons = {number: [Doubt(credible, "")] for number, credible in doubted.items()}
+    assert with_doubts(np.array([0.6, 0.1, 0.3]), reasons) == pytest.approx(probabilities)

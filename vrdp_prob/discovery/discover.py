@@ -1,6 +1,5 @@
 """The search for what a model lacks."""
 
-import math
 from collections.abc import Mapping, Sequence
 
 import numpy as np
@@ -10,7 +9,7 @@ from vrdp_prob.discovery.believed import extended_model, models_of_the_others
 from vrdp_prob.discovery.checking import check_video_count
 from vrdp_prob.discovery.checks import run_checks
 from vrdp_prob.discovery.describe import describe
-from vrdp_prob.discovery.doubts import Doubt, doubts
+from vrdp_prob.discovery.doubts import Doubt, doubts, with_doubts
 from vrdp_prob.discovery.estimates import cause_sentence, estimates, mass_scale_notes, upper_bounds
 from vrdp_prob.discovery.figures import residual_figures
 from vrdp_prob.discovery.finding import Check, Finding, FoundCause, Gain, UpperBound, Verdict
@@ -175,12 +174,14 @@ def _causes(found: Search, doubted: Mapping[Effect, Sequence[Doubt]], seed: int)
         shares = weights(trials, log_prior, np.random.default_rng(seed), overdispersion=found.overdispersion)
         cause = found.best.causes[number]
         reasons = doubted.get(cause, ())
-        probability = float(shares[0]) * math.prod(one.credible for one in reasons)
-        causes.append(_cause(found.best, cause, lesser, found.overdispersion, probability, named=not reasons))
-        for rival, share in zip(best_of.values(), shares[2:], strict=True):
-            if share >= LEAST_SHARE:
-                probability = float(share) * math.prod(one.credible for one in doubts(rival, rival.causes[-1]))
-                causes.append(_cause(rival, rival.causes[-1], lesser, found.overdispersion, probability, named=False))
+        told = {2 + k: rival for k, rival in enumerate(best_of.values()) if shares[2 + k] >= LEAST_SHARE}
+        why = {0: reasons} | {k: tuple(doubts(rival, rival.causes[-1])) for k, rival in told.items()}
+        believed = with_doubts(shares, why)
+        causes.append(_cause(found.best, cause, lesser, found.overdispersion, float(believed[0]), named=not reasons))
+        causes += [
+            _cause(rival, rival.causes[-1], lesser, found.overdispersion, float(believed[k]), named=False)
+            for k, rival in told.items()
+        ]
     return causes
 
 

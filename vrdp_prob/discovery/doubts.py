@@ -1,7 +1,11 @@
 """Reasons to doubt that what was found is the cause that it is called."""
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
 
 from vrdp_prob.discovery.body_checks import REBOUND, friction_against
 from vrdp_prob.discovery.contact_checks import DISTANCE, KICK, REBOUND_AT_WALLS, RUBBING, RUBBING_AT_WALLS
@@ -77,3 +81,24 @@ def doubts(trial: Trial, cause: Effect, left: Sequence[Check] = ()) -> Iterator[
             f"With '{cause.name}' the check of {own[0].name} fails still, which asks for just what this cause does: "
             f"its law is another one{otherwise}, and its probability counts that.",
         )
+
+
+def with_doubts(
+    shares: Float[np.ndarray, "model"], reasons: Mapping[int, Sequence[Doubt]]
+) -> Float[np.ndarray, "model"]:
+    """Probabilities of models of which some are doubted.
+
+    Parameters
+    ----------
+    shares
+        Probabilities without doubts, the first that of the best model.
+    reasons
+        Why some models are doubted, by their number.
+
+    Returns
+    -------
+    What a doubted rival loses the others have; what the best model loses is that of something that was not compared, so
+    that the probabilities then add up to less than 1.
+    """
+    believed = shares * [math.prod(one.credible for one in reasons.get(k, ())) for k in range(len(shares))]
+    return believed if reasons.get(0) else believed / believed.sum()

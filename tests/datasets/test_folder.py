@@ -59,7 +59,7 @@ def test_write_then_read_gives_the_same(tmp_path: Path) -> None:
     angles[:, 1] = times
     bodies = (Body("x", Shape.SPHERE, 0.2, color="red"), Body("y", Shape.CUBE, 0.3, mass=2.0))
     tracks = Tracks.from_arrays(
-        "v", bodies, times, positions, angles=angles, walls=(Wall(0, 0, 1, 0, 0.5),), camera=Camera.clevrer()
+        "v", bodies, times, positions, angles=angles, walls=(Wall(5, 5, 6, 5, 0.5),), camera=Camera.clevrer()
     )
     write_folder(str(tmp_path), [tracks])
     again = load(tmp_path)

@@ -77,7 +77,7 @@ def test_panels_go_by_the_names_of_checks_and_what_is_equal_stands_together() ->
     model = ResidualModel.of(fitted(seed=1)[1])
     known = {question.name for question in QUESTIONS} | {DISTANCE, LOST, SINGLE, DISTORTION}
     assert known >= PANELS.keys()
-    remainder = Remainder.of(model, "red", "a model")
+    remainder = Remainder(model, "red", "a model")
     for panel in PANELS.values():
         places = [place for place, *_ in _groups(remainder, panel)]
         assert len(places) > 1

@@ -50,7 +50,7 @@ class _Seen:
         contacts = [FittedContacts.of(video.motion) for video in model.videos]
         windows = missing_acceleration(flight.model, roughness(model))
         rubbed = rubbing(model, flight, contacts)
-        return cls(windows, Rebounds.of(fit, contacts), rubbed, Remainder.of(model, colour, name), colour, name)
+        return cls(windows, Rebounds.of(fit, contacts), rubbed, Remainder(model, colour, name), colour, name)
 
 
 def residual_figures(before: SharedFit, after: SharedFit | None, *, failing: Collection[str] = ()) -> dict[str, str]:

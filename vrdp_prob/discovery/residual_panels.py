@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from jaxtyping import Float
@@ -21,6 +22,7 @@ GROUPS, FEWEST = 10, 5
 
 Numbers = Float[np.ndarray, "observation"]
 Vectors = Float[np.ndarray, "observation 2"]
+Groups = list[tuple[float, float, float]]
 
 
 @dataclass(frozen=True)
@@ -49,34 +51,31 @@ class Remainder:
     ----------
     model
         Its residuals.
-    replicas
-        What noise alone leaves of each video.
     colour, name
         How it is drawn, and what it is called.
     """
 
     model: ResidualModel
-    replicas: Sequence[Float[np.ndarray, "_ replica"]]
     colour: str
     name: str
 
-    @classmethod
-    def of(cls, model: ResidualModel, colour: str, name: str) -> "Remainder":
-        """That of a fit."""
-        return cls(model, model.replicas(REPLICAS, np.random.default_rng(0)), colour, name)
+    @cached_property
+    def replicas(self) -> Sequence[Float[np.ndarray, "_ replica"]]:
+        """What noise alone leaves of each video."""
+        return self.model.replicas(REPLICAS, np.random.default_rng(0))
 
 
 def panels(remainders: Sequence[Remainder], failing: Collection[str]) -> dict[str, str]:
     """A figure for each of the checks that fail and have one: SVG elements by their titles."""
+    found = {name: [_groups(one, panel) for one in remainders] for name, panel in PANELS.items() if name in failing}
     return {
-        f"Residuals: {name}": _figure(remainders, panel)
-        for name, panel in PANELS.items()
-        if name in failing and all(len(_groups(one, panel)) > 1 for one in remainders)
+        f"Residuals: {name}": _figure(remainders, PANELS[name], groups)
+        for name, groups in found.items()
+        if all(len(some) > 1 for some in groups)
     }
 
 
-def _figure(remainders: Sequence[Remainder], panel: Panel) -> str:
-    found = [_groups(one, panel) for one in remainders]
+def _figure(remainders: Sequence[Remainder], panel: Panel, found: Sequence[Groups]) -> str:
     x = linear_axis([place for groups in found for place, *_ in groups])
     y = linear_axis(
         [end for groups in found for _, mean, sd in groups for end in (mean, NORMAL_95 * sd, -NORMAL_95 * sd)]
@@ -95,7 +94,7 @@ def _figure(remainders: Sequence[Remainder], panel: Panel) -> str:
     return side_by_side(plots, words)
 
 
-def _groups(one: Remainder, panel: Panel) -> list[tuple[float, float, float]]:
+def _groups(one: Remainder, panel: Panel) -> Groups:
     """Mean place, mean residual, and its standard deviation by chance, of each group of observations."""
     at, seen, drawn = [], [], []
     for video, left, noise in zip(one.model.videos, one.model.left, one.replicas, strict=True):

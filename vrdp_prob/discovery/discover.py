@@ -163,7 +163,10 @@ def _excess(trial: Trial) -> float:
 
 
 def _causes(found: Search, doubted: Mapping[Effect, Sequence[Doubt]], seed: int) -> list[FoundCause]:
-    """The causes of the best model, and those that could take the place of one."""
+    """The causes of the best model, and those that could take the place of one.
+
+    What another way of a cause has for it, that cause has.
+    """
     causes: list[FoundCause] = []
     for number, (lesser, rivals) in enumerate(zip(found.lesser, found.rivals, strict=True)):
         best_of = {one.causes[-1].name: one for one in reversed(rivals)}
@@ -177,10 +180,13 @@ def _causes(found: Search, doubted: Mapping[Effect, Sequence[Doubt]], seed: int)
         told = {2 + k: rival for k, rival in enumerate(best_of.values()) if shares[2 + k] >= LEAST_SHARE}
         why = {0: reasons} | {k: tuple(doubts(rival, rival.causes[-1])) for k, rival in told.items()}
         believed = with_doubts(shares, why)
-        causes.append(_cause(found.best, cause, lesser, found.overdispersion, float(believed[0]), named=not reasons))
+        same = [k for k, rival in told.items() if rival.causes[-1].cause_name() == cause.cause_name()]
+        probability = float(believed[[0, *same]].sum())
+        causes.append(_cause(found.best, cause, lesser, found.overdispersion, probability, named=not reasons))
         causes += [
             _cause(rival, rival.causes[-1], lesser, found.overdispersion, float(believed[k]), named=False)
             for k, rival in told.items()
+            if k not in same
         ]
     return causes
 
@@ -189,7 +195,7 @@ def _in_order(causes: Sequence[FoundCause]) -> list[FoundCause]:
     """Named causes first, each group by probability; one that may take the place of several stands there once."""
     first: dict[str, FoundCause] = {}
     for cause in sorted(causes, key=lambda one: (not one.named, -one.probability)):
-        first.setdefault(cause.name, cause)
+        first.setdefault(cause.effect, cause)
     return list(first.values())
 
 
@@ -204,12 +210,13 @@ def _cause(
 ) -> FoundCause:
     values = estimates(trial.fit, effect, unexplained=trial.unexplained, overdispersion=overdispersion)
     return FoundCause(
-        name=effect.name,
+        name=effect.cause_name(),
         probability=min(max(probability, 0.0), 1.0),
         sentence=cause_sentence(effect, values),
         parameters=values,
         gain=_gain(lesser, trial, overdispersion),
         named=named,
+        way=effect.name if effect.cause else None,
     )
 
 
@@ -229,7 +236,7 @@ def _gain(before: Trial, after: Trial, overdispersion: Float[np.ndarray, "video"
 def _told(found: Search, causes: Sequence[FoundCause]) -> list[Effect]:
     """The effects of some causes."""
     names = {cause.name for cause in causes}
-    return [effect for effect in found.refits.catalogue if effect.name in names]
+    return [effect for effect in found.refits.catalogue if effect.cause_name() in names]
 
 
 def _bounds(found: Search) -> list[UpperBound]:

@@ -93,6 +93,7 @@ def write_finding(finding: Finding, directory: Path | str) -> FindingFiles:
 def _cause(cause: FoundCause) -> dict[str, Any]:
     return {
         "name": cause.name,
+        "effect": cause.effect,
         "probability": cause.probability,
         "named": cause.named,
         "sentence": cause.sentence,

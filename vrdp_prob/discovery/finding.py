@@ -105,6 +105,8 @@ class FoundCause:
         What it adds to the prediction of held-out videos.
     named
         Whether it is part of the extended model.
+    way
+        Name of the effect, where that is a further way in which the cause acts; None where it is the cause itself.
     """
 
     name: str
@@ -113,6 +115,12 @@ class FoundCause:
     parameters: Mapping[str, Estimate]
     gain: Gain
     named: bool
+    way: str | None = None
+
+    @property
+    def effect(self) -> str:
+        """Name of the effect as which it is part of a model."""
+        return self.way or self.name
 
 
 @dataclass(frozen=True)

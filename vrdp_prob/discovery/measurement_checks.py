@@ -56,8 +56,9 @@ def _clock_checks(model: ResidualModel, replicas: Replicas) -> Iterator[Check]:
     strongest, where = (0.0, 0.0), ""
     squares, weights = 0.0, 0.0
     for index, (video, noise) in enumerate(zip(model.videos, replicas, strict=True)):
-        motion = video.motion
-        late, single = (_scanned(model, index, rows, noise) for rows in _clock_rows(video))
+        motion, frames = video.motion, video.late_frames
+        from_there = frames @ np.tril(np.ones((len(motion.times), len(motion.times))))
+        late, single = (_scanned(model, index, rows, noise) for rows in (from_there, frames))
         lost += float(late.statistic.max(initial=0.0))
         lost_replicas += late.replicas.max(axis=0, initial=0.0)
         jitter += float(single.statistic.sum())
@@ -118,18 +119,6 @@ def _scanned(
     gradient = np.array([float(scores[k].gradient[0]) for k in shown])
     scale = np.sqrt(model.dispersion)
     return _Scan(shown, gradient / scale, information[shown], blocks[:, shown, 0].T @ noise)
-
-
-def _clock_rows(video: VideoResiduals) -> tuple[Float[np.ndarray, "data frame"], Float[np.ndarray, "data frame"]]:
-    """What 1 s does that is lost before each frame, and by which each single frame is late."""
-    motion = video.motion
-    count = len(motion.times)
-    late = np.tril(np.ones((count, count)))
-    moves = np.where(motion.moving[..., None], motion.velocity, 0.0)
-    return (
-        video.rows(moves[..., None] * late[:, None, None, :]),
-        video.rows(moves[..., None] * np.eye(count)[:, None, None, :]),
-    )
 
 
 def _lens_check(flight: FreeFlight) -> Iterator[Check]:

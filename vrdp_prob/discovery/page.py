@@ -67,7 +67,7 @@ def render(finding: Finding) -> str:
 
 
 def _cause(cause: FoundCause, finding: Finding) -> dict[str, Any]:
-    effect = effect_of(cause.name, finding.extended)
+    effect = effect_of(cause.effect, finding.extended)
     said = chance(cause.probability)
     return {
         "title": title(cause.name),
@@ -217,7 +217,7 @@ def _model(finding: Finding) -> dict[str, Any]:
             " what that video says twice."
         )
     kept = {effect.name for effect in finding.extended.effects}
-    if past := [title(cause.name) for cause in finding.named if cause.name not in kept]:
+    if past := [title(cause.name) for cause in finding.named if cause.effect not in kept]:
         words += f" {listed(past)} is no part of it, since that happened once in a video."
     return {
         "model": finding.model.name,

@@ -12,6 +12,7 @@ from functools import cached_property
 import numpy as np
 import torch
 from jaxtyping import Float
+from torch import Tensor
 
 from vrdp_prob.discovery.fitted_motion import FittedMotion
 from vrdp_prob.discovery.linear import LinearFit, LinearVideo, Score
@@ -21,6 +22,7 @@ from vrdp_prob.inference.parallel import in_parallel
 from vrdp_prob.inference.several_videos.fitting import SharedFit
 from vrdp_prob.inference.several_videos.joint_fit import expand_prior
 from vrdp_prob.inference.several_videos.linking import LinkedVideo
+from vrdp_prob.models.lateness import Lateness
 from vrdp_prob.models.likelihood import Discrepancies, Likelihood
 from vrdp_prob.models.noise import NoiseFamily
 from vrdp_prob.models.unknowns import ANGLE_NOISE, DEGREES_OF_FREEDOM, NOISE
@@ -42,19 +44,25 @@ class Noise:
         Scales of positions and angles in units of the video's references.
     degrees
         Degrees of freedom of Student-t noise.
+    lateness
+        How frames are late by chance; None where the model has no such frames.
     """
 
     family: NoiseFamily
     scale: float
     angle_scale: float
     degrees: float
+    lateness: Lateness | None = None
 
     @classmethod
     def of(cls, likelihood: Likelihood, point: Float[np.ndarray, "dimension"]) -> "Noise":
         """The noise at a point of a video's density."""
-        quantities = likelihood.coordinates.quantities(torch.from_numpy(point[None]))
-        numbers = (float(quantities[name][0, 0]) for name in (NOISE, ANGLE_NOISE, DEGREES_OF_FREEDOM))
-        return cls(likelihood.noise, *numbers)
+        rows = torch.from_numpy(point[None])
+        quantities = likelihood.coordinates.quantities(rows)
+        scale, angle_scale, degrees = (
+            float(quantities[name][0, 0]) for name in (NOISE, ANGLE_NOISE, DEGREES_OF_FREEDOM)
+        )
+        return cls(likelihood.noise, scale, angle_scale, degrees, likelihood.lateness(rows))
 
     def slope(self, numbers: int) -> float:
         """Derivative of the influence, of unit variance, of an observation of 1 or 2 numbers of unit scale."""
@@ -64,10 +72,21 @@ class Noise:
 
     def linear(self, discrepancies: Discrepancies) -> Float[np.ndarray, "point data"]:
         """Differences of what was seen from worlds, in the units in which residuals of unit variance follow them."""
-        positions = discrepancies.positions.flatten(1) * (self.slope(2) / self.scale)
-        angles = discrepancies.angles * (self.slope(1) / self.angle_scale)
-        rows: np.ndarray = torch.cat([positions, angles], dim=1).detach().numpy()
+        rows = self.independent(discrepancies)
+        positions = 2 * discrepancies.positions.shape[1]
+        rows[:, :positions] *= self.slope(2)
+        rows[:, positions:] *= self.slope(1)
         return rows
+
+    def independent(self, discrepancies: Discrepancies) -> Float[np.ndarray, "point data"]:
+        """Differences of what was seen from worlds in units of the noise, as independent numbers."""
+        parts = [discrepancies.positions.flatten(1) / self.scale, discrepancies.angles / self.angle_scale]
+        rows: np.ndarray = self.on_time(torch.cat(parts, dim=1)).detach().numpy()
+        return rows
+
+    def on_time(self, rows: Float[Tensor, "row data"]) -> Float[Tensor, "row data"]:
+        """Numbers in units of the noise as independent ones."""
+        return rows if self.lateness is None else self.lateness.independent(rows)
 
     def influence(
         self, residuals: Float[np.ndarray, "observation number column"]
@@ -128,8 +147,7 @@ class VideoResiduals:
             with torch.no_grad():
                 found = likelihood.discrepancies(rows)
                 prior = coordinates.prior_residuals(rows)
-            parts = [found.positions.flatten(1) / noise.scale, found.angles / noise.angle_scale, prior]
-            return torch.cat(parts, dim=1).numpy()
+            return np.concatenate([noise.independent(found), prior.numpy()], axis=1)
 
         world = ~coordinates.mask(NOISE_FIELDS)
         values, derivative = jacobian(differences, point, coordinates.scale, active=world, central=True)
@@ -141,7 +159,7 @@ class VideoResiduals:
         columns = np.zeros((len(values), shared))
         columns[:, video.shared_columns] = derivative[:, video.shared_places]
         own = [place for place in video.local_places if world[place]]
-        predicted = likelihood.predicted(torch.from_numpy(point[None]))[0, observations.frame, observations.body, :2]
+        predicted = likelihood.fitted(torch.from_numpy(point[None]))[0, observations.frame, observations.body, :2]
         return cls(
             LinearVideo(video.name, values, derivative[:, own], columns, data),
             likelihood,
@@ -165,15 +183,24 @@ class VideoResiduals:
         """What changes of the measured places (m) and angles (rad, where given) do to the data's residuals."""
         observations = self.likelihood.observations
         seen = changes[observations.frame, observations.body, :2]
-        factor = self.noise.slope(2) / self.noise.scale
-        scaled = np.einsum("oij,ojc->oic", factor * observations.whitening, seen)
+        scaled = np.einsum("oij,ojc->oic", observations.whitening / self.noise.scale, seen)
         result = np.zeros((self.linear.data, changes.shape[-1]))
         result[: self.positions] = scaled.reshape(self.positions, -1)
         if changes.shape[2] > 2:
             turned = changes[observations.angle_frame, observations.angle_body, 2]
-            factor = self.noise.slope(1) / (self.noise.angle_scale * observations.angle_reference)
-            result[self.positions :] = factor * turned
+            result[self.positions :] = turned / (self.noise.angle_scale * observations.angle_reference)
+        if self.noise.lateness is not None:
+            result = self.noise.on_time(torch.from_numpy(np.ascontiguousarray(result.T))).numpy().T.copy()
+        result[: self.positions] *= self.noise.slope(2)
+        result[self.positions :] *= self.noise.slope(1)
         return result
+
+    @cached_property
+    def late_frames(self) -> Float[np.ndarray, "data frame"]:
+        """What 1 s does to the data's residuals by which each single frame is late."""
+        motion = self.motion
+        moves = np.where(motion.moving[..., None], motion.velocity, 0.0)
+        return self.rows(moves[..., None] * np.eye(len(motion.times))[:, None, None, :])
 
     def drawn(self, count: int, generator: np.random.Generator) -> Float[np.ndarray, "residual replica"]:
         """Residuals of pure noise before anything is absorbed."""

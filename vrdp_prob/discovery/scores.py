@@ -14,6 +14,7 @@ import numpy as np
 from jaxtyping import Float
 from scipy.stats import chi2
 
+from vrdp_prob.discovery.jitter import jitter
 from vrdp_prob.discovery.linear import RANK, Score
 from vrdp_prob.discovery.probes import Probe, probes
 from vrdp_prob.discovery.residual_model import ResidualModel
@@ -126,6 +127,8 @@ def score_causes(fit: SharedFit, model: ResidualModel, effects: Iterable[Effect]
 
 
 def _scanned(fit: SharedFit, model: ResidualModel, seed: int, effect: Effect) -> CauseScore | None:
+    if effect.overrides("frame_jitter"):
+        return _scan_frames(model, effect)
     scan = _scan_once if happens_once(effect) else _scan_shared
     return scan(fit, model, effect, np.random.default_rng(seed))
 
@@ -176,6 +179,16 @@ def _scan_shared(
     start = dict(points[best]) | (_starting(effect, estimate) if len(estimate) == len(names) else {})
     largest = _largest([zip(names, score.estimate, score.sd, strict=True) for score in scores], effect)
     return CauseScore(effect, start, (), float(statistics[best]), degrees, p_value, largest)
+
+
+def _scan_frames(model: ResidualModel, effect: Effect) -> CauseScore | None:
+    """How probable it is that all frames are early or late by chance; the strength is a standard deviation."""
+    found = jitter(model)
+    if found is None:
+        return None
+    (name,) = effect.vanishes_at
+    largest = {name: Largest(found.bound, 1, 1)}
+    return CauseScore(effect, {name: found.value}, (), found.chi_square, 1, found.p_value, largest)
 
 
 def _largest(places: Sequence[Iterable[tuple[str, float, float]]], effect: Effect) -> dict[str, Largest]:

@@ -117,9 +117,10 @@ def causes_of_lost_videos(
 
 
 def _tells(effect: Effect) -> bool:
-    """Whether one video can say much about an effect."""
+    """Whether one video can say much about an effect, and about the course of its events."""
     of_materials = any(parameter.scope is Scope.MATERIAL for parameter in effect.parameters)
-    return bool(effect.vanishes_at or effect.vanishes_like) and not happens_once(effect) and not of_materials
+    vanishes = bool(effect.vanishes_at or effect.vanishes_like)
+    return vanishes and not happens_once(effect) and not of_materials and not effect.overrides("frame_jitter")
 
 
 def _acts_in_contacts(effect: Effect) -> bool:

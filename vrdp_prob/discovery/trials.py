@@ -10,6 +10,7 @@ from jaxtyping import Float
 from vrdp_prob.discovery.finding import HeldOut
 from vrdp_prob.discovery.forecast import held_out
 from vrdp_prob.discovery.held_out import Cavity, cavities
+from vrdp_prob.discovery.jitter import alike_in_neighbours
 from vrdp_prob.discovery.kicked_at_contact import kicked_at_contact
 from vrdp_prob.discovery.scores import CauseScore, happens_once
 from vrdp_prob.discovery.unexplained import Unexplained, unexplained
@@ -37,6 +38,8 @@ SPREAD_ROUNDS = 3
 PATCHED = 0.5
 """Share of the videos with a cause that happens once from which on, if they stray still or it comes with a contact, it
 explains none of them."""
+MOVED = 1e-3
+"""Probability that lateness of neighbouring frames is so much alike by chance, below which it is none."""
 FELL = 5.0
 """Nats by which a video may be less probable with one more cause; beyond that it has lost its course of events."""
 
@@ -197,11 +200,14 @@ class Trial:
         return [int(video) for video in np.flatnonzero(self.choices[cause.name])]
 
     def patches(self, cause: Effect) -> bool:
-        """Whether a cause that happens once in a video mends the fit of videos and explains none of them.
+        """Whether a cause mends the fit of videos and explains none of them.
 
         One kick explains a video or it does not. Where nearly every video needs one and strays with it as well, kicks
-        stand for something that acts all the time; where they come with contacts, for errors of these.
+        stand for something that acts all the time; where they come with contacts, for errors of these. Frames that are
+        late as their neighbours are stand for motion along the paths.
         """
+        if cause.overrides("frame_jitter"):
+            return alike_in_neighbours(self.fit) < MOVED
         if not happens_once(cause):
             return False
         acting = self.acting(cause)

@@ -23,8 +23,8 @@ def tried_causes(found: Search, told: Collection[str], *, seed: int) -> list[Tri
     """
     best_of: dict[str, Trial] = {}
     for trial in found.refits.made(found.best):
-        if trial.causes[-1].name not in told:
-            best_of.setdefault(trial.causes[-1].name, trial)
+        if (name := trial.causes[-1].cause_name()) not in told:
+            best_of.setdefault(name, trial)
     return sorted((_tried(found, trial, seed) for trial in best_of.values()), key=lambda one: -one.gain)
 
 
@@ -42,4 +42,4 @@ def _tried(found: Search, trial: Trial, seed: int) -> TriedCause:
         why = "too few videos speak for it"
     else:
         why = "what it leaves unexplained outweighs its gain"
-    return TriedCause(cause.name, difference, error, found.needed, probability, ESTABLISHED, why)
+    return TriedCause(cause.cause_name(), difference, error, found.needed, probability, ESTABLISHED, why)

@@ -155,7 +155,7 @@ def judge(likelihood: Likelihood, point: Float[np.ndarray, "dimension"], clues: 
         Noise and outliers that the tracks show by themselves.
     """
     tracks = likelihood.tracks
-    residuals = tracks.positions - likelihood.predicted(torch.from_numpy(point[None]))[0, :, :, :2]
+    residuals = tracks.positions - likelihood.fitted(torch.from_numpy(point[None]))[0, :, :, :2]
     robust = likelihood.noise is NoiseFamily.STUDENT_T
     if robust:
         residuals = tempered(residuals, clues)

@@ -19,6 +19,7 @@ from vrdp_prob.inference.least_squares import jacobian
 from vrdp_prob.inference.misfit import Misfit, tempered
 from vrdp_prob.inference.noise_fit import NOISE_FIELDS
 from vrdp_prob.models.likelihood import Likelihood
+from vrdp_prob.models.measurement import jitters
 from vrdp_prob.models.model_error import ModelError, Strand, by_law
 from vrdp_prob.models.roughness import untold_noise
 from vrdp_prob.models.unknowns import ANGLE_NOISE
@@ -91,6 +92,8 @@ def next_model_error(
 ) -> ModelError | None:
     """What a fit is to allow for next: nothing, or what one expects of a model error, or what the residuals show.
 
+    Nothing where frames are late by chance, which is known of the model and not looked for beside an error of it.
+
     Parameters
     ----------
     likelihood
@@ -102,6 +105,8 @@ def next_model_error(
     misfit
         How the residuals of the first fit, without a model error, compare with the noise.
     """
+    if jitters(likelihood.model):  # frames that are late by chance tie bodies together, and strands stray by themselves
+        return None
     if likelihood.model_error is not None:
         return fit_model_error(likelihood, point, clues) or likelihood.model_error
     told = untold_noise(likelihood.tracks) is None  # else residuals smaller than the noise mean nothing

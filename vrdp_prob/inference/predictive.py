@@ -33,7 +33,7 @@ def replicated(
     A position in every frame from the release on, NaN before.
     """
     observations, error = likelihood.observations, likelihood.model_error
-    predicted = likelihood.predicted(points)[..., :2]
+    predicted = likelihood.predicted(points, _late(likelihood, points, generator))[..., :2]
     spread = np.broadcast_to(observations.position_reference * np.eye(2), (*predicted.shape[1:3], 2, 2)).copy()
     spread[observations.frame, observations.body] = np.linalg.inv(observations.whitening)
     if error is not None:
@@ -63,7 +63,7 @@ def replicated_angles(
     An angle in every frame from the release on, NaN before and for bodies of which no angle was measured.
     """
     observations, error = likelihood.observations, likelihood.model_error
-    predicted = likelihood.predicted(points)[..., 2]
+    predicted = likelihood.predicted(points, _late(likelihood, points, generator))[..., 2]
     spread = np.full(predicted.shape[1:], observations.angle_reference)
     if error is not None:
         spread[observations.angle_frame, observations.angle_body] *= np.sqrt(error.angle_variance)
@@ -75,6 +75,16 @@ def replicated_angles(
     scale = likelihood.coordinates.quantities(points)[ANGLE_NOISE].numpy()
     measured = np.isin(np.arange(predicted.shape[2]), observations.angle_bodies)
     return np.where(measured, _released(likelihood, (predicted + scale[:, None] * errors)[..., None])[..., 0], np.nan)
+
+
+def _late(
+    likelihood: Likelihood, points: Float[Tensor, "point dimension"], generator: np.random.Generator
+) -> Float[np.ndarray, "point time"] | None:
+    """Time in s by which each frame is late by chance; None where the model has no such frames."""
+    lateness = likelihood.lateness(points)
+    if lateness is None:
+        return None
+    return lateness.jitter.numpy()[:, None] * generator.standard_normal((len(points), len(likelihood.tracks.times)))
 
 
 def _tails(

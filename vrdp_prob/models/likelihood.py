@@ -9,7 +9,15 @@ from jaxtyping import Bool, Float
 from torch import Tensor
 
 from vrdp_prob.models.coordinates import Coordinates
-from vrdp_prob.models.measurement import changes_clock, changes_positions, measured_positions, true_times
+from vrdp_prob.models.lateness import Lateness
+from vrdp_prob.models.measurement import (
+    changes_clock,
+    changes_positions,
+    frame_jitter,
+    jitters,
+    measured_positions,
+    true_times,
+)
 from vrdp_prob.models.model_error import ModelError, Strands, Whitening
 from vrdp_prob.models.noise import NoiseFamily
 from vrdp_prob.models.observation import Observations
@@ -35,10 +43,14 @@ class Discrepancies:
         Of each seen position.
     angles
         Of each measured angle.
+    rates
+        Change of all of them, positions first, per second by which their frame is late; None where the model has no
+        frames that are late by chance.
     """
 
     positions: Float[Tensor, "point observation 2"]
     angles: Float[Tensor, "point angle"]
+    rates: Float[Tensor, "point number"] | None = None
 
 
 @dataclass(frozen=True)
@@ -150,6 +162,7 @@ class Likelihood:
         return Discrepancies(
             found.positions.masked_fill(failed[:, None, None], torch.nan),
             found.angles.masked_fill(failed[:, None], torch.nan),
+            found.rates,
         )
 
     def log_density_given(
@@ -162,22 +175,56 @@ class Likelihood:
         quantities = self.coordinates.quantities(points)
         return self._log_likelihood(discrepancies, quantities) + self.coordinates.log_prior(points).sum(dim=1)
 
-    def predicted(self, points: Float[Tensor, "point dimension"]) -> Float[np.ndarray, "point time body 3"]:
-        """Positions (m) and angles (rad) of all frames and bodies as they would be measured without noise."""
+    def predicted(
+        self, points: Float[Tensor, "point dimension"], late: Float[np.ndarray, "point time"] | None = None
+    ) -> Float[np.ndarray, "point time body 3"]:
+        """Positions (m) and angles (rad) of all frames and bodies as they would be measured without noise.
+
+        Parameters
+        ----------
+        points
+            The worlds.
+        late
+            Time in s by which each frame is late beyond what the worlds say; none is where None.
+        """
         with torch.no_grad():
             quantities = self.coordinates.quantities(points)
             worlds = self._worlds(quantities)
-            states = self._measured(worlds, self._rollout(worlds, None)[0]).numpy()
+            rollout = self._rollout(worlds, None)[0]
+            states = self._measured(worlds, rollout).numpy()
         predicted: np.ndarray = states.reshape(len(points), *self.tracks.seen.shape, 3)
         predicted[..., 2] += quantities["angle_zero"].numpy()[:, None]
-        return predicted
+        return predicted if late is None else predicted + late[:, :, None, None] * rollout.velocity.numpy()
+
+    def fitted(self, points: Float[Tensor, "point dimension"]) -> Float[np.ndarray, "point time body 3"]:
+        """What is predicted where each frame is as late as the bodies seen in it say, if frames are late by chance."""
+        return self.predicted(points, self.late(points) if jitters(self.model) else None)
+
+    def late(self, points: Float[Tensor, "point dimension"]) -> Float[np.ndarray, "point time"]:
+        """Most probable time in s by which each frame is late, in a model in which frames are late by chance."""
+        with torch.no_grad():
+            quantities = self.coordinates.quantities(points)
+            found, _ = self._discrepancies(quantities, None)
+            positions = found.positions / quantities[NOISE][:, :, None]
+            together = torch.cat([positions.flatten(1), found.angles / quantities[ANGLE_NOISE]], dim=1)
+            late: np.ndarray = self._lateness(found, quantities).expected(together).numpy()
+        return late
+
+    def lateness(self, points: Float[Tensor, "point dimension"]) -> Lateness | None:
+        """How frames are late by chance in the worlds of some points; None where the model has no such frames."""
+        if not jitters(self.model):
+            return None
+        with torch.no_grad():
+            quantities = self.coordinates.quantities(points)
+            return self._lateness(self._discrepancies(quantities, None)[0], quantities)
 
     def pointwise(
         self, points: Float[Tensor, "point dimension"]
     ) -> tuple[Float[np.ndarray, "point observation"], Float[np.ndarray, "point angle"]]:
         """Log likelihood of each seen position (both axes together) and of each measured angle.
 
-        With a model error it is that of one given the body's earlier ones, so that the sum is that of all.
+        With a model error it is that of one given the body's earlier ones, so that the sum is that of all. Where frames
+        are late by chance, what a frame's numbers have in common is shared by them alike.
         """
         observations, error = self.observations, self._whitening
         with torch.no_grad():
@@ -187,8 +234,12 @@ class Likelihood:
             degrees = quantities[DEGREES_OF_FREEDOM][:, 0]
             of_position = self.noise.log_constant(2, degrees)[:, None] - (position**2).sum(dim=-1) / 2
             of_angle = self.noise.log_constant(1, degrees)[:, None] - angle**2 / 2
-            positions = (of_position - 2 * quantities[NOISE].log()).numpy()
-            angles = (of_angle - quantities[ANGLE_NOISE].log()).numpy()
+            of_position, of_angle = of_position - 2 * quantities[NOISE].log(), of_angle - quantities[ANGLE_NOISE].log()
+            if discrepancies.rates is not None:
+                shares = self._lateness(discrepancies, quantities).log_volumes
+                of_position = of_position + shares[:, : 2 * position.shape[1]].reshape(position.shape).sum(dim=-1)
+                of_angle = of_angle + shares[:, 2 * position.shape[1] :]
+            positions, angles = of_position.numpy(), of_angle.numpy()
         positions = positions + np.linalg.slogdet(observations.whitening)[1]
         angles = angles - np.log(observations.angle_reference)
         if error is not None:
@@ -216,6 +267,8 @@ class Likelihood:
         if angle.shape[1]:
             constant = self.noise.log_constant(1, quantities[DEGREES_OF_FREEDOM][:, 0])
             value = value + angle.shape[1] * (constant - quantities[ANGLE_NOISE][:, 0].log())
+        if discrepancies.rates is not None:
+            value = value + self._lateness(discrepancies, quantities).log_volumes.sum(dim=1)
         return value
 
     def _independent(
@@ -226,9 +279,25 @@ class Likelihood:
         if self._whitening is not None:
             flat = self._whitening.whitened_positions(position.flatten(1))
             position, angle = flat.reshape(position.shape), self._whitening.whitened_angles(angle)
+        position, angle = position / quantities[NOISE][:, :, None], angle / quantities[ANGLE_NOISE]
+        if discrepancies.rates is not None:
+            together = torch.cat([position.flatten(1), angle], dim=1)
+            on_time = self._lateness(discrepancies, quantities).independent(together)
+            flat, angle = torch.split(on_time, [2 * position.shape[1], angle.shape[1]], dim=1)
+            position = flat.reshape(position.shape)
         degrees = quantities[DEGREES_OF_FREEDOM][:, 0]
-        position = self.noise.shrunk(position / quantities[NOISE][:, :, None], degrees)
-        return position, self.noise.shrunk((angle / quantities[ANGLE_NOISE])[..., None], degrees)[..., 0]
+        return self.noise.shrunk(position, degrees), self.noise.shrunk(angle[..., None], degrees)[..., 0]
+
+    def _lateness(self, discrepancies: Discrepancies, quantities: Quantities) -> Lateness:
+        """Frames that are late by chance."""
+        assert discrepancies.rates is not None
+        observations, count = self.observations, discrepancies.positions.shape[1]
+        frames = [observations.position_frames[: 2 * count], observations.angle_frames[: discrepancies.angles.shape[1]]]
+        noise = [quantities[NOISE].expand(-1, 2 * count), quantities[ANGLE_NOISE].expand(-1, len(frames[1]))]
+        of_video = [parameter.name for parameter in self.model.parameters if parameter.scope.per_video]
+        jitter = frame_jitter(self.model, {name: quantities[name][:, 0] for name in of_video})
+        rates = discrepancies.rates / torch.cat(noise, dim=1)
+        return Lateness(torch.cat(frames), rates, jitter, len(self.tracks.times))
 
     def _discrepancies(
         self, quantities: Quantities, frame_count: int | None
@@ -245,4 +314,13 @@ class Likelihood:
         turned = states.index_select(1, observations.angle_places) + zero - torch.from_numpy(observations.angle)
         angle = turned / observations.angle_reference
         finite = torch.isfinite(position).all(dim=(1, 2)) & torch.isfinite(angle).all(dim=1)
-        return Discrepancies(position, angle), valid & finite.numpy()
+        rates = _rates(rollout, observations) if jitters(self.model) else None
+        return Discrepancies(position, angle, rates), valid & finite.numpy()
+
+
+def _rates(rollout: Rollout, observations: Observations) -> Float[Tensor, "point number"]:
+    """Change of what was seen per second by which its frame is late, at noise scale 1."""
+    states = rollout.velocity.flatten(1)
+    place = observations.whitened(states.index_select(1, observations.position_places).reshape(len(states), -1, 2))
+    turning = states.index_select(1, observations.angle_places) / observations.angle_reference
+    return torch.cat([place.flatten(1), turning], dim=1)

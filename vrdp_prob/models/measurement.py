@@ -17,6 +17,11 @@ def changes_clock(model: PhysicsModel) -> bool:
     return any(effect.overrides("measured_times") for effect in model.effects)
 
 
+def jitters(model: PhysicsModel) -> bool:
+    """Whether frames come early or late by chance."""
+    return any(effect.overrides("frame_jitter") for effect in model.effects)
+
+
 def changes_positions(model: PhysicsModel) -> bool:
     """Whether measured positions differ from the true ones."""
     return any(effect.overrides("measured_positions") for effect in model.effects)
@@ -43,3 +48,9 @@ def measured_positions(
     for effect in model.effects:
         positions = effect.measured_positions(positions, times.expand(len(positions), -1), parameters)
     return positions
+
+
+def frame_jitter(model: PhysicsModel, parameters: Parameters) -> Float[Tensor, "world"]:
+    """Standard deviation in s of the true times of frames, of a model in which they come early or late by chance."""
+    found = [effect.frame_jitter(parameters) for effect in model.effects]
+    return torch.stack([one for one in found if one is not None]).square().sum(dim=0).sqrt()

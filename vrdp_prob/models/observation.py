@@ -117,6 +117,16 @@ class Observations:
         """Places of the measured angles in a flattened trajectory."""
         return torch.from_numpy(3 * (self.angle_frame * self.body_count + self.angle_body) + 2)
 
+    @cached_property
+    def position_frames(self) -> Int[Tensor, "coordinate"]:
+        """Frames of the seen coordinates (x and y in turn)."""
+        return torch.from_numpy(np.repeat(self.frame, 2))
+
+    @cached_property
+    def angle_frames(self) -> Int[Tensor, "angle"]:
+        """Frames of the measured angles."""
+        return torch.from_numpy(self.angle_frame)
+
 
 def prior_noise(tracks: Tracks) -> float:
     """Prior median of the position noise in m, from the size of the bodies."""

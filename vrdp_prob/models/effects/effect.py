@@ -112,6 +112,8 @@ class Effect:
 
     name: ClassVar[str]
     """Name in the catalogue of causes."""
+    cause: ClassVar[str | None] = None
+    """Name of the cause that the effect is a further way of; None where the effect is the cause itself."""
     sentence: ClassVar[str]
     """One sentence a person can read."""
     signed_sentences: ClassVar[tuple[str, str] | None] = None
@@ -130,6 +132,11 @@ class Effect:
     """Whether its laws read `vrdp_prob.models.parameters.VIDEO_START` beside their parameters."""
     stepwise: ClassVar[frozenset[str]] = frozenset()
     """Parameters on which the motion depends in steps, without a slope: they are found by a scan, and held there."""
+
+    @classmethod
+    def cause_name(cls) -> str:
+        """Name of the cause that it is, or is a way of."""
+        return cls.cause or cls.name
 
     @classmethod
     def overrides(cls, hook: str) -> bool:
@@ -249,6 +256,10 @@ class Effect:
     ) -> Float[Tensor, "world time"]:
         """True times in s of the frames, from their time stamps."""
         return times
+
+    def frame_jitter(self, parameters: Mapping[str, Float[Tensor, "..."]]) -> Float[Tensor, "world"] | None:
+        """Standard deviation in s of the true times of frames about `measured_times`, each by itself; None without."""
+        return None
 
     def measured_positions(
         self,

@@ -130,7 +130,7 @@ def catalogue(task: Task) -> list[Effect] | None:
     if task.kind is not Kind.REMOVED:
         return None
     hidden = {ALL[way].name for way in task.ways}
-    return [effect() for name, effect in known_effects().items() if name not in hidden]
+    return [effect() for effect in known_effects().values() if effect.cause_name() not in hidden]
 
 
 def outcome(finding: Finding, truth: Truth) -> Result:

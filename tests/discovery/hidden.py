@@ -70,6 +70,8 @@ def true_values(truth: Truth, found: Mapping[str, float]) -> dict[str, float]:
             values |= _OF_THE_TABLE[cause.way](truth.videos[0])
         elif cause.way == "clock_error":
             values |= {f"lost_time[{name}]": cause.strength for name in _named(truth)}
+        elif cause.way == "irregular_frames":
+            values["frame_jitter"] = cause.strength
         elif cause.way == "external_impulse":
             kicked = {name: video.laws for name, video in _named(truth).items() if np.isfinite(video.laws.kick_time)}
             for name, laws in kicked.items():

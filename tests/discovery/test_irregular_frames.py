@@ -1,0 +1,97 @@
+"""Frames that come early or late are found by their one jitter, and told from motion that the model lacks."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tests.discovery.fitted import fitted
+from vrdp_prob.discovery.checks import run_checks
+from vrdp_prob.discovery.estimates import estimates
+from vrdp_prob.discovery.jitter import alike_in_neighbours, jitter
+from vrdp_prob.discovery.residual_model import ResidualModel
+from vrdp_prob.discovery.scores import score_causes
+from vrdp_prob.discovery.trials import Trial, gain
+from vrdp_prob.models.effects.clock_error import ClockError
+from vrdp_prob.models.effects.irregular_frames import IrregularFrames
+
+SIZE, SEED = 3.0, 1
+NULLS = 24
+LARGEST = 0.1 / 25
+"""A tenth of the time in s between two frames."""
+
+
+@pytest.fixture(scope="module")
+def found() -> tuple[Trial, Trial]:
+    _, fit = fitted("irregular_frames", SIZE, seed=SEED)
+    base = Trial((), fit)
+    (score,) = score_causes(fit, ResidualModel.of(fit), [IrregularFrames()], seed=0)
+    trial = base.with_cause(score)
+    assert trial is not None
+    return base, trial
+
+
+def test_the_jitter_is_that_of_the_truth(found: tuple[Trial, Trial]) -> None:
+    data, fit = fitted("irregular_frames", SIZE, seed=SEED)
+    base, trial = found
+    strength = data.truth.causes[0].strength
+    promised = jitter(ResidualModel.of(fit))
+    assert promised is not None
+    assert promised.value == pytest.approx(strength, rel=0.15)
+    assert strength < promised.bound < 1.5 * strength
+    (one,) = estimates(trial.fit, IrregularFrames()).values()
+    assert abs(one.mean - strength) < 4 * one.sd < 0.3 * strength
+    difference, error = gain(trial, base)
+    assert difference > 100
+    assert difference > 3 * error
+
+
+def test_nothing_is_left_and_no_frame_is_late_like_its_neighbours(found: tuple[Trial, Trial]) -> None:
+    _, trial = found
+    assert not any(check.significant for check in run_checks(trial.fit, seed=0))
+    assert alike_in_neighbours(trial.fit) > 0.01
+    assert not trial.patches(trial.causes[0])
+
+
+def test_it_explains_more_than_lost_frames(found: tuple[Trial, Trial]) -> None:
+    _, fit = fitted("irregular_frames", SIZE, seed=SEED)
+    base, trial = found
+    (score,) = score_causes(fit, ResidualModel.of(fit), [ClockError()], seed=0)
+    lost = base.with_cause(score)
+    assert lost is None or gain(trial, lost)[0] > 100
+
+
+def test_without_the_cause_the_jitter_is_gone(found: tuple[Trial, Trial]) -> None:
+    _, trial = found
+    without = trial.without(trial.causes[0])
+    assert without.names == ()
+    assert without.fit.value("frame_jitter") is None
+
+
+def test_motion_that_the_model_lacks_is_no_jitter() -> None:
+    _, fit = fitted("linear_drag", 6.0, seed=1)
+    (score,) = score_causes(fit, ResidualModel.of(fit), [IrregularFrames()], seed=0)
+    trial = Trial((), fit).with_cause(score)
+    assert trial is not None
+    if trial.fit.value("frame_jitter") > 1e-3:
+        assert alike_in_neighbours(trial.fit) < 1e-3
+        assert trial.patches(trial.causes[0])
+
+
+def test_frames_that_are_on_time_have_none() -> None:
+    """The statistic against its own law: half a chi-square, so a tenth of nulls have p below 0.1 at most."""
+    _, fit = fitted(None, seed=1)
+    model = ResidualModel.of(fit)
+    generator = np.random.default_rng(0)
+    nulls = [jitter(model), *(jitter(with_noise(model, generator)) for _ in range(NULLS))]
+    assert all(one is not None and one.value < one.bound < LARGEST for one in nulls)
+    assert sum(one is not None and one.p_value < 0.1 for one in nulls) <= 8  # 3 expected, more in one of 1000 at most
+
+
+def with_noise(model: ResidualModel, generator: np.random.Generator) -> ResidualModel:
+    """The same model where pure noise was measured."""
+    videos = [
+        replace(video, linear=replace(video.linear, residuals=video.drawn(1, generator)[:, 0]))
+        for video in model.videos
+    ]
+    return ResidualModel(replace(model.linear, videos=tuple(one.linear for one in videos)), tuple(videos))

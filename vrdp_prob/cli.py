@@ -230,6 +230,7 @@ def discover_causes(
     out: Annotated[Path, typer.Option(metavar="DIR", help="Folder of the finding.")] = Path("vrdp-prob-finding"),
     as_json: Annotated[bool, typer.Option("--json", help="One JSON document on standard output.")] = False,
     camera: CameraOption = None,
+    checkpoint: CheckpointFolder = None,
     model: Model = None,
     processes: Processes = None,
     sampler: Annotated[
@@ -245,7 +246,8 @@ def discover_causes(
     """Find what the simulation gets wrong: finding.html, finding.json and the extended model.toml."""
     progress = progress_display(quiet=quiet)
     check_options(sampler=sampler)
-    check_writable(out)
+    for place in (out, *([] if checkpoint is None else [checkpoint])):
+        check_writable(place)
     physics = model_at(model)
     names, words = video_names(folder), words_at(word)
     check_video_count(names, source=folder)
@@ -253,7 +255,7 @@ def discover_causes(
     videos = load_all(folder, camera=camera, progress=progress)
     for tracks in videos:
         check_questions(asked.get(tracks.video, ()), tracks=tracks, words=words)
-    finding = discover(videos, model=physics, seed=seed, processes=processes, progress=progress)
+    finding = discover(videos, model=physics, seed=seed, processes=processes, progress=progress, checkpoint=checkpoint)
     if asked:
         finding = with_answers(finding, videos, asked, words=words, seed=seed, processes=processes, progress=progress)
     if sampler != SAMPLER_OF_FITS:

@@ -1,6 +1,7 @@
 """The search for what a model lacks."""
 
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 
 import numpy as np
 from jaxtyping import Float
@@ -19,6 +20,8 @@ from vrdp_prob.discovery.search import Search, search
 from vrdp_prob.discovery.trials import Trial, gain, gains, weights
 from vrdp_prob.discovery.tried import tried_causes
 from vrdp_prob.inference import default_model
+from vrdp_prob.inference.checkpoint import Checkpoint, model_facts, program_facts, tracks_facts
+from vrdp_prob.inference.journal import journal
 from vrdp_prob.inference.parallel import linear_algebra_in_one_thread, several_processes
 from vrdp_prob.inference.several_videos.fitting import fit_together
 from vrdp_prob.models.effects.effect import Effect
@@ -50,6 +53,7 @@ def discover(
     catalogue: Sequence[Effect] | None = None,
     processes: int | None = None,
     progress: ProgressDisplay | None = None,
+    checkpoint: Path | str | None = None,
 ) -> Finding:
     """Say whether a model explains some videos, and if not, which causes it lacks.
 
@@ -67,18 +71,24 @@ def discover(
         Number of processes that fit videos and try causes side by side; as many as there are cores where None.
     progress
         Told how far the work is.
+    checkpoint
+        Folder that keeps what is done, so that the same call after a kill goes on from there and says the same. It
+        holds pickles: one that somebody else made may hold any program.
 
     Raises
     ------
     InputError
-        If there are fewer than three videos, two have one name, or a video shows no motion.
+        If there are fewer than three videos, two have one name, a video shows no motion, or the checkpoint belongs to
+        another run.
     """
     check_video_count(videos)
     physics = default_model() if model is None else model
+    looked_for = _catalogue(physics, catalogue)
+    own = None if checkpoint is None else Checkpoint(checkpoint, _facts(videos, physics, looked_for, seed))
     compile_model(physics)
-    with several_processes(processes):
+    with several_processes(processes), journal(own):
         fit = fit_together(videos, model=physics, seed=seed, model_error=False, progress=progress)
-        found = search(fit, _catalogue(physics, catalogue), seed=seed, progress=progress)
+        found = search(fit, looked_for, seed=seed, progress=progress)
         checks = run_checks(found.base.fit, seed=seed)
         after = _checks_after(found, checks, seed)
         unlisted: Unlisted | None = None
@@ -119,6 +129,13 @@ def discover(
         left_out=models_of_the_others(found.base, found.best, found.overdispersion),
         tried=tuple(tried),
     )
+
+
+def _facts(videos: Sequence[Tracks], model: PhysicsModel, catalogue: Sequence[Effect], seed: int) -> dict[str, str]:
+    """What a search depends on, in short texts by name."""
+    seen = {f"video {tracks.video}": tracks_facts(tracks)["tracks"] for tracks in videos}
+    names = ", ".join(sorted(effect.name for effect in catalogue))
+    return {**seen, **model_facts(model), **program_facts(seed=seed, catalogue=names)}
 
 
 def _catalogue(model: PhysicsModel, catalogue: Sequence[Effect] | None) -> list[Effect]:

@@ -235,7 +235,7 @@ class Trial:
         left = self._with_stated_population(self.fit.model.without_effect(cause))
         choices = {name: one for name, one in self.choices.items() if name != cause.name}
         fit = self.fit.under(left, held=self._held_without(cause), rounds=FIRST_ROUNDS, model_error=False)
-        causes = tuple(one for one in self.causes if one is not cause)
+        causes = tuple(one for one in self.causes if one.name != cause.name)
         return replace(self, causes=causes, fit=with_own_population(fit), choices=choices)
 
     def _held_without(self, cause: Effect) -> list[dict[Owned, float | None]]:

@@ -70,7 +70,7 @@ def _code() -> str:
 
 
 FINGERPRINT = "fingerprint.json"
-KEPT = ("*.npz", "ensemble_*.h5")
+KEPT = ("*.npz", "ensemble_*.h5", "step_*.pickle")
 """Files of what a run has done."""
 
 
@@ -146,6 +146,20 @@ class Checkpoint:
             return (self.folder / name).read_text(encoding="utf-8")
         except (OSError, ValueError):
             return None
+
+    def content(self, name: str) -> bytes | None:
+        """Content of a file that was kept; None where there is none. Reading does not claim the folder."""
+        if self._owner() is None:
+            return None
+        try:
+            return (self.folder / name).read_bytes()
+        except OSError:
+            return None
+
+    def keep_content(self, name: str, content: bytes) -> None:
+        """Keep the content of a file, whole or not at all."""
+        with write_atomically(self.path(name)) as temporary:
+            temporary.write_bytes(content)
 
     def keep(self, name: str, arrays: Arrays) -> None:
         """Keep arrays under a name, whole or not at all."""

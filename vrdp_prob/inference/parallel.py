@@ -10,6 +10,7 @@ from typing import ParamSpec, TypeVar
 
 from threadpoolctl import ThreadpoolController
 
+from vrdp_prob.inference.journal import Step, in_a_step
 from vrdp_prob.progress import Advance
 from vrdp_prob.workers import local_workers
 
@@ -50,6 +51,8 @@ def in_processes(
 ) -> list[Result]:
     """Results of a task, each made in one of `several_processes`; in threads where there are none.
 
+    Each is a step of a run that keeps a journal.
+
     Parameters
     ----------
     task
@@ -59,6 +62,19 @@ def in_processes(
     advance
         Told of each result.
     """
+    with in_a_step() as journal:
+        if journal is None:
+            return _made(task, items, advance)
+        steps = [journal.step(task, item) for item in items]
+        found = [one.read() for one in steps]
+        missing = [step for step, one in zip(steps, found, strict=True) if one is None]
+        if advance is not None and len(missing) < len(steps):
+            advance(len(steps) - len(missing))
+        made = iter(_made(Step.make, missing, advance))
+        return [next(made) if one is None else one[0] for one in found]
+
+
+def _made(task: Callable[[Item], Result], items: Sequence[Item], advance: Advance | None) -> list[Result]:
     workers = _workers.get()
     if workers is None or len(items) < 2:
         return in_parallel(_told(task, advance), items)

@@ -104,7 +104,7 @@ class PhysicsModel:
 
     def without_effect(self, effect: Effect) -> "PhysicsModel":
         """The model without one of its causes, and without what was believed of it alone."""
-        effects = tuple(one for one in self.effects if one is not effect)
+        effects = tuple(one for one in self.effects if one.name != effect.name)
         stated = {*MATTER, *(parameter.name for one in effects for parameter in one.parameters)}
         beliefs = {name: belief for name, belief in self.beliefs.items() if name in stated}
         name = "+".join(part for part in self.name.split("+") if part != effect.name)

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from vrdp_prob.errors import InputError
+from vrdp_prob.inference.journal import kept
 from vrdp_prob.inference.map_fit import MapFit
 from vrdp_prob.inference.misfit import judge
 from vrdp_prob.inference.mode import Mode
@@ -88,6 +89,7 @@ class SharedFit:
         mean = float(self.joint.gaussian.mean[place])
         return math.exp(mean) if self.joint.numbers.logarithms[place] else mean
 
+    @kept
     def under(
         self,
         model: PhysicsModel,

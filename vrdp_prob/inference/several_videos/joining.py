@@ -7,6 +7,7 @@ from functools import partial
 import numpy as np
 from jaxtyping import Float
 
+from vrdp_prob.inference.journal import kept
 from vrdp_prob.inference.map_fit import MapFit
 from vrdp_prob.inference.misfit import judge
 from vrdp_prob.inference.parallel import in_processes
@@ -29,6 +30,7 @@ from vrdp_prob.inference.yaw_search import tells_yaws_by_contacts
 from vrdp_prob.models.physics import PhysicsModel
 
 
+@kept
 def joined(
     alone: Sequence[MapFit], model: PhysicsModel, shared: Sequence[str] | None, *, seed: int
 ) -> tuple[list[MapFit], JointFit]:

@@ -8,14 +8,14 @@ from _discovery_tasks import SIZES, Kind
 from _resumable import Result
 from scipy.stats import binomtest
 
-from tests.discovery.causes import CATALOGUE
+from tests.discovery.causes import CATALOGUE, VARIANTS
 from vrdp_prob.discovery.search import gain_needed
 
 SURE, LIKELY = 0.9, 0.5
 REACHED = 0.95
 """Share of an effect size from which it counts as reached: the search for a strength is no finer."""
 NULLS = (Kind.NULL, Kind.ROUGH_NULL)
-NEEDED = gain_needed(len(CATALOGUE))
+NEEDED = gain_needed(len(CATALOGUE) + len(VARIANTS))
 """Gain (nats) without which the search names nothing, when it looks for all causes."""
 STRONG_RECALL, WEAK_RECALL, FALSE_ALARMS, BOTH = 0.95, 0.60, 0.05, 0.80
 FEWEST_NULLS = 60

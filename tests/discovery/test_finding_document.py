@@ -53,6 +53,7 @@ def test_evidence_bounds_and_notes():
     assert found["evidence"][1]["p_value"] == 3.1e-38
     assert found["upper_bounds"][0] == {
         "name": "linear_drag",
+        "effect": "linear_drag",
         "parameter": "linear_drag",
         "bound": 0.0123,
         "unit": "1/s",
@@ -86,6 +87,7 @@ def test_the_unknown_is_described():
     assert found["description"]["explained"] == 0.61
     assert found["tried"][0] == {
         "name": "pair_force",
+        "effect": "pair_force",
         "gain": 4.2,
         "gain_se": 3.1,
         "gain_needed": 5.99,

@@ -85,7 +85,8 @@ def test_what_was_tried_is_told_with_what_it_would_have_needed(
     trials = [create_autospec(Trial, instance=True) for _ in range(3)]
     for trial, name in zip(trials, ("drag", "drag", "named before"), strict=True):
         trial.causes = (Mock(),)
-        trial.causes[0].name = name
+        trial.causes[0].name = trial.causes[0].cause_name.return_value = name
+        trial.causes[0].way.return_value = None
         trial.patches.return_value = patches
     found.refits, found.needed, found.overdispersion = Mock(made=lambda _trial: trials), 6.0, np.ones(3)
     monkeypatch.setattr(tried, "gain", lambda *_given: gain)

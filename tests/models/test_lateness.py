@@ -1,18 +1,26 @@
 """Frames that are late by chance: the density of what is seen, against the dense Gaussian that it stands for."""
 
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import ClassVar
+
 import numpy as np
 import pytest
 import torch
 from scipy.stats import multivariate_normal
 
+from vrdp_prob.errors import InputError
+from vrdp_prob.inference import infer
 from vrdp_prob.inference.noise_fit import best_noise
-from vrdp_prob.inference.predictive import replicated
+from vrdp_prob.inference.predictive import drawn_lateness, replicated, replicated_angles
+from vrdp_prob.inference.several_videos import fit_together
 from vrdp_prob.models.effects.effect import Effect
-from vrdp_prob.models.effects.irregular_frames import FRAME_JITTER, IrregularFrames
+from vrdp_prob.models.effects.irregular_frames import IrregularFrames
 from vrdp_prob.models.lateness import Lateness
 from vrdp_prob.models.likelihood import Likelihood
 from vrdp_prob.models.noise import NoiseFamily
-from vrdp_prob.models.parameters import ANGULAR_DRAG
+from vrdp_prob.models.parameters import ANGULAR_DRAG, FRAME_JITTER
 from vrdp_prob.models.physics import PhysicsModel
 from vrdp_prob.models.unknowns import ANGLE_NOISE, NOISE, Structure, unknowns
 from vrdp_prob.scene import Body, Shape, Tracks
@@ -157,11 +165,55 @@ def test_the_first_frames_alone_have_their_own_residuals(seen: Tracks) -> None:
 def test_measurements_drawn_anew_scatter_along_the_paths(seen: Tracks) -> None:
     likelihood = likelihood_of(seen, IrregularFrames())
     point = point_of(likelihood, **{NOISE: np.log(1e-6 / likelihood.observations.position_reference)})
-    drawn = replicated(likelihood, point.expand(2000, -1), np.random.default_rng(0))
+    points, generator = point.expand(2000, -1), np.random.default_rng(0)
+    late = drawn_lateness(likelihood, points, generator)
+    drawn = replicated(likelihood, points, generator, late)
     off = drawn - likelihood.predicted(point)[..., :2]
     assert np.std(off[:, 7, 0, 0]) == pytest.approx(JITTER * VELOCITY[0, 0], rel=0.1)
     assert np.allclose(off[:, 7, 0, 0] / VELOCITY[0, 0], off[:, 7, 1, 1] / VELOCITY[1, 1], atol=1e-4)
     assert np.abs(off[:, :, 2]).max() < 1e-4
+    turned = replicated_angles(likelihood, points, generator, late) - likelihood.predicted(point)[..., 2]
+    along = off[:, 7, 0, 0] / VELOCITY[0, 0] * SPIN[0]  # one frame is late for places and angles alike
+    assert np.corrcoef(turned[:, 7, 0], along)[0, 1] > 0.4
+    assert drawn_lateness(likelihood_of(seen), points[:, :-1], generator) is None
+
+
+def test_the_parameter_of_irregular_frames_is_the_one_that_is_found_with_the_noise() -> None:
+    class Shaky(Effect):
+        """Frames come irregularly, by a parameter of another name."""
+
+        name: ClassVar = "shaky"
+        parameters: ClassVar = (replace(FRAME_JITTER, name="camera_jitter"),)
+
+        def frame_jitter(self, parameters: Mapping[str, torch.Tensor]) -> torch.Tensor:
+            return parameters["camera_jitter"]
+
+    with pytest.raises(InputError, match=r"effect 'shaky': .*'frame_jitter' must be its one parameter"):
+        PhysicsModel.base().with_effect(Shaky())
+
+
+def test_a_posterior_holds_the_jitter_and_its_model_can_be_written(seen: Tracks, tmp_path: Path) -> None:
+    model = PhysicsModel.base().with_effect(IrregularFrames(), [seen])
+    posterior = infer(seen, model=model, sampler="laplace", draws=200, seed=0)
+    low, high = np.quantile(posterior.data["posterior"]["frame_jitter"], [0.005, 0.995])
+    assert low < JITTER < high < 3 * JITTER
+    model.write(tmp_path / "model.toml")
+    assert PhysicsModel.read(tmp_path / "model.toml").text == model.text
+
+
+@pytest.mark.parametrize("shared", [None, ["sliding_friction", "air_drag"]])
+def test_several_videos_have_one_jitter_or_each_its_own(seen: Tracks, shared: list[str] | None) -> None:
+    other = replace(tracks(JITTER * np.random.default_rng(3).standard_normal(COUNT), seed=3), video="two")
+    model = PhysicsModel.base().with_effect(IrregularFrames(), [seen, other])
+    fit = fit_together([seen, other], model=model, shared=shared, model_error=False)
+    found = fit.value("frame_jitter")
+    if shared is None:
+        assert found == pytest.approx(JITTER, rel=0.4)
+    else:
+        assert found is None
+        for index, video in enumerate(fit.joint.videos):
+            quantities = video.likelihood.coordinates.quantities(torch.from_numpy(fit.joint.point(index)[None]))
+            assert float(quantities["frame_jitter"][0, 0]) == pytest.approx(JITTER, rel=0.5)
 
 
 def test_a_frame_in_which_nothing_moves_tells_nothing() -> None:

@@ -18,7 +18,11 @@ from vrdp_prob.models.physics import PhysicsModel
 from vrdp_prob.models.unknowns import Structure, unknowns
 from vrdp_prob.scene import Body, Shape, Tracks
 
-LOOKED_FOR = [effect() for effect in known_effects().values() if effect.overrides("expected")]
+LOOKED_FOR = [
+    effect()
+    for effect in known_effects().values()
+    if effect.overrides("expected") and not effect.overrides("frame_jitter")  # which goes with the time between frames
+]
 
 
 def seen(middle: tuple[float, float] = (0.0, 0.0), *, begin: float = 0.0, half_width: float = 1.5) -> Tracks:

@@ -197,14 +197,15 @@ def _causes(found: Search, doubted: Mapping[Effect, Sequence[Doubt]], seed: int)
         told = {2 + k: rival for k, rival in enumerate(best_of.values()) if shares[2 + k] >= LEAST_SHARE}
         why = {0: reasons} | {k: tuple(doubts(rival, rival.causes[-1])) for k, rival in told.items()}
         believed = with_doubts(shares, why)
-        same = [k for k, rival in told.items() if rival.causes[-1].cause_name() == cause.cause_name()]
-        probability = float(believed[[0, *same]].sum())
-        causes.append(_cause(found.best, cause, lesser, found.overdispersion, probability, named=not reasons))
-        causes += [
-            _cause(rival, rival.causes[-1], lesser, found.overdispersion, float(believed[k]), named=False)
-            for k, rival in told.items()
-            if k not in same
-        ]
+        ways: dict[str, list[int]] = {cause.cause_name(): [0]}
+        for k in sorted(told, key=lambda k: -believed[k]):
+            ways.setdefault(told[k].causes[-1].cause_name(), []).append(k)
+        for first, *others in ways.values():
+            trial = told.get(first, found.best)
+            effect = trial.causes[-1] if first else cause
+            probability = float(believed[[first, *others]].sum())
+            named = not first and not reasons
+            causes.append(_cause(trial, effect, lesser, found.overdispersion, probability, named=named))
     return causes
 
 
@@ -233,7 +234,7 @@ def _cause(
         parameters=values,
         gain=_gain(lesser, trial, overdispersion),
         named=named,
-        way=effect.name if effect.cause else None,
+        way=effect.way(),
     )
 
 
@@ -257,11 +258,14 @@ def _told(found: Search, causes: Sequence[FoundCause]) -> list[Effect]:
 
 
 def _bounds(found: Search) -> list[UpperBound]:
-    named = set(found.best.names)
+    named = {cause.cause_name() for cause in found.best.causes}
     scores = {score.effect.name: score for score in found.left.beside_chance}
     left = sorted(found.refits.catalogue, key=lambda effect: effect.name not in scores)
     return [
-        bound for effect in left if effect.name not in named for bound in upper_bounds(effect, scores.get(effect.name))
+        bound
+        for effect in left
+        if effect.cause_name() not in named
+        for bound in upper_bounds(effect, scores.get(effect.name))
     ]
 
 

@@ -8,7 +8,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from vrdp_prob.discovery.finding import Check, ComparedAnswer, Finding, FoundCause, Gain
+from vrdp_prob.discovery.finding import Check, ComparedAnswer, Finding, FoundCause, Gain, TriedCause, UpperBound
 from vrdp_prob.discovery.page import render
 from vrdp_prob.discovery.summary import verdict_sentence
 from vrdp_prob.files import write_atomically
@@ -43,10 +43,10 @@ def to_document(finding: Finding, *, model: Path | None = None) -> dict[str, Any
         "verdict": str(finding.verdict),
         "sentence": verdict_sentence(finding),
         "causes": [_cause(cause) for cause in finding.causes],
-        "tried": [asdict(one) for one in finding.tried],
+        "tried": [_of_effect(one) for one in finding.tried],
         "evidence": _evidence(finding.checks),
         "evidence_after": _evidence(finding.checks_after),
-        "upper_bounds": [asdict(bound) for bound in finding.upper_bounds],
+        "upper_bounds": [_of_effect(bound) for bound in finding.upper_bounds],
         "answers": None if finding.answers is None else [_answer(answer) for answer in finding.answers],
         "description": None if finding.description is None else asdict(finding.description),
         "model": None if model is None else str(model.absolute()),
@@ -100,6 +100,12 @@ def _cause(cause: FoundCause) -> dict[str, Any]:
         "parameters": {name: asdict(estimate) for name, estimate in cause.parameters.items()},
         "held_out_gain": _gain(cause.gain),
     }
+
+
+def _of_effect(told: UpperBound | TriedCause) -> dict[str, Any]:
+    """What is told of a cause, with the effect as which it acts."""
+    facts = asdict(told)
+    return {"name": facts.pop("name"), "effect": facts.pop("way") or told.name, **facts}
 
 
 def _gain(gain: Gain) -> dict[str, Any]:

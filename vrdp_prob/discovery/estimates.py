@@ -173,7 +173,16 @@ def upper_bounds(effect: Effect, score: CauseScore | None) -> list[UpperBound]:
     units = {parameter.name: parameter.unit for parameter in effect.parameters}
     largest = {name: (score.largest if score else {}).get(name, Largest(None, 1, 0)) for name in names}
     return [
-        UpperBound(effect.cause_name(), name, one.bound, units[name], _nothing(effect, name), one.places, one.told)
+        UpperBound(
+            effect.cause_name(),
+            name,
+            one.bound,
+            units[name],
+            _nothing(effect, name),
+            places=one.places,
+            told=one.told,
+            way=effect.way(),
+        )
         for name, one in largest.items()
     ]
 

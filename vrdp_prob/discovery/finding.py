@@ -139,6 +139,8 @@ class TriedCause:
         Against the model without it, and what that would have to be.
     why
         What speaks against it, as a clause for a reader.
+    way
+        As for a cause that was found.
     """
 
     name: str
@@ -148,6 +150,7 @@ class TriedCause:
     probability: float
     probability_needed: float
     why: str
+    way: str | None = None
 
 
 @dataclass(frozen=True)
@@ -191,6 +194,8 @@ class UpperBound:
     places, told
         Number of places (points of a search, bodies or videos) at which it was looked for, and of those that tell
         anything: nobody was at the others.
+    way
+        Name of the effect that has the parameter, where that is a further way in which the cause acts.
     """
 
     name: str
@@ -200,6 +205,7 @@ class UpperBound:
     vanishes_at: float | str = 0.0
     places: int = 1
     told: int = 1
+    way: str | None = None
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from vrdp_prob.discovery.finding import FoundCause, Gain
-from vrdp_prob.discovery.wording import length_unit, number, signed, title
+from vrdp_prob.discovery.wording import cause_title, length_unit, number, signed
 from vrdp_prob.report.axes import Axis, linear_axis, size_axis
 
 STRETCHES = {"rmse": "all frames", "rmse_one_second": "1 s ahead", "rmse_end": "last frames"}
@@ -87,7 +87,7 @@ def error_figure(causes: Sequence[FoundCause]) -> ErrorFigure:
         unit,
         axis.place(factor * noise) if _is_size(noise) and noise > 0 else None,
         f"{number(factor * noise)} {unit}",
-        [(title(cause.name), _changes(cause.gain, axis, factor)) for cause in causes],
+        [(cause_title(cause), _changes(cause.gain, axis, factor)) for cause in causes],
     )
 
 

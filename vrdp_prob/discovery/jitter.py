@@ -18,9 +18,9 @@ from vrdp_prob.discovery.residual_model import ResidualModel
 from vrdp_prob.inference.several_videos.fitting import SharedFit
 
 SEEN = 1e-3
-"""Share of what a late frame does that must be left when the fit has absorbed what it can, for the frame to tell."""
+"""Share of what a late frame does that must be left when the fit has absorbed what it can, for it to tell anything."""
 RATIOS = np.geomspace(1e-4, 1e4, 33)
-"""Information of a typical frame on its lateness, in units of that lateness, at which the density is looked at."""
+"""Variance of the lateness, in units of what the data leave open of it, at which the density is looked at."""
 ONE_SIDED = float(chi2.isf(0.10, 1))
 """Twice the loss (nats) in log density at the end of the lower 95 %."""
 
@@ -47,8 +47,8 @@ class Jitter:
 
 def jitter(model: ResidualModel) -> Jitter | None:
     """The jitter of all frames of several videos; None where no frame tells its lateness."""
-    frames = [_frames(model, index) for index in range(len(model.videos))]
-    gradient, information = (np.concatenate([one[k] for one in frames]) for k in range(2))
+    parts = [_independent(model, index) for index in range(len(model.videos))]
+    gradient, information = (np.concatenate([one[k] for one in parts]) for k in range(2))
     if not len(gradient):
         return None
     count = float(model.linear.degrees)
@@ -82,13 +82,18 @@ def jitter(model: ResidualModel) -> Jitter | None:
     )
 
 
-def _frames(model: ResidualModel, index: int) -> tuple[Float[np.ndarray, "frame"], Float[np.ndarray, "frame"]]:
-    """Of each frame of a video that tells its lateness (s): the slope of the log density there, and the information."""
+def _independent(model: ResidualModel, index: int) -> tuple[Float[np.ndarray, "part"], Float[np.ndarray, "part"]]:
+    """Of a video: slopes of the log density, and the information, by independent combinations of its frames' lateness.
+
+    What the fit absorbs, of all frames together, ties them: their slopes are not independent one by one.
+    """
     rows = model.videos[index].late_frames
-    scores, _ = model.linear.scores_in(index, rows[:, :, None])
-    information = np.array([float(score.information[0, 0]) for score in scores])
-    told = (information > SEEN * (rows**2).sum(axis=0)) & (information > 0)
-    return np.array([float(score.gradient[0]) for score in scores])[told], information[told]
+    _, blocks = model.linear.scores_in(index, rows[:, :, None])
+    reduced = blocks[:, :, 0]
+    values, vectors = np.linalg.eigh(reduced.T @ reduced)
+    told = values > SEEN * float((rows**2).sum(axis=0).max(initial=0.0))
+    gradient: np.ndarray = -(reduced.T @ model.left[index]) @ vectors[:, told]
+    return gradient, values[told]
 
 
 def alike_in_neighbours(fit: SharedFit) -> float:
@@ -105,7 +110,7 @@ def alike_in_neighbours(fit: SharedFit) -> float:
         lateness = likelihood.lateness(point)
         if lateness is None:
             continue
-        late, told = likelihood.late(point)[0], lateness.variance[0].numpy() > 1.0
+        late, told = likelihood.late(point)[0], lateness.variance[0].numpy() > 0.0
         product = (late[1:] * late[:-1])[told[1:] & told[:-1]]
         products += float(product.sum())
         squares += float((product**2).sum())

@@ -89,7 +89,7 @@ def without_mimics(
         advance(1)
         if alone is not None and _merit(alone, best, found) > 0:
             gained = gain(alone, best, found.overdispersion)
-            return found.without(best.causes), Unlisted(_of(alone, laws), best.names, *gained)
+            return found.without(best.causes), Unlisted(_of(alone, laws), _names(best.causes), *gained)
         others = [lesser for lesser in found.lesser if lesser is not found.base]
         refitted = in_processes(with_laws, others, advance=advance)
     instead = {found.base: alone, **dict(zip(others, refitted, strict=True))}
@@ -98,8 +98,7 @@ def without_mimics(
         for cause, lesser in zip(best.causes, found.lesser, strict=True)
         if _believed(found, beside, lesser, instead[lesser], seed) < BELIEVED
     ]
-    names = tuple(one.name for one in mimics)
-    explained = Unlisted(_of(beside, laws), names, *gain(beside, best, found.overdispersion))
+    explained = Unlisted(_of(beside, laws), _names(mimics), *gain(beside, best, found.overdispersion))
     return found.without(mimics), explained
 
 
@@ -111,6 +110,10 @@ def _with_laws(trial: Trial, laws: Sequence[Effect], seed: int) -> Trial | None:
         promising = [one for one in scores if one.size / 2 > EACH_PARAMETER * len(law.parameters) - UNLISTED]
         found = (found.with_cause(promising[0]) if promising else None) or found
     return None if found is trial else found.continued()
+
+
+def _names(causes: Sequence[Effect]) -> tuple[str, ...]:
+    return tuple(cause.cause_name() for cause in causes)
 
 
 def _of(trial: Trial, laws: Sequence[Effect]) -> tuple[Effect, ...]:

@@ -11,12 +11,13 @@ from markupsafe import Markup
 
 from vrdp_prob.datasets.folder import some
 from vrdp_prob.discovery.changed_answers import rows
-from vrdp_prob.discovery.finding import Check, Description, Finding, FoundCause, Verdict
+from vrdp_prob.discovery.finding import Check, Description, Finding, FoundCause, UpperBound, Verdict
 from vrdp_prob.discovery.gain_figure import error_figure, video_figure
 from vrdp_prob.discovery.summary import POSSIBLE, possible, summary, verdict_sentence
 from vrdp_prob.discovery.wording import (
     UNDEFINED,
     bound_words,
+    cause_title,
     chance,
     difference_words,
     effect_of,
@@ -70,7 +71,7 @@ def _cause(cause: FoundCause, finding: Finding) -> dict[str, Any]:
     effect = effect_of(cause.effect, finding.extended)
     said = chance(cause.probability)
     return {
-        "title": title(cause.name),
+        "title": cause_title(cause),
         "sentence": typeset(cause.sentence),
         "chance": said,
         "bar": {
@@ -79,7 +80,7 @@ def _cause(cause: FoundCause, finding: Finding) -> dict[str, Any]:
             "error_low": 0,
             "error_high": 0,
             "chosen": cause.named,
-            "label": f"{title(cause.name)}: {said}",
+            "label": f"{cause_title(cause)}: {said}",
         },
         "parameters": [
             {
@@ -115,7 +116,7 @@ def _tried(finding: Finding) -> dict[str, Any] | None:
         "needed": number(first.gain_needed),
         "probability_needed": _percent(first.probability_needed),
         "rows": [
-            {"title": title(one.name), "gain": tried_words(one), "chance": chance(one.probability), "why": one.why}
+            {"title": cause_title(one), "gain": tried_words(one), "chance": chance(one.probability), "why": one.why}
             for one in finding.tried
         ],
     }
@@ -125,7 +126,7 @@ def _coverage(causes: Sequence[FoundCause]) -> list[dict[str, str]]:
     """Calibration of the predictions, without and with each cause."""
     return [
         {
-            "words": f"{word} {title(cause.name)}",
+            "words": f"{word} {cause_title(cause)}",
             "half": _percent(held.coverage_50),
             "most": _percent(held.coverage_90),
         }
@@ -178,21 +179,25 @@ def _check(check: Check, after: Check | None) -> dict[str, Any]:
 
 def _bounds(finding: Finding) -> list[dict[str, Any]]:
     """Upper bounds by cause, in the order given; causes without any bound last."""
-    groups = []
-    for name in dict.fromkeys(bound.name for bound in finding.upper_bounds):
-        effect = effect_of(name, finding.extended)
-        rows = [
-            {
-                "name": bound.parameter,
-                "words": sentence(parameter_words(bound.parameter, effect)),
-                "bound": bound_words(bound),
-                "is_known": bound.bound is not None,
-            }
-            for bound in finding.upper_bounds
-            if bound.name == name
-        ]
-        groups.append({"title": title(name), "rows": rows})
-    return sorted(groups, key=lambda group: not any(row["is_known"] for row in group["rows"]))
+    groups: dict[tuple[str, str | None], list[UpperBound]] = {}
+    for bound in finding.upper_bounds:
+        groups.setdefault((bound.name, bound.way), []).append(bound)
+    told = [
+        {
+            "title": cause_title(bounds[0]),
+            "rows": [
+                {
+                    "name": bound.parameter,
+                    "words": sentence(parameter_words(bound.parameter, effect_of(way or name, finding.extended))),
+                    "bound": bound_words(bound),
+                    "is_known": bound.bound is not None,
+                }
+                for bound in bounds
+            ],
+        }
+        for (name, way), bounds in groups.items()
+    ]
+    return sorted(told, key=lambda group: not any(row["is_known"] for row in group["rows"]))
 
 
 def _description(description: Description) -> dict[str, Any]:
@@ -205,7 +210,7 @@ def _description(description: Description) -> dict[str, Any]:
 
 
 def _model(finding: Finding) -> dict[str, Any]:
-    added = [title(cause.name) for cause in finding.named]
+    added = [cause_title(cause) for cause in finding.named]
     if added:
         words = f"The model that was given, with {listed(added)} added."
     else:
@@ -217,7 +222,7 @@ def _model(finding: Finding) -> dict[str, Any]:
             " what that video says twice."
         )
     kept = {effect.name for effect in finding.extended.effects}
-    if past := [title(cause.name) for cause in finding.named if cause.effect not in kept]:
+    if past := [cause_title(cause) for cause in finding.named if cause.effect not in kept]:
         words += f" {listed(past)} is no part of it, since that happened once in a video."
     return {
         "model": finding.model.name,

@@ -199,7 +199,8 @@ class VideoResiduals:
     def late_frames(self) -> Float[np.ndarray, "data frame"]:
         """What 1 s does to the data's residuals by which each single frame is late."""
         motion = self.motion
-        moves = np.where(motion.moving[..., None], motion.velocity, 0.0)
+        rates = np.concatenate([motion.velocity, motion.spin[..., None]], axis=-1)
+        moves = np.where(motion.moving[..., None], rates, 0.0)
         return self.rows(moves[..., None] * np.eye(len(motion.times))[:, None, None, :])
 
     def drawn(self, count: int, generator: np.random.Generator) -> Float[np.ndarray, "residual replica"]:

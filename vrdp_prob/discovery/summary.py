@@ -7,6 +7,7 @@ from vrdp_prob.discovery.changed_answers import answers_sentence
 from vrdp_prob.discovery.finding import Check, Finding, FoundCause, Gain, TriedCause, UpperBound, Verdict
 from vrdp_prob.discovery.wording import (
     bound_words,
+    cause_title,
     chance,
     difference_words,
     estimate_words,
@@ -68,7 +69,7 @@ def lines(finding: Finding) -> list[str]:
     """The finding as lines of text for a terminal."""
     told = [verdict_sentence(finding)]
     for cause in finding.named:
-        told.append(f"  {title(cause.name)}: probability {chance(cause.probability)}; {_gain_line(cause.gain)}")
+        told.append(f"  {cause_title(cause)}: probability {chance(cause.probability)}; {_gain_line(cause.gain)}")
         for name, estimate in cause.parameters.items():
             mean, interval = estimate_words(estimate)
             told.append(f"      {title(name)} {mean} (95 %: {interval})")
@@ -110,7 +111,7 @@ def _gains(causes: Sequence[FoundCause]) -> str:
         change = (
             f"leaves {what} at {after} {unit}" if before == after else f"takes {what} from {before} to {after} {unit}"
         )
-        parts.append(f"{title(cause.name)} {change}")
+        parts.append(f"{cause_title(cause)} {change}")
     *_, noise, unit = errors_words(causes[-1].gain)
     return f"In videos that were left out, {listed(parts)}; the measurement noise is {noise} {unit}."
 
@@ -121,7 +122,7 @@ def _carried(causes: Sequence[FoundCause]) -> list[str]:
     for cause in causes:
         video, most = max(cause.gain.by_video.items(), key=lambda item: item[1])
         if most > CARRIED * cause.gain.elpd_difference:
-            told.append(f"the gain of {title(cause.name)} comes from {video} alone and may be something of that video")
+            told.append(f"the gain of {cause_title(cause)} comes from {video} alone and may be something of that video")
     return told
 
 
@@ -131,12 +132,12 @@ def _gain_line(gain: Gain) -> str:
 
 
 def _others(others: Sequence[FoundCause], *, beside: Sequence[FoundCause]) -> str:
-    told = listed(f"{title(cause.name)} ({chance(cause.probability)})" for cause in others)
+    told = listed(f"{cause_title(cause)} ({chance(cause.probability)})" for cause in others)
     return f"{'Also possible' if beside else 'Not excluded'}: {told}."
 
 
 def _tried(tried: Sequence[TriedCause]) -> str:
-    words = listed(f"{title(one.name)} ({tried_words(one)})" for one in tried)
+    words = listed(f"{cause_title(one)} ({tried_words(one)})" for one in tried)
     needed = number(tried[0].gain_needed)
     return f"Tried and not established: {words}; nats in left-out videos, of which {needed} are needed."
 

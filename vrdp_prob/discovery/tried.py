@@ -42,4 +42,4 @@ def _tried(found: Search, trial: Trial, seed: int) -> TriedCause:
         why = "too few videos speak for it"
     else:
         why = "what it leaves unexplained outweighs its gain"
-    return TriedCause(cause.cause_name(), difference, error, found.needed, probability, ESTABLISHED, why)
+    return TriedCause(cause.cause_name(), difference, error, found.needed, probability, ESTABLISHED, why, cause.way())

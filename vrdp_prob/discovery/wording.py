@@ -4,7 +4,7 @@ import math
 import re
 from collections.abc import Iterable
 
-from vrdp_prob.discovery.finding import Estimate, Gain, TriedCause, UpperBound
+from vrdp_prob.discovery.finding import Estimate, FoundCause, Gain, TriedCause, UpperBound
 from vrdp_prob.models.effects.effect import Effect
 from vrdp_prob.models.model_file import known_effects
 from vrdp_prob.models.physics import PhysicsModel
@@ -142,6 +142,11 @@ def length_unit(lengths: Iterable[float]) -> tuple[float, str]:
 def title(name: str) -> str:
     """Name of a cause or parameter as words."""
     return name.replace("_", " ")
+
+
+def cause_title(cause: FoundCause | TriedCause | UpperBound) -> str:
+    """Name of a cause as words, with the way in which it acts where that is a further one."""
+    return title(cause.name) if cause.way is None else f"{title(cause.name)} by {title(cause.way)}"
 
 
 def effect_of(name: str, model: PhysicsModel) -> Effect | type[Effect] | None:

@@ -6,8 +6,8 @@ from jaxtyping import Bool, Float, Int
 from scipy.optimize import minimize
 from torch import Tensor
 
-from vrdp_prob.models.effects.irregular_frames import FRAME_JITTER
 from vrdp_prob.models.likelihood import Likelihood
+from vrdp_prob.models.parameters import FRAME_JITTER
 from vrdp_prob.models.unknowns import ANGLE_NOISE, DEGREES_OF_FREEDOM, NOISE
 
 NOISE_FIELDS = (NOISE, ANGLE_NOISE, DEGREES_OF_FREEDOM, FRAME_JITTER.name)

@@ -13,8 +13,21 @@ SMALLEST = 1e-10
 """Share of the variance that keeps covariances positive."""
 
 
-def replicated(
+def drawn_lateness(
     likelihood: Likelihood, points: Float[Tensor, "point dimension"], generator: np.random.Generator
+) -> Float[np.ndarray, "point time"] | None:
+    """Times in s by which the frames of some worlds are late by chance; None where the model has no such frames."""
+    lateness = likelihood.lateness(points)
+    if lateness is None:
+        return None
+    return lateness.jitter.numpy()[:, None] * generator.standard_normal((len(points), len(likelihood.tracks.times)))
+
+
+def replicated(
+    likelihood: Likelihood,
+    points: Float[Tensor, "point dimension"],
+    generator: np.random.Generator,
+    late: Float[np.ndarray, "point time"] | None = None,
 ) -> Float[np.ndarray, "point time body 2"]:
     """Positions (m) that would be measured in the worlds of some points.
 
@@ -27,13 +40,15 @@ def replicated(
     generator
         Draws the noise and the error of the model. Where a position was seen, noise has that position's covariance, in
         gaps the one in the middle.
+    late
+        Time in s by which each frame is late, from `drawn_lateness`.
 
     Returns
     -------
     A position in every frame from the release on, NaN before.
     """
     observations, error = likelihood.observations, likelihood.model_error
-    predicted = likelihood.predicted(points, _late(likelihood, points, generator))[..., :2]
+    predicted = likelihood.predicted(points, late)[..., :2]
     spread = np.broadcast_to(observations.position_reference * np.eye(2), (*predicted.shape[1:3], 2, 2)).copy()
     spread[observations.frame, observations.body] = np.linalg.inv(observations.whitening)
     if error is not None:
@@ -49,13 +64,16 @@ def replicated(
 
 
 def replicated_angles(
-    likelihood: Likelihood, points: Float[Tensor, "point dimension"], generator: np.random.Generator
+    likelihood: Likelihood,
+    points: Float[Tensor, "point dimension"],
+    generator: np.random.Generator,
+    late: Float[np.ndarray, "point time"] | None = None,
 ) -> Float[np.ndarray, "point time body"]:
     """Angles (rad) that would be measured in the worlds of some points.
 
     Parameters
     ----------
-    likelihood, points, generator
+    likelihood, points, generator, late
         As for positions.
 
     Returns
@@ -63,7 +81,7 @@ def replicated_angles(
     An angle in every frame from the release on, NaN before and for bodies of which no angle was measured.
     """
     observations, error = likelihood.observations, likelihood.model_error
-    predicted = likelihood.predicted(points, _late(likelihood, points, generator))[..., 2]
+    predicted = likelihood.predicted(points, late)[..., 2]
     spread = np.full(predicted.shape[1:], observations.angle_reference)
     if error is not None:
         spread[observations.angle_frame, observations.angle_body] *= np.sqrt(error.angle_variance)
@@ -75,16 +93,6 @@ def replicated_angles(
     scale = likelihood.coordinates.quantities(points)[ANGLE_NOISE].numpy()
     measured = np.isin(np.arange(predicted.shape[2]), observations.angle_bodies)
     return np.where(measured, _released(likelihood, (predicted + scale[:, None] * errors)[..., None])[..., 0], np.nan)
-
-
-def _late(
-    likelihood: Likelihood, points: Float[Tensor, "point dimension"], generator: np.random.Generator
-) -> Float[np.ndarray, "point time"] | None:
-    """Time in s by which each frame is late by chance; None where the model has no such frames."""
-    lateness = likelihood.lateness(points)
-    if lateness is None:
-        return None
-    return lateness.jitter.numpy()[:, None] * generator.standard_normal((len(points), len(likelihood.tracks.times)))
 
 
 def _tails(

@@ -14,16 +14,16 @@ from arviz_stats.base.array import array_stats
 from jaxtyping import Float
 
 from vrdp_prob.errors import InputError
+from vrdp_prob.inference.noise_fit import NOISE_FIELDS
 from vrdp_prob.inference.posterior import Posterior
 from vrdp_prob.models.parameters import MASS, RESTITUTION, ROLLING_RESISTANCE, SLIDING_FRICTION
-from vrdp_prob.models.unknowns import ANGLE_NOISE, DEGREES_OF_FREEDOM, NOISE
 
 THRESHOLD = 0.05
 """Sensitivity from which on a change of the prior (or the likelihood) counts; about a shift of the mean by 0.3 standard
 deviations where the logarithm of the power changes by 1."""
 POWERS = (0.99, 1.01)
 SHUFFLES = 20
-OTHERS = frozenset({"position", "velocity", "angle", "spin", "angle_zero", NOISE, ANGLE_NOISE, DEGREES_OF_FREEDOM})
+OTHERS = frozenset({"position", "velocity", "angle", "spin", "angle_zero", *NOISE_FIELDS})
 """Quantities whose priors say nothing of masses, restitutions and friction."""
 FRICTIONS = (SLIDING_FRICTION, ROLLING_RESISTANCE)
 

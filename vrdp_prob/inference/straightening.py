@@ -15,6 +15,7 @@ from jaxtyping import Float, Int
 from torch import Tensor
 
 from vrdp_prob.inference.mode import Mode
+from vrdp_prob.inference.noise_fit import NOISE_FIELDS
 from vrdp_prob.inference.samples import Gaussian
 from vrdp_prob.models.coordinates import Coordinates
 from vrdp_prob.models.effects.body_friction import FRICTION_RATIO
@@ -26,10 +27,9 @@ from vrdp_prob.models.parameters import (
     WALL_RESTITUTION,
     Transform,
 )
-from vrdp_prob.models.unknowns import ANGLE_NOISE, DEGREES_OF_FREEDOM, NOISE
 from vrdp_prob.scene import Shape, Tracks
 
-NO_RATES = frozenset({MASS.name, RESTITUTION.name, WALL_RESTITUTION.name, NOISE, ANGLE_NOISE, DEGREES_OF_FREEDOM})
+NO_RATES = frozenset({MASS.name, RESTITUTION.name, WALL_RESTITUTION.name, *NOISE_FIELDS})
 """Quantities with a logarithm in the vector that are no rates of slowing down."""
 LARGEST = 4.0
 """Change of the logarithm of a rate beyond which the ridge is followed no further."""

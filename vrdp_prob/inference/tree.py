@@ -10,7 +10,7 @@ from jaxtyping import Float, Int
 
 from vrdp_prob.inference.draws import flat_draws, named_draws, named_fields
 from vrdp_prob.inference.map_fit import MapFit
-from vrdp_prob.inference.predictive import replicated, replicated_angles
+from vrdp_prob.inference.predictive import drawn_lateness, replicated, replicated_angles
 from vrdp_prob.inference.samples import Samples
 from vrdp_prob.models.likelihood import Likelihood
 
@@ -115,11 +115,12 @@ def _predictive(
     chosen = np.linspace(0, draws - 1, per_chain).round().astype(int)
     worlds = flat_draws(points[:, chosen])
     axes, sizes = (*SAMPLE, "time", "body"), (len(points), per_chain, *likelihood.tracks.seen.shape)
-    positions = replicated(likelihood, worlds, generator).reshape(*sizes, 2)
+    late = drawn_lateness(likelihood, worlds, generator)
+    positions = replicated(likelihood, worlds, generator, late).reshape(*sizes, 2)
     variables: dict[str, Any] = {"position": ((*axes, "axis"), _rounded(positions), {"units": "m"})}
     if len(likelihood.observations.angle):
         # a stream of its own: what is drawn after the positions is the same with and without angles
-        angles = replicated_angles(likelihood, worlds, generator.spawn(1)[0]).reshape(sizes)
+        angles = replicated_angles(likelihood, worlds, generator.spawn(1)[0], late).reshape(sizes)
         variables["angle"] = (axes, _rounded(angles), {"units": "rad"})
     return xr.Dataset(
         variables,

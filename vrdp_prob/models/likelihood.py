@@ -132,7 +132,8 @@ class Likelihood:
     ) -> Float[np.ndarray, "point residual"]:
         """Residuals of unit variance: positions, angles, then the prior; a row of NaN where a world fails.
 
-        Half their sum of squares is the negative log posterior, but for the terms of the noise scales.
+        Half their sum of squares is the negative log posterior, but for the terms of the noise scales (which hang on
+        the velocities, too, where frames are late by chance).
         """
         with torch.no_grad():
             residuals = self.differentiable_residuals(torch.from_numpy(np.ascontiguousarray(points)), frame_count)

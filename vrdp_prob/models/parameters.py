@@ -207,3 +207,11 @@ AIR_DRAG = _log_parameter("air_drag", "1/m", "deceleration by the air per square
 ANGULAR_DRAG = _log_parameter(
     "angular_drag", "rad/s^2", "rate at which a body's spin about the vertical decays", median=1.0, log_sd=1.0
 )
+FRAME_JITTER = _log_parameter(
+    "frame_jitter",
+    "s",
+    "standard deviation of the true times of frames about their stamps",
+    median=0.004,
+    log_sd=1.0,
+)
+"""What an effect with the hook of that name has: a scale of the noise, on which worlds do not depend."""

@@ -14,7 +14,7 @@ from vrdp_prob.models.effects.angular_drag import AngularDrag
 from vrdp_prob.models.effects.dry_friction import DryFriction
 from vrdp_prob.models.effects.effect import Effect
 from vrdp_prob.models.effects.normal_impact import NormalImpact
-from vrdp_prob.models.parameters import MATTER, VIDEO_START, Parameter
+from vrdp_prob.models.parameters import FRAME_JITTER, MATTER, VIDEO_START, Parameter
 from vrdp_prob.models.simulator.kernel import Kernel, load
 from vrdp_prob.models.simulator.laws import (
     CONSTANTS,
@@ -72,6 +72,11 @@ class PhysicsModel:
         if not effect.does_something():
             raise InputError(f"{where}: it has none of the hooks of Effect; check how its methods are spelt.")
         own = {parameter.name for parameter in effect.parameters}
+        if effect.overrides("frame_jitter") and own != {FRAME_JITTER.name}:
+            raise InputError(
+                f"{where}: it scatters the times of frames; '{FRAME_JITTER.name}' must be its one parameter, which is "
+                "found with the noise."
+            )
         if strange := sorted(set(effect.vanishes_at) - own):
             raise InputError(f"{where}: 'vanishes_at' names '{strange[0]}', which is none of its parameters.")
         if taken := sorted(own & {*STATE, *CONSTANTS, *MATTER, VIDEO_START}):

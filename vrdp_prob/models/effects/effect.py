@@ -139,6 +139,11 @@ class Effect:
         return cls.cause or cls.name
 
     @classmethod
+    def way(cls) -> str | None:
+        """Its name where it is a further way of a cause."""
+        return cls.name if cls.cause else None
+
+    @classmethod
     def overrides(cls, hook: str) -> bool:
         """Whether the effect has its own version of a hook."""
         return getattr(cls, hook) is not getattr(Effect, hook)
@@ -159,8 +164,9 @@ class Effect:
     def expected(self, videos: Sequence[Tracks]) -> Mapping[str, Parameter]:
         """Parameters by name, with what is believed of them where it is known where and when bodies were seen.
 
-        For an effect that has a place or a time: what its parameters state holds for a scene around the origin that
-        begins at 0 s. A search takes these instead, so that it does not matter where the origin lies.
+        For an effect that has a place or a time, or goes with the time between frames. What its parameters state holds
+        for a scene around the origin that begins at 0 s; a search takes these instead, so that it does not matter where
+        the origin lies.
         """
         return {}
 
@@ -258,7 +264,10 @@ class Effect:
         return times
 
     def frame_jitter(self, parameters: Mapping[str, Float[Tensor, "..."]]) -> Float[Tensor, "world"] | None:
-        """Standard deviation in s of the true times of frames about `measured_times`, each by itself; None without."""
+        """Standard deviation in s of the true times of frames about `measured_times`, each by itself; None without.
+
+        The effect has `vrdp_prob.models.parameters.FRAME_JITTER` and no other parameter.
+        """
         return None
 
     def measured_positions(

@@ -11,19 +11,11 @@ from torch import Tensor
 
 from vrdp_prob.models.effects.clock_error import ClockError
 from vrdp_prob.models.effects.effect import Effect
-from vrdp_prob.models.parameters import Parameter, Prior, Transform
+from vrdp_prob.models.parameters import FRAME_JITTER, Parameter
 from vrdp_prob.scene import Tracks
 
 EXPECTED_SHARE = 0.1
 """Jitter that is expected, as a share of the time between two frames."""
-FRAME_JITTER = Parameter(
-    "frame_jitter",
-    "s",
-    "standard deviation of the true times of frames about their stamps",
-    Transform.LOG,
-    Prior(math.log(0.004), 1.0),
-    default=0.004,
-)
 
 
 class IrregularFrames(Effect):
@@ -41,7 +33,7 @@ class IrregularFrames(Effect):
     law: ClassVar = "true time = stamp + frame_jitter z, with z normal and another one in every frame"
     source: ClassVar = "definition"
     parameters: ClassVar = (FRAME_JITTER,)
-    vanishes_at: ClassVar = {"frame_jitter": 0.0}
+    vanishes_at: ClassVar = {FRAME_JITTER.name: 0.0}
 
     def expected(self, videos: Sequence[Tracks]) -> Mapping[str, Parameter]:
         """A tenth of the time between two frames."""
@@ -52,4 +44,4 @@ class IrregularFrames(Effect):
 
     def frame_jitter(self, parameters: Mapping[str, Float[Tensor, "..."]]) -> Float[Tensor, "world"]:
         """Standard deviation in s of the true times of frames."""
-        return parameters["frame_jitter"]
+        return parameters[FRAME_JITTER.name]

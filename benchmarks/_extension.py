@@ -39,10 +39,10 @@ def learned_base(training: Sequence[Tracks], folder: Path) -> Learned:
 
 
 def learned_extension(training: Sequence[Tracks], folder: Path) -> Learned:
-    """The default model extended by what discovery finds on some videos; the finding is kept in a folder."""
+    """The default model extended by what discovery finds on some videos; the finding is kept in a folder, and on the way what is done."""
 
     def found() -> SharedFit:
-        finding = discover(training, seed=0, progress=progress_display(quiet=False))
+        finding = discover(training, seed=0, progress=progress_display(quiet=False), checkpoint=folder / "steps")
         write_finding(finding, folder)
         assert finding.fit is not None
         return finding.fit

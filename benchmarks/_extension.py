@@ -39,7 +39,10 @@ def learned_base(training: Sequence[Tracks], folder: Path) -> Learned:
 
 
 def learned_extension(training: Sequence[Tracks], folder: Path) -> Learned:
-    """The default model extended by what discovery finds on some videos; the finding is kept in a folder, and on the way what is done."""
+    """The default model extended by what discovery finds on some videos.
+
+    The finding is kept in a folder, and on the way to it what is done.
+    """
 
     def found() -> SharedFit:
         finding = discover(training, seed=0, progress=progress_display(quiet=False), checkpoint=folder / "steps")

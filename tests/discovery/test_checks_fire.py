@@ -14,8 +14,10 @@ from tests.discovery.videos import Video, move, recorded
 from vrdp_prob.discovery.contact_checks import DISTANCE, KICK, contact_checks
 from vrdp_prob.discovery.finding import Check
 from vrdp_prob.discovery.free_flight import FreeFlight
+from vrdp_prob.discovery.free_flight_checks import free_flight_checks
 from vrdp_prob.discovery.measurement_checks import DISTORTION, LOST, OUTLIERS, SINGLE, measurement_checks
 from vrdp_prob.discovery.residual_model import ResidualModel
+from vrdp_prob.scene import Body, Shape
 
 REPLICAS = 60
 FAINT = 1e-3
@@ -94,6 +96,32 @@ def test_a_check_fires_on_what_it_is_for(name: str, change: Changes, says: str) 
     assert found[name].p_value < CHANCE
     assert says in found[name].sentence
     assert found[name].p_value == min(found[one].p_value for one in (DISTANCE, KICK, LOST, SINGLE, DISTORTION))
+
+
+@pytest.mark.parametrize(
+    ("name", "belongs", "says"),
+    [
+        ("shape", lambda body: body.shape is Shape.SPHERE, "Bodies of one shape are pushed sideways"),
+        ("material", lambda body: body.material == "metal", "Bodies of one material are pushed sideways"),
+    ],
+)
+def test_a_push_to_the_side_of_some_bodies_is_told_by_what_they_are(
+    name: str, belongs: Callable[[Body], bool], says: str
+) -> None:
+    _, model = null()
+    changes, chosen = [], 0
+    for video in model.videos:
+        motion = video.motion
+        some = np.array([belongs(body) for body in motion.tracks.bodies])
+        chosen += int(some.sum())
+        left = np.stack([-motion.velocity[..., 1], motion.velocity[..., 0]], axis=-1)
+        changes.append(motion.pushed(0.5 * (some[:, None] * left)[..., None])[:, :, :2, 0])
+    assert 0 < chosen < sum(len(video.motion.tracks.bodies) for video in model.videos)
+    before, after = (by_name(free_flight_checks(FreeFlight.of(one))) for one in (model, moved(model, changes)))
+    check = f"acceleration across the velocity against {name}"
+    assert before[check].p_value > CHANCE
+    assert after[check].p_value < CHANCE
+    assert after[check].sentence.startswith(says)
 
 
 def test_positions_that_are_grossly_wrong_are_counted() -> None:

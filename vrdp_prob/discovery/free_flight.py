@@ -120,4 +120,4 @@ def after_contacts_freed(model: ResidualModel) -> ResidualModel:
 
 
 def _matches(name: str, wanted: str) -> bool:
-    return name == wanted or (wanted == "along material" and name.startswith(wanted))
+    return name == wanted or (wanted.endswith(" material") and name.startswith(wanted))

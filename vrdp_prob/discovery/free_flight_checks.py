@@ -13,6 +13,7 @@ from vrdp_prob.discovery.finding import Check
 from vrdp_prob.discovery.free_flight import FreeFlight, Part
 from vrdp_prob.discovery.replications import anywhere
 from vrdp_prob.discovery.words import by, direction_words, number, opposite
+from vrdp_prob.scene import Shape
 
 BESIDE = "Nothing is left of it beside"
 """How the sentence of a check begins that another check explains."""
@@ -172,6 +173,27 @@ QUESTIONS = (
         ),
     ),
     Question(
+        "acceleration across the velocity against shape",
+        tuple(f"across speed {shape}" for shape in Shape),
+        lambda part: f"bodies of one shape are pushed sideways and others are not, {_sideways(part)}",
+        ("across", "across speed"),
+    ),
+    Question(
+        "acceleration across the velocity against material",
+        ("across speed material",),
+        lambda part: f"bodies of one material are pushed sideways and others are not, {_sideways(part)}",
+        ("across", "across speed"),
+    ),
+    Question(
+        "acceleration across the velocity against mass",
+        ("across speed mass",),
+        lambda part: (
+            f"heavy bodies are pushed more to the {opposite(part.estimate('across speed mass'), 'right', 'left')} than "
+            f"light ones, {_sideways(part)}"
+        ),
+        ("across", "across speed"),
+    ),
+    Question(
         "acceleration against the distance to other bodies",
         ("others", "others square"),
         lambda part: f"bodies {_pull(part)} each other: {number(part.size)} m/s^2 (root mean square)",
@@ -251,6 +273,10 @@ def _spreading(part: Part) -> str:
     outward = opposite(away, "towards a middle", "away from a middle")
     around = opposite(turn, "clockwise", "counter-clockwise")
     return f"{number(abs(away))} m/s^2 per m {outward}, {number(abs(turn))} m/s^2 per m around it {around}"
+
+
+def _sideways(part: Part) -> str:
+    return f"by {number(part.size)} m/s^2 (root mean square)"
 
 
 def _by_speed(part: Part) -> str:

@@ -1,6 +1,6 @@
 """Missing accelerations that are looked for in free flight: patterns over the plane, the speed, the time, the spin."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -149,6 +149,8 @@ def patterns(scales: Scales) -> Iterator[Pattern]:
     yield Pattern("across sine", _across(_heading(np.sin)), "sin(2 phi) n")
     if scales.turning:
         yield Pattern("across speed spin", _across(_turning(lambda m: m.spin)), "omega |v| n")
+    for name, factor, words in _of_bodies(scales, scales.shapes):
+        yield Pattern(f"across speed {name}", _across(_turning(factor)), f"{words} |v| n")
     mass = "/m" if scales.weighed else ""
     softened = f"(r^2 + {SOFTENING:g}^2)"
     yield Pattern("others square", _towards_others(2, weighed=scales.weighed), f"sum r/{softened}^1.5{mass}")
@@ -185,10 +187,14 @@ def _factors(scales: Scales) -> Iterator[tuple[str, Factor, str]]:
     yield "way", _way, "s"
     if scales.turning:
         yield "spin", lambda m: np.abs(m.spin), "|omega|"
-    if scales.own_friction:
-        return
-    if {Shape.CUBE, Shape.CYLINDER} <= scales.shapes:
-        yield "cube", _of_body(lambda body: float(body.shape is Shape.CUBE)), "[cube]"
+    if not scales.own_friction:  # the friction of spheres is another number in any case
+        yield from _of_bodies(scales, scales.shapes - {Shape.SPHERE})
+
+
+def _of_bodies(scales: Scales, shapes: Collection[Shape]) -> Iterator[tuple[str, Factor, str]]:
+    """What bodies are, by which an acceleration may differ between them: one of some shapes, a material, a mass."""
+    for shape in [one for one in Shape if one in shapes][:-1]:
+        yield str(shape), _of_body(_has(shape)), f"[{shape}]"
     for material in scales.materials[1:]:
         yield f"material {material}", _of_body(_is_made_of(material)), f"[{material}]"
     if scales.weighed:
@@ -250,6 +256,10 @@ def _of_body(value: Callable[[Body], float]) -> Factor:
         return np.broadcast_to(np.array([value(body) for body in motion.tracks.bodies]), motion.speed.shape)
 
     return factor
+
+
+def _has(shape: Shape) -> Callable[[Body], float]:
+    return lambda body: float(body.shape is shape)
 
 
 def _is_made_of(material: str) -> Callable[[Body], float]:

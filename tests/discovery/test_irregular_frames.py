@@ -73,7 +73,7 @@ def test_without_the_cause_the_jitter_is_gone(found: tuple[Trial, Trial]) -> Non
 
 
 def test_motion_that_the_model_lacks_is_no_jitter() -> None:
-    _, fit = fitted("linear_drag", 6.0, seed=1)
+    _, fit = fitted("linear_drag", 6.0, seed=1, setting=Setting(videos=3, bodies=2, frames=60))
     (score,) = score_causes(fit, ResidualModel.of(fit), [IrregularFrames()], seed=0)
     trial = Trial((), fit).with_cause(score)
     assert trial is not None

@@ -7,16 +7,18 @@ and works on copies of what it is given: else it would find things worked out, o
 up.
 """
 
-import io
 import pickle
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import fields, is_dataclass
-from functools import wraps
+from functools import partial, wraps
 from hashlib import sha256
+from types import FunctionType, MethodType
 from typing import Any, ParamSpec, TypeVar
 
+import numpy as np
+import torch
 import xarray
 
 from vrdp_prob.inference.checkpoint import Checkpoint
@@ -67,26 +69,53 @@ class Step:
         return pickle.loads(content)[1]
 
 
-class _Facts(pickle.Pickler):
-    """Writes what objects are, and nothing of what they have worked out of it since."""
-
-    def reducer_override(self, thing: object) -> Any:
-        if isinstance(thing, type):
-            return NotImplemented
-        if is_dataclass(thing):
-            return tuple, ((type(thing), *(getattr(thing, one.name) for one in fields(thing))),)
-        if isinstance(thing, xarray.Dataset):
-            return tuple, ([(str(name), values.dims, values.values) for name, values in thing.variables.items()],)
-        return NotImplemented
+def _digest(thing: object) -> str:
+    """A thing in a short text: what it is, and nothing of what it has worked out of that since."""
+    text = sha256()
+    _tell(thing, text.update)
+    return text.hexdigest()
 
 
-def _digest(work: object) -> str:
-    """Work in a short text: the same for what is alike."""
-    written = io.BytesIO()
-    facts = _Facts(written)
-    facts.fast = True  # what stands there twice is written twice, be it one object or two that are alike
-    facts.dump(work)
-    return sha256(written.getvalue()).hexdigest()
+def _tell(thing: Any, told: Callable[[bytes], None]) -> None:
+    """Tell what a thing is, in the same words wherever it is alike."""
+    kind = type(thing)
+    told(f"{kind.__module__}.{kind.__qualname__}(".encode())
+    if thing is None or isinstance(thing, bool | int | float | complex | str | bytes | np.generic):
+        told(repr(thing).encode())
+    elif isinstance(thing, type | FunctionType):
+        told(f"{thing.__module__}.{thing.__qualname__}".encode())
+    elif isinstance(thing, np.ndarray) and thing.dtype != object:
+        told(f"{thing.dtype} {thing.shape} ".encode() + np.ascontiguousarray(thing).tobytes())
+    elif isinstance(thing, set | frozenset):
+        told(" ".join(sorted(map(_digest, thing))).encode())
+    elif (parts := _parts(thing)) is not None:
+        for part in parts:
+            _tell(part, told)
+    else:
+        told(pickle.dumps(thing))
+    told(b")")
+
+
+def _parts(thing: Any) -> Iterable[Any] | None:
+    """What a thing consists of; None where it is not known to consist of anything."""
+    parts: Iterable[Any] | None = None
+    if is_dataclass(thing):
+        parts = [getattr(thing, one.name) for one in fields(thing)]
+    elif isinstance(thing, xarray.Dataset):
+        parts = [(str(name), values.dims, values.values) for name, values in thing.variables.items()]
+    elif isinstance(thing, Mapping):
+        parts = [part for item in thing.items() for part in item]
+    elif isinstance(thing, list | tuple):
+        parts = thing
+    elif isinstance(thing, np.ndarray):
+        parts = thing.tolist()
+    elif isinstance(thing, torch.Tensor):
+        parts = [thing.detach().cpu().numpy()]
+    elif isinstance(thing, partial):
+        parts = [thing.func, thing.args, thing.keywords]
+    elif isinstance(thing, MethodType):
+        parts = [thing.__func__, thing.__self__]
+    return parts
 
 
 class Journal:

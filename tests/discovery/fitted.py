@@ -11,8 +11,11 @@ from tests.discovery.data_set import DataSet, Wanted, draw
 from tests.discovery.measurement import Measurement
 from tests.discovery.scenes import Setting
 from vrdp_prob.discovery.residual_model import ResidualModel
+from vrdp_prob.discovery.scores import score_causes
+from vrdp_prob.discovery.trials import Trial
 from vrdp_prob.inference.several_videos.fitting import SharedFit, fit_together
 from vrdp_prob.models.effects.body_friction import BodyFriction
+from vrdp_prob.models.effects.effect import Effect
 from vrdp_prob.models.physics import PhysicsModel
 
 SMALL = Setting(videos=3, bodies=3, frames=70)
@@ -32,6 +35,16 @@ def fitted(
     data = draw(wanted, seed=seed, setting=setting, measurement=measurement)
     model = PhysicsModel.base().with_effect(BodyFriction())
     return data, fit_together(data.tracks, model=model, model_error=False)
+
+
+def with_cause(way: str, effect_size: float, effect: Effect, *, seed: int) -> tuple[Trial, Trial]:
+    """The base model on videos in which a cause is hidden, and the same with an effect from where its score begins."""
+    _, fit = fitted(way, effect_size, seed=seed)
+    base = Trial((), fit)
+    (score,) = score_causes(fit, ResidualModel.of(fit), [effect], seed=0)
+    trial = base.with_cause(score)
+    assert trial is not None
+    return base, trial
 
 
 def moved(model: ResidualModel, changes: Sequence[Float[np.ndarray, "time body number"]]) -> ResidualModel:

@@ -7,7 +7,7 @@ import pytest
 from scipy.linalg import null_space
 from scipy.optimize import minimize
 
-from tests.discovery.fitted import fitted
+from tests.discovery.fitted import fitted, with_cause
 from tests.discovery.scenes import Setting
 from vrdp_prob.discovery.checks import run_checks
 from vrdp_prob.discovery.estimates import estimates
@@ -26,12 +26,7 @@ LARGEST = 0.1 / 25
 
 @pytest.fixture(scope="module")
 def found() -> tuple[Trial, Trial]:
-    _, fit = fitted("irregular_frames", SIZE, seed=SEED)
-    base = Trial((), fit)
-    (score,) = score_causes(fit, ResidualModel.of(fit), [IrregularFrames()], seed=0)
-    trial = base.with_cause(score)
-    assert trial is not None
-    return base, trial
+    return with_cause("irregular_frames", SIZE, IrregularFrames(), seed=SEED)
 
 
 def test_the_jitter_is_that_of_the_truth(found: tuple[Trial, Trial]) -> None:
@@ -57,11 +52,8 @@ def test_nothing_is_left_and_no_frame_is_late_like_its_neighbours(found: tuple[T
 
 
 def test_it_explains_more_than_lost_frames(found: tuple[Trial, Trial]) -> None:
-    _, fit = fitted("irregular_frames", SIZE, seed=SEED)
-    base, trial = found
-    (score,) = score_causes(fit, ResidualModel.of(fit), [ClockError()], seed=0)
-    lost = base.with_cause(score)
-    assert lost is not None
+    _, trial = found
+    _, lost = with_cause("irregular_frames", SIZE, ClockError(), seed=SEED)
     assert gain(trial, lost)[0] > 100
 
 

@@ -3,10 +3,8 @@
 import numpy as np
 import pytest
 
-from tests.discovery.fitted import fitted
+from tests.discovery.fitted import fitted, with_cause
 from vrdp_prob.discovery.estimates import estimates
-from vrdp_prob.discovery.residual_model import ResidualModel
-from vrdp_prob.discovery.scores import score_causes
 from vrdp_prob.discovery.trials import Trial, gain
 from vrdp_prob.models.effects.clock_error import ClockError
 
@@ -15,12 +13,7 @@ SIZE, SEED = 6.0, 1
 
 @pytest.fixture(scope="module")
 def found() -> tuple[Trial, Trial]:
-    _, fit = fitted("clock_error", SIZE, seed=SEED)
-    base = Trial((), fit)
-    score = score_causes(fit, ResidualModel.of(fit), [ClockError()], seed=0)[0]
-    trial = base.with_cause(score)
-    assert trial is not None
-    return base, trial
+    return with_cause("clock_error", SIZE, ClockError(), seed=SEED)
 
 
 def test_the_lost_time_is_that_of_the_truth(found: tuple[Trial, Trial]) -> None:

@@ -87,9 +87,8 @@ def _independent(model: ResidualModel, index: int) -> tuple[Float[np.ndarray, "p
 
     What the fit absorbs, of all frames together, ties them: their slopes are not independent one by one.
     """
-    rows = model.videos[index].late_frames
-    _, blocks = model.linear.scores_in(index, rows[:, :, None])
-    reduced = blocks[:, :, 0]
+    rows, linear = model.videos[index].late_frames, model.linear.videos[index]
+    reduced = linear.without_own(linear.padded(rows))
     values, vectors = np.linalg.eigh(reduced.T @ reduced)
     told = values > SEEN * float((rows**2).sum(axis=0).max(initial=0.0))
     gradient: np.ndarray = -(reduced.T @ model.left[index]) @ vectors[:, told]
@@ -106,12 +105,8 @@ def alike_in_neighbours(fit: SharedFit) -> float:
     """
     products, squares = 0.0, 0.0
     for index, video in enumerate(fit.joint.videos):
-        likelihood, point = video.likelihood, torch.from_numpy(fit.joint.point(index)[None])
-        lateness = likelihood.lateness(point)
-        if lateness is None:
-            continue
-        late, told = likelihood.late(point)[0], lateness.variance[0].numpy() > 0.0
-        product = (late[1:] * late[:-1])[told[1:] & told[:-1]]
+        late = video.likelihood.late(torch.from_numpy(fit.joint.point(index)[None]))[0]
+        product = late[1:] * late[:-1]
         products += float(product.sum())
         squares += float((product**2).sum())
     return float(norm.sf(products / np.sqrt(squares))) if squares else 1.0

@@ -21,6 +21,7 @@ from vrdp_prob.models.measurement import (
 from vrdp_prob.models.model_error import ModelError, Strands, Whitening
 from vrdp_prob.models.noise import NoiseFamily
 from vrdp_prob.models.observation import Observations
+from vrdp_prob.models.parameters import FRAME_JITTER
 from vrdp_prob.models.physics import PhysicsModel
 from vrdp_prob.models.scenery import Quantities, Scenery
 from vrdp_prob.models.simulator.rollout import Rollout, simulate
@@ -295,8 +296,7 @@ class Likelihood:
         observations, count = self.observations, discrepancies.positions.shape[1]
         frames = [observations.position_frames[: 2 * count], observations.angle_frames[: discrepancies.angles.shape[1]]]
         noise = [quantities[NOISE].expand(-1, 2 * count), quantities[ANGLE_NOISE].expand(-1, len(frames[1]))]
-        of_video = [parameter.name for parameter in self.model.parameters if parameter.scope.per_video]
-        jitter = frame_jitter(self.model, {name: quantities[name][:, 0] for name in of_video})
+        jitter = frame_jitter(self.model, {FRAME_JITTER.name: quantities[FRAME_JITTER.name][:, 0]})
         rates = discrepancies.rates / torch.cat(noise, dim=1)
         return Lateness(torch.cat(frames), rates, jitter, len(self.tracks.times))
 

@@ -57,7 +57,7 @@ bench: $(SETUP)
 
 calibrate: $(SETUP)
 	mkdir -p $(OUT)
-	$(BIN)/python benchmarks/calibration.py --samplers laplace,emcee,nuts --docs docs --json $(OUT)/calibration.json
+	$(BIN)/python benchmarks/calibration.py --samplers laplace-alone,laplace,emcee,nuts --docs docs --json $(OUT)/calibration.json
 
 clean:
 	rm -rf $(VENV) .pytest_cache .mypy_cache .ruff_cache build dist

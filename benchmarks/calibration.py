@@ -1,6 +1,6 @@
 """Whether posteriors are calibrated: ranks and coverage of true values over scenes from the prior, by sampler.
 
-    python benchmarks/calibration.py [--json FILE] [--docs docs] [--scenes 200] [--samplers laplace,emcee,nuts] [--show]
+    python benchmarks/calibration.py [--json FILE] [--docs docs] [--scenes 200] [--samplers laplace,emcee] [--show]
 
 `laplace-alone` is `laplace` without emcee, on to which it hands what it cannot be trusted with.
 Scenes come from the prior that the inference believes in, their motion from an integrator that is not the simulator
@@ -45,7 +45,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         "--docs", type=Path, help="folder of the documentation, whose page and figures are written anew"
     )
     parser.add_argument("--scenes", type=int, default=200, help="scenes per sampler")
-    parser.add_argument("--samplers", default="laplace,emcee,nuts")
+    parser.add_argument("--samplers", default="laplace-alone,laplace,emcee,nuts")
     parser.add_argument("--results", type=Path, default=RESULTS, help="folder of the results, which are gone on with")
     parser.add_argument("--show", action="store_true", help="compute nothing, show all results there are")
     parser.add_argument("--processes", type=int, default=os.cpu_count() or 1)

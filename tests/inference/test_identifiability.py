@@ -180,3 +180,23 @@ def test_groups_say_which_combinations_are_determined() -> None:
     assert not told["mass scale of objects 0, 1 and 2"].determined
     prior_sd = 0.7 / np.sqrt(3)
     assert told["mass scale of objects 0, 1 and 2"].relative_sd == pytest.approx(prior_sd, rel=0.01)
+
+
+def test_a_contact_that_tells_nothing_between_groups_determines_nothing() -> None:
+    video, clear, all_of_them = tracks(4), [(0, 1), (2, 3)], [(0, 1), (1, 2), (2, 3)]
+    known = information(video, clear, [])
+    (group,) = collision_groups(video, all_of_them, known)
+    determined = {one.name: one.determined for one in group.combinations}
+    assert determined["mass ratio of objects 0 and 1"]
+    assert not determined["mass ratio of objects 1 and 2"]
+    assert not determined["restitution product of objects 1 and 2"]
+
+
+@pytest.mark.parametrize("told", [[(0, 1), (1, 2), (2, 3)], [(0, 1), (1, 2)]])
+def test_what_a_chain_of_contacts_tells_is_told_of_its_ends(told: list[tuple[int, int]]) -> None:
+    """A chain tells all ratios, and products of two that are an odd number of steps apart."""
+    video, end = tracks(4), len(told)
+    (group,) = collision_groups(video, [*told, (0, end)], information(video, told, []))
+    determined = {one.name: one.determined for one in group.combinations}
+    assert determined[f"mass ratio of objects 0 and {end}"]
+    assert determined[f"restitution product of objects 0 and {end}"] is (end % 2 == 1)

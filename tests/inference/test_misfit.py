@@ -114,3 +114,34 @@ def test_residuals_without_outliers_stay_as_they_are() -> None:
     residuals[30, 1] += 1.0
     changed = (tempered(residuals, clues) != residuals).any(axis=-1) & np.isfinite(residuals[..., 0])
     assert np.argwhere(changed).tolist() == [[30, 1]]
+
+
+def struck(size: float, *, seed: int, share: float = 0.05) -> Tracks:
+    """A chain of collisions, some of whose positions are off by so many standard deviations of the noise."""
+    tracks, generator = observe(chain(), noise=0.005, seed=seed), np.random.default_rng(seed)
+    angle = generator.uniform(0, 2 * np.pi, tracks.seen.shape)
+    off = (generator.random(tracks.seen.shape) < share)[..., None]
+    positions = tracks.positions + off * 0.005 * size * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+    return Tracks.from_arrays("struck", tracks.bodies, tracks.times, positions)
+
+
+@pytest.mark.parametrize("size", [8, 12])
+def test_outliers_that_only_a_fit_shows_are_no_error_of_the_model(size: float) -> None:
+    fit = fitted(struck(size, seed=1))
+    assert Clues.of(struck(size, seed=1)).outliers.sum() <= 2
+    assert fit.likelihood.noise is NoiseFamily.STUDENT_T
+    assert fit.misfit.fits
+    assert fit.misfit.outliers > 5
+    assert "lie far off" in fit.misfit.sentences[0]
+
+
+def test_noise_that_differs_from_position_to_position_as_it_is_stated_is_no_misfit() -> None:
+    tracks, generator = observe(chain(), noise=0.003, seed=1), np.random.default_rng(1)
+    rough = generator.random(tracks.seen.shape) < 0.15
+    positions = tracks.positions + np.where(rough, 0.02, 0.0)[..., None] * generator.normal(size=tracks.positions.shape)
+    covariance = np.where(rough, 0.003**2 + 0.02**2, 0.003**2)[..., None, None] * np.eye(2)
+    fit = fitted(Tracks.from_arrays("v", tracks.bodies, tracks.times, positions, position_covariance=covariance))
+    assert fit.misfit.fits
+    assert fit.misfit.ratio == pytest.approx(1.0, abs=0.1)
+    assert fit.misfit.error_acceleration is None
+    assert fit.likelihood.noise is NoiseFamily.GAUSSIAN

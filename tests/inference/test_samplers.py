@@ -142,3 +142,10 @@ def test_ends_behind_a_change_of_course_are_told_from_other_divergences_for_whic
     truth = truncnorm(-np.inf, WALL)
     error = truth.std() / np.sqrt(min(convergence.ess_bulk or 0.0, x.size))
     assert abs(x.mean() - truth.mean()) < 4 * error
+
+
+def test_emcee_says_where_it_made_fewer_draws_than_were_asked_for() -> None:
+    target = SkewedRidge()
+    samples = sample_emcee(target, target.start, draws=100_000, generator=np.random.default_rng(0), most_steps=4)
+    made = samples.points.shape[0] * samples.points.shape[1]
+    assert f"emcee made {made} draws, fewer than the 100000 that were asked for." in samples.notes

@@ -41,6 +41,30 @@ def test_noise_that_can_be_seen_is_told() -> None:
     assert untold_noise(moved(seen(), seen(0.004).positions.round(3))) is None
 
 
+@pytest.mark.parametrize("spoilt", ["frames lost", "frames at odd times"])
+def test_frames_that_come_unevenly_do_not_look_like_noise(spoilt: str) -> None:
+    generator = np.random.default_rng(0)
+    even = np.arange(200) / 50
+    lost = generator.random(200) < 0.4
+    times = even[~lost] if spoilt == "frames lost" else even + generator.uniform(0, 0.018, 200)
+    positions = np.stack([1.1 * times - 0.15 * times**2, 0.3 * times], axis=1)
+    positions += generator.normal(0, 0.002, positions.shape)
+    tracks = Tracks.from_arrays("v", (Body("a", Shape.SPHERE, 0.1),), times, positions[:, None])
+    assert noise_scale(tracks) == pytest.approx(0.002, rel=0.25)
+
+
+def test_noise_that_is_stated_differently_for_each_position_is_that_of_the_middle() -> None:
+    generator = np.random.default_rng(0)
+    times = np.arange(300) / 50
+    sd = np.where(generator.random(300) < 0.2, 0.02, 0.003)
+    positions = np.stack([0.5 * times, 0.3 * times], axis=1) + sd[:, None] * generator.normal(size=(300, 2))
+    covariance = (sd**2)[:, None, None, None] * np.eye(2)
+    body = (Body("a", Shape.SPHERE, 0.1),)
+    told = Tracks.from_arrays("v", body, times, positions[:, None], position_covariance=covariance)
+    assert noise_scale(told) == pytest.approx(0.003, rel=0.1)
+    assert noise_scale(Tracks.from_arrays("v", body, times, positions[:, None])) > 0.0045
+
+
 def test_computed_positions_get_a_small_noise() -> None:
     assert untold_noise(seen()) == pytest.approx(1e-3 * 0.05 * RADIUS)
 

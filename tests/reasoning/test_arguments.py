@@ -37,6 +37,8 @@ EXPECTED = {
     "model as a text": "model is 'base'; give a PhysicsModel, which PhysicsModel.read reads from a file.",
     "plan as a text": "plan is 'lbfgs'; give a FitPlan of vrdp_prob.inference.",
     "one video together": f"videos are no list of tracks{OF_SEVERAL}",
+    "model of several as a text": "model is 'base'; give a PhysicsModel, which PhysicsModel.read reads from a file.",
+    "model to discover as a text": "model is 'base'; give a PhysicsModel, which PhysicsModel.read reads from a file.",
     "a folder together": f"videos are no list of tracks{OF_SEVERAL}",
     "unknown shape": "object a: shape 'pyramid' is not known; use sphere, cube or cylinder.",
     "shape as a text": "accepted: Body(id='a', shape=<Shape.CUBE: 'cube'>, radius=None, mass=None, inertia=None, "

@@ -15,6 +15,7 @@ import vrdp_prob
 from tests.concepts.physical.words import UNSURE
 from tests.reasoning.hand_made import STORY, video
 from tests.reasoning.sliding_discs import Disc, KnownPosterior, tracks_of
+from vrdp_prob.discovery import discover
 from vrdp_prob.inference import infer_together
 from vrdp_prob.reasoning import ask
 from vrdp_prob.scene import Body, Choice, Question, Shape, Tracks
@@ -60,6 +61,8 @@ CALLS: dict[str, Callable[[Path], Any]] = {
     "model as a text": lambda _: vrdp_prob.infer(TRACKS, model="base"),  # type: ignore[arg-type]
     "plan as a text": lambda _: vrdp_prob.infer(TRACKS, plan="lbfgs"),  # type: ignore[arg-type]
     "one video together": lambda _: infer_together(TRACKS),
+    "model of several as a text": lambda _: infer_together([TRACKS], model="base"),  # type: ignore[arg-type]
+    "model to discover as a text": lambda _: discover(3 * [TRACKS], model="base"),  # type: ignore[arg-type]
     "a folder together": lambda _: infer_together("folder"),  # type: ignore[arg-type]
     "unknown shape": lambda _: Body("a", "pyramid"),  # type: ignore[arg-type]
     "shape as a text": lambda _: Body("a", "cube"),  # type: ignore[arg-type]

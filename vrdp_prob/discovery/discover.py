@@ -21,6 +21,7 @@ from vrdp_prob.discovery.trials import Trial, gain, gains, weights
 from vrdp_prob.discovery.tried import tried_causes
 from vrdp_prob.inference import default_model
 from vrdp_prob.inference.checkpoint import Checkpoint, model_facts, program_facts, tracks_facts
+from vrdp_prob.inference.infer import check_model
 from vrdp_prob.inference.journal import journal
 from vrdp_prob.inference.parallel import linear_algebra_in_one_thread, several_processes
 from vrdp_prob.inference.several_videos.fitting import fit_together
@@ -78,10 +79,11 @@ def discover(
     Raises
     ------
     InputError
-        If there are fewer than three videos, two have one name, a video shows no motion, or the checkpoint belongs to
-        another run.
+        If there are fewer than three videos, two have one name, a video shows no motion, the model is none, the videos
+        have no common world, or the checkpoint belongs to another run.
     """
     check_video_count(videos)
+    check_model(model)
     physics = default_model() if model is None else model
     looked_for = _catalogue(physics, catalogue)
     own = None if checkpoint is None else Checkpoint(checkpoint, _facts(videos, physics, looked_for, seed))

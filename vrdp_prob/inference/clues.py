@@ -18,7 +18,7 @@ from vrdp_prob.inference.free_flight import (
 from vrdp_prob.inference.outliers import gross_outliers, without
 from vrdp_prob.models.noise import NoiseFamily
 from vrdp_prob.models.observation import prior_noise
-from vrdp_prob.models.roughness import noise_scale, untold_noise
+from vrdp_prob.models.roughness import noise_scale, stated_sd, untold_noise
 from vrdp_prob.scene import Tracks
 
 SIGNIFICANT = 5.0
@@ -27,6 +27,8 @@ REST_TEST = 3.0
 """A body rests until its first contact if its scatter about one place exceeds the noise by less than so many sd."""
 REST_LOOK = 0.6
 """Time in s after its release for which a body that rests must at least stay where it is."""
+MOST_STARTS = 64
+"""Times at which a body that stays at first is tried to set off."""
 SHORTEST_REST_TEST = 6
 """Degrees of freedom (two per position) below which a scatter says nothing."""
 STILL_ANGLE_SD = 0.06
@@ -68,7 +70,7 @@ class Clues:
 
     @cached_property
     def position_sd(self) -> Float[np.ndarray, "time body"]:
-        """Standard deviation (m) of each position per axis: the noise, or the stated one where it is larger."""
+        """Standard deviation (m) of each position per axis: the noise, or the stated ones where these are larger."""
         return _position_sd(self.tracks, self.noise)
 
     @property
@@ -89,13 +91,7 @@ class Clues:
     @cached_property
     def moving(self) -> frozenset[int]:
         """Bodies that are not at rest when they are released."""
-        times = self.tracks.times
-        moving = set()
-        for body, start in enumerate(self.tracks.first_seen.tolist()):
-            until = (self.first_contact(body), start + REST_LOOK)
-            if not any(self._stays(body, times < end) for end in until):
-                moving.add(body)
-        return frozenset(moving)
+        return frozenset(body for body in range(len(self.tracks.bodies)) if not self._rests(body))
 
     @cached_property
     def acceleration(self) -> float:
@@ -132,6 +128,32 @@ class Clues:
             return 0.0
         return float(np.polyfit(self.tracks.times[chosen], angles[chosen, body], 1)[0])
 
+    def _rests(self, body: int) -> bool:
+        """Whether a body is at rest until its first contact, or at first and is then set off by what was not seen."""
+        times, start, contact = self.tracks.times, float(self.tracks.first_seen[body]), self.first_contact(body)
+        if self._stays(body, times < contact):
+            return True
+        look = start + REST_LOOK
+        return self._stays(body, times < look) and (contact <= look or self._sets_off(body, look, contact))
+
+    def _sets_off(self, body: int, earliest: float, until: float) -> bool:
+        """Whether rest and then motion explain the positions of a body better than motion from its release does.
+
+        A slow body may stay within the noise for a while, and is seen to drift in all the time there is.
+        """
+        chosen = (self.tracks.times < until) & self.clean.seen[:, body]
+        times, sd = self.tracks.times[chosen], self.position_sd[chosen, body, None]
+        places = self.clean.positions[chosen, body] / sd
+        starts = times[times >= earliest]
+        starts = starts[np.unique(np.linspace(0, len(starts) - 1, MOST_STARTS).astype(int))] if len(starts) else starts
+
+        def left(start: float) -> float:
+            moved = np.maximum(times - start, 0.0)
+            law = np.stack([np.ones_like(moved), moved, moved**2], axis=1) / sd
+            return float(((places - law @ np.linalg.lstsq(law, places, rcond=None)[0]) ** 2).sum())
+
+        return min(map(left, starts.tolist()), default=np.inf) < left(float(times[0])) - REST_TEST**2
+
     def _stays(self, body: int, chosen: Bool[np.ndarray, "time"]) -> bool:
         """Whether positions and angles in some frames scatter about one value, and are enough to tell."""
         chosen = chosen & self.clean.seen[:, body]
@@ -147,11 +169,12 @@ class Clues:
 
 
 def _position_sd(tracks: Tracks, noise: float) -> Float[np.ndarray, "time body"]:
-    """Standard deviation (m) per axis: the stated one where it is larger; errors that last look like motion."""
-    covariance = tracks.position_covariance
-    if covariance is None:
-        return np.full(tracks.seen.shape, noise)
-    return np.sqrt(np.fmax(np.trace(covariance, axis1=-2, axis2=-1) / 2, noise**2))
+    """Standard deviation (m) per axis: the stated ones, all larger where the tracks are rougher.
+
+    Errors that last look like motion, and make no roughness.
+    """
+    stated, reference = stated_sd(tracks)
+    return stated * (noise / reference if tracks.position_covariance is None else max(noise / reference, 1.0))
 
 
 def _roughness(tracks: Tracks) -> float:

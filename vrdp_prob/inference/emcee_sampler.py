@@ -69,8 +69,8 @@ def sample_emcee(
     start
         A cloud per mode.
     draws
-        Number of draws that are wanted over all ensembles; ensembles are run until they have converged, which gives
-        more.
+        Number of draws that are wanted over all ensembles; ensembles are run until they have converged, which mostly
+        gives more, and a note says where it gives fewer.
     generator
         Source of randomness.
     progress
@@ -93,7 +93,6 @@ def sample_emcee(
     One chain per ensemble, walker after walker so that autocorrelation within a walker shows; all steps after warm-up.
     The R-hat that goes with it compares the ensembles' earlier with their later steps.
     """
-    del draws
     with metered() as meter:
         form = form or _kept_form(density, start, generator, checkpoint)
         walkers = max(2 * (start.dimension + 1), FEWEST_WALKERS)
@@ -125,10 +124,15 @@ def sample_emcee(
         gradients=form.gradients + sum(ensemble.gradients for ensemble in ensembles),
         work=meter.rows + sum(ensemble.work for ensemble in ensembles),
         modes=modes,
-        notes=stopped,
+        notes=(*stopped, *_too_few(by_walker, draws)),
         doubts=doubts(modes),
         ess_goal=_ess_goal(ensembles),
     )
+
+
+def _too_few(points: Float[np.ndarray, "chain draw dimension"], draws: int) -> tuple[str, ...]:
+    made = points.shape[0] * points.shape[1]
+    return (f"emcee made {made} draws, fewer than the {draws} that were asked for.",) if made < draws else ()
 
 
 def _run(

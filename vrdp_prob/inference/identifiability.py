@@ -9,7 +9,7 @@ whether another law of the model (a force that depends on mass, say) tells the r
 """
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from itertools import combinations
 
@@ -81,12 +81,16 @@ class Combination:
         Posterior standard deviation of its logarithm, about its relative error.
     contraction
         Share of the prior variance of the logarithm that the data take away.
+    linked
+        Whether collisions tell of its objects together, directly or through others. Where they do not, the data take
+        prior variance away that they tell of each object by itself.
     """
 
     quantity: str
     objects: tuple[str, ...]
     relative_sd: float
     contraction: float
+    linked: bool = True
 
     @property
     def name(self) -> str:
@@ -96,8 +100,8 @@ class Combination:
 
     @property
     def determined(self) -> bool:
-        """Whether the data say more about it than was believed before."""
-        return self.contraction >= LEAST_CONTRACTION
+        """Whether the data say more about it than was believed before, of its objects together."""
+        return self.linked and self.contraction >= LEAST_CONTRACTION
 
 
 @dataclass(frozen=True)
@@ -145,6 +149,7 @@ def collision_groups(
 ) -> tuple[CollisionGroup, ...]:
     """Which combinations of masses and restitutions the data determine, group by group."""
     contacts, _ = _graphs(tracks, pairs, ())
+    masses, restitutions = _Unknowns.masses(tracks, information), _Unknowns.restitutions(tracks, information)
     names = [body.id for body in tracks.bodies]
     groups, left = [], [name for name in names if contacts[name]]
     while left:
@@ -155,8 +160,12 @@ def collision_groups(
             ratio = {(MASS.name, first): 1.0, (MASS.name, second): -1.0}
             product = {(RESTITUTION.name, first): 1.0, (RESTITUTION.name, second): 1.0}
             both = (names[first], names[second])
-            found.append(_combination("mass_ratio", both, ratio, information))
-            found.append(_combination("restitution_product", both, product, information))
+            for quantity, weights, unknowns in (
+                ("mass_ratio", ratio, masses),
+                ("restitution_product", product, restitutions),
+            ):
+                linked = unknowns.told_together(*both, contacts)
+                found.append(replace(_combination(quantity, both, weights, information), linked=linked))
         scale = {(MASS.name, names.index(name)): 1 / len(members) for name in members}
         found.append(_combination("mass_scale", tuple(members), scale, information))
         groups.append(CollisionGroup(tuple(members), tuple(found)))
@@ -271,6 +280,19 @@ class _Unknowns:
         apart = self.information.sd({first: 1.0}) ** 2 + self.information.sd({second: 1.0}) ** 2
         share = 1 - self.information.sd({first: 1.0, second: self.sign}) ** 2 / apart if apart > 0 else 0.0
         return 2 * share / (1 + share) if share > 0 else 0.0
+
+    def told_together(self, name: str, other: str, graph: Graph) -> bool:
+        """Whether contacts tell the ratio or product of two: through a chain of ties, or as both are told.
+
+        A chain of products tells that of its ends where it has an odd number of them, and their ratio elsewhere.
+        """
+        ties = {
+            one: {partner for partner in partners if self.link(one, partner) >= LEAST_CONTRACTION}
+            for one, partners in graph.items()
+        }
+        steps = _component(name, ties).get(other)
+        chained = steps is not None and (self.sign < 0 or steps % 2 == 1)
+        return chained or all(one in self.known or self._is_fixed(one, graph) for one in (name, other))
 
     def status(self, name: str, graph: Graph) -> ParameterStatus:
         """What the data say of one."""

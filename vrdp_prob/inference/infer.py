@@ -118,8 +118,7 @@ def infer(
         raise InputError(f"tracks is {_given(tracks)}; give the tracks of one video, which vrdp_prob.load reads.")
     check_options(sampler=sampler, noise=noise, defaults=defaults, motion=motion)
     check_counts(draws, seed)
-    if not isinstance(model, PhysicsModel | None):
-        raise InputError(f"model is {_given(model)}; give a PhysicsModel, which PhysicsModel.read reads from a file.")
+    check_model(model)
     if not isinstance(plan, FitPlan | None):
         raise InputError(f"plan is {_given(plan)}; give a FitPlan of vrdp_prob.inference.")
     physics = default_model() if model is None else model
@@ -207,6 +206,18 @@ def check_counts(draws: int, seed: int) -> None:
     for name, value, least in (("draws", draws, FEWEST_DRAWS), ("seed", seed, 0)):
         if not isinstance(value, int | np.integer) or value < least:
             raise InputError(f"{name} is {value!r}; give a whole number of at least {least}.")
+
+
+def check_model(model: object) -> None:
+    """Refuse what is neither a model nor None, such as the name of its file.
+
+    Raises
+    ------
+    InputError
+        In that case.
+    """
+    if not isinstance(model, PhysicsModel | None):
+        raise InputError(f"model is {_given(model)}; give a PhysicsModel, which PhysicsModel.read reads from a file.")
 
 
 def _given(value: object) -> str:

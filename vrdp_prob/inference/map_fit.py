@@ -18,7 +18,7 @@ from vrdp_prob.inference.clues import Clues
 from vrdp_prob.inference.descent import Descent
 from vrdp_prob.inference.events import Pairs, first_contacts
 from vrdp_prob.inference.growing_fit import GrowingFit, merged
-from vrdp_prob.inference.misfit import Misfit, judge
+from vrdp_prob.inference.misfit import Misfit, judge, shows_outliers, with_outliers
 from vrdp_prob.inference.mode import Mode
 from vrdp_prob.inference.mode_search import ModeSearch
 from vrdp_prob.inference.model_error_fit import TURNS, next_model_error
@@ -141,7 +141,8 @@ def fit_map(
     progress
         Told how many windows are done.
     noise
-        Distribution of the measurement errors; where None, Student-t if the tracks show gross outliers, else Gaussian.
+        Distribution of the measurement errors; where None, Student-t if the tracks or what the fit leaves show gross
+        outliers, else Gaussian.
     plan
         Stages and optimiser; `FitPlan()` where None.
     model_error
@@ -182,6 +183,14 @@ def fit_map(
     )
     likelihood, structure, found = explained.likelihood, explained.structure, explained.found
     evaluations = explained.evaluations
+    believed_at_rest = clues.moving - structure.moving
+    if noise is None and family is NoiseFamily.GAUSSIAN and shows_outliers(clues, likelihood, found[0].point):
+        family = NoiseFamily.STUDENT_T
+        heavy = Likelihood(tracks, model, unknowns(tracks, model, structure, family), family)
+        tempered = _refined(likelihood, [one.point for one in found], heavy, stages)
+        evaluations += sum(one.evaluations for one in tempered)
+        if (further := with_outliers(clues, heavy, tempered[0].point)) is not clues:
+            clues, likelihood, found = further, heavy, tempered
     misfit = judge(likelihood, found[0].point, clues)
     for _ in range(TURNS if model_error else 0):
         error = next_model_error(likelihood, found[0].point, clues, misfit)
@@ -202,7 +211,7 @@ def fit_map(
     likelihood, modes = without_idle(likelihood, distinct_modes(likelihood, climbed), structure.moving)
     converged = at_the_top(found, climbed)
     search = ModeSearch(stages.alternatives, len(attempts), not _in_doubt(attempts))
-    return MapFit(likelihood, modes, converged, search, clues, misfit, evaluations, clues.moving - structure.moving)
+    return MapFit(likelihood, modes, converged, search, clues, misfit, evaluations, believed_at_rest)
 
 
 def _refined(

@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import torch
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 from scipy.ndimage import median_filter
 
 from vrdp_prob.inference.clues import Clues
@@ -20,6 +20,13 @@ LARGEST_RATIO = 1.5
 """Residuals this much larger than the measurement noise are called a misfit."""
 LIKE_NOISE = 1.05
 """Residuals in units of the noise up to which they are said to be no larger."""
+SUSPICIOUS = 5.5
+"""Standard deviations off the residuals around it from which a position is an outlier where all else is explained; by
+chance one in a hundred thousand is."""
+HARDLY_MORE = 1.15
+"""Residuals in units of the noise up to which chance may have made them so large in a short video."""
+ALIKE = 0.2
+"""Correlation from which on neighbouring errors are said to be alike."""
 
 
 @dataclass(frozen=True)
@@ -29,8 +36,9 @@ class Misfit:
     Parameters
     ----------
     residual_sd
-        Standard deviation (m) of the residuals per axis. Under Student-t noise gross outliers are left out, and others
-        count for as much as the largest error that is none.
+        Standard deviation (m) of the residuals per axis. Where the noise of each position is stated, residuals count in
+        units of it, and are told as those of a position of middle noise. Under Student-t noise gross outliers are left
+        out, and others count for as much as the largest error that is none.
     noise_sd
         Standard deviation (m) of the measurement noise: the stated one where there is one, at least that of the
         tracks' roughness.
@@ -115,8 +123,8 @@ class Misfit:
             text = (
                 "The model does not explain this motion: after the best fit positions are off by "
                 f"{self.residual_sd:.2g} m where measurement noise is {self.noise_sd:.2g} m (most for object "
-                f"{self.worst}, {self.worst_sd:.2g} m), and neighbouring errors are alike (correlation "
-                f"{self.correlation:.2f})."
+                f"{self.worst}, {self.worst_sd:.2g} m), and neighbouring errors are "
+                f"{'alike' if self.correlation > ALIKE else 'not alike'} (correlation {self.correlation:.2f})."
             )
         else:
             smooth = f"correlation of neighbouring errors {self.correlation:.2f}; most for object {self.worst}"
@@ -155,16 +163,18 @@ def judge(likelihood: Likelihood, point: Float[np.ndarray, "dimension"], clues: 
         Noise and outliers that the tracks show by themselves.
     """
     tracks = likelihood.tracks
-    residuals = tracks.positions - likelihood.fitted(torch.from_numpy(point[None]))[0, :, :, :2]
+    residuals = residuals_of(likelihood, point)
     robust = likelihood.noise is NoiseFamily.STUDENT_T
     if robust:
         residuals = tempered(residuals, clues)
+    stated = 0.0 if tracks.position_covariance is None else likelihood.observations.position_reference
+    noise = max(clues.noise, stated)
+    residuals = residuals * (noise / clues.position_sd[..., None])
     squares = np.nanmean(residuals**2, axis=(0, 2))
     worst = int(np.argmax(squares))
-    stated = 0.0 if tracks.position_covariance is None else likelihood.observations.position_reference
     return Misfit(
         residual_sd=float(np.sqrt(np.nanmean(residuals**2))),
-        noise_sd=max(clues.noise, stated),
+        noise_sd=noise,
         noise_stated=tracks.position_covariance is not None,
         correlation=_neighbour_correlation(residuals),
         worst=tracks.bodies[worst].id,
@@ -189,13 +199,71 @@ def tempered(residuals: Float[np.ndarray, "time body 2"], clues: Clues) -> Float
         Noise and outliers that the tracks show by themselves.
     """
     result = np.where(clues.outliers[..., None], np.nan, residuals)
+    around, reach = _around(result, clues)
+    return np.where(reach[..., None] < 1.0, around + reach[..., None] * (result - around), result)
+
+
+def isolated(
+    residuals: Float[np.ndarray, "time body 2"], clues: Clues, farthest: float = FARTHEST
+) -> Bool[np.ndarray, "time body"]:
+    """Positions that lie farther off the residuals around them than noise does, and are no outliers of the tracks.
+
+    Parameters
+    ----------
+    residuals, clues
+        As those of `tempered`.
+    farthest
+        How far noise reaches, in standard deviations.
+    """
+    reach = _around(np.where(clues.outliers[..., None], np.nan, residuals), clues)[1]
+    return np.asarray(reach < FARTHEST / farthest)
+
+
+def shows_outliers(clues: Clues, likelihood: Likelihood, point: Float[np.ndarray, "dimension"]) -> bool:
+    """Whether what a fit leaves may be outliers that the tracks do not show by themselves, and that drew it along."""
+    return bool(isolated(residuals_of(likelihood, point), clues, SUSPICIOUS).any())
+
+
+def with_outliers(clues: Clues, likelihood: Likelihood, point: Float[np.ndarray, "dimension"]) -> Clues:
+    """The clues with the outliers that only a fit shows, where nothing but these is left unexplained.
+
+    Neighbours predict a position with errors of their own, a fit with hardly any.
+
+    Parameters
+    ----------
+    clues
+        Noise and outliers that the tracks show by themselves.
+    likelihood
+        A density that discounts outliers.
+    point
+        Its fit.
+    """
+    residuals = residuals_of(likelihood, point)
+    found = isolated(residuals, clues, SUSPICIOUS)
+    if not found.any():
+        return clues
+    rest = np.where((clues.outliers | found)[..., None], np.nan, residuals) / clues.position_sd[..., None]
+    explained = np.nanmean(rest**2) <= HARDLY_MORE**2 and _neighbour_correlation(rest) <= ALIKE
+    return replace(clues, outliers=clues.outliers | found) if explained else clues
+
+
+def residuals_of(likelihood: Likelihood, point: Float[np.ndarray, "dimension"]) -> Float[np.ndarray, "time body 2"]:
+    """What was seen less what a fit predicts (m); NaN where nothing was seen."""
+    fitted = likelihood.fitted(torch.from_numpy(point[None]))[0, :, :, :2]
+    return np.asarray(likelihood.tracks.positions - fitted)
+
+
+def _around(
+    residuals: Float[np.ndarray, "time body 2"], clues: Clues
+) -> tuple[Float[np.ndarray, "time body 2"], Float[np.ndarray, "time body"]]:
+    """What is usual around each residual (m), and how far noise reaches from there as a share of what is off."""
+    around, reach = np.full(residuals.shape, np.nan), np.full(residuals.shape[:2], np.inf)
     for body in range(residuals.shape[1]):
-        seen = np.flatnonzero(np.isfinite(result[:, body, 0]))
-        around = median_filter(result[seen, body], size=(NEIGHBOURS, 1), mode="mirror")
-        off = result[seen, body] - around
-        reach = FARTHEST * clues.position_sd[seen, body] / np.maximum(np.linalg.norm(off, axis=-1), TINY)
-        result[seen, body] = np.where(reach[:, None] < 1.0, around + reach[:, None] * off, result[seen, body])
-    return result
+        seen = np.flatnonzero(np.isfinite(residuals[:, body, 0]))
+        around[seen, body] = median_filter(residuals[seen, body], size=(NEIGHBOURS, 1), mode="mirror")
+        off = np.linalg.norm(residuals[seen, body] - around[seen, body], axis=-1)
+        reach[seen, body] = FARTHEST * clues.position_sd[seen, body] / np.maximum(off, TINY)
+    return around, reach
 
 
 def _neighbour_correlation(residuals: Float[np.ndarray, "time body 2"]) -> float:

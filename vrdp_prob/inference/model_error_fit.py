@@ -16,7 +16,7 @@ from scipy.optimize import OptimizeResult, minimize
 
 from vrdp_prob.inference.clues import Clues
 from vrdp_prob.inference.least_squares import jacobian
-from vrdp_prob.inference.misfit import Misfit, tempered
+from vrdp_prob.inference.misfit import Misfit, isolated
 from vrdp_prob.inference.noise_fit import NOISE_FIELDS
 from vrdp_prob.models.likelihood import Likelihood
 from vrdp_prob.models.measurement import jitters
@@ -285,7 +285,7 @@ def _variances(
     draws = torch.from_numpy(point[None])
     position, angle = likelihood.information_shares(draws)
     residuals = likelihood.tracks.positions - likelihood.predicted(draws)[0, :, :, :2]
-    alone = ~(tempered(residuals, clues) == residuals).all(axis=-1)
+    alone = clues.outliers | isolated(residuals, clues)
     alone = alone[likelihood.observations.frame, likelihood.observations.body]
     variance = np.where(alone, np.minimum(1 / position[0], LARGEST_VARIANCE), 1.0)
     return variance, np.minimum(1 / angle[0], LARGEST_VARIANCE)

@@ -1,6 +1,6 @@
 """The posterior of one video: draws with names and units, what they can be trusted for, and worlds made of them."""
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any, TypeVar
@@ -121,9 +121,13 @@ class Posterior:
         """Restitution (product of both factors) of every pair that collides."""
         return tuple(self._pair_summary(pair, RESTITUTION.name, np.multiply) for pair in self.pairs)
 
-    def tells(self, bodies: Iterable[str], name: str) -> bool:
-        """Whether the data say something of the `mass` or the `restitution` of all of some bodies."""
-        return all(getattr(self.status[body], name).status is not Status.DEFAULT for body in bodies)
+    def tells(self, pair: tuple[str, str], name: str) -> bool:
+        """Whether the data tell the ratio of `mass`, or the product of `restitution`, of two bodies that collide."""
+        each = all(getattr(self.status[body], name).status is not Status.DEFAULT for body in pair)
+        combinations = (one for group in self.groups for one in group.combinations)
+        return each and all(
+            one.linked for one in combinations if one.objects == pair and one.quantity.startswith(f"{name}_")
+        )
 
     def to_arviz(self) -> Any:
         """All groups as what the installed ArviZ works with: `InferenceData` before its version 1, else `DataTree`."""

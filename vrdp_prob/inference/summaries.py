@@ -64,7 +64,7 @@ class ObjectSummary:
 class PairSummary:
     """A quantity of two bodies that collided: the mass of the first over that of the second, or their restitution.
 
-    `determined` is False where the data say nothing of one of them.
+    `determined` is False where the data say nothing of one of them, or nothing of both together.
     """
 
     objects: tuple[str, str]

@@ -8,6 +8,8 @@ from vrdp_prob.scene import Tracks
 
 FEWEST = 8
 """Third differences below which nothing is said."""
+WINDOW = 4
+"""Frames of a third difference."""
 CUBIC_NOISE_GAIN = 20.0
 """Variance of a third difference of independent noise of unit variance: 1 + 9 + 9 + 1."""
 NORMAL_MAD = 0.6745
@@ -22,15 +24,25 @@ MOST_DECIMALS = 6
 def noise_scale(tracks: Tracks) -> float:
     """Standard deviation (m) of the positions, from third differences of neighbouring frames (kinks are outvoted).
 
-    A coordinate that an object keeps to the last digit was not measured, and tells nothing; nan where all are so, or
+    Differences are divided ones, to which motion at a constant acceleration adds nothing, however far apart the frames
+    are. Where standard deviations are stated it is that of a position which is stated like the one in the middle. A
+    coordinate that an object keeps to the last digit was not measured, and tells nothing; nan where all are so, or
     frames are too few.
     """
     positions = tracks.positions
-    differences = np.diff(positions, n=3, axis=0)[:, ~_kept(positions)]
-    values = differences[np.isfinite(differences)]
+    count = len(positions) - WINDOW + 1
+    if count < 1:
+        return float("nan")
+    sd, reference = stated_sd(tracks)
+    windows = np.arange(count)[:, None] + np.arange(WINDOW)
+    weights = _third_difference(tracks.times[windows])
+    spread = np.sqrt(np.einsum("wf,wfb->wb", weights**2, sd[windows] ** 2))
+    differences = np.einsum("wf,wfba->wba", weights, positions[windows]) / spread[..., None]
+    told = differences[:, ~_kept(positions)]
+    values = told[np.isfinite(told)]
     if len(values) < FEWEST:
         return float("nan")
-    return float(np.median(np.abs(values)) / NORMAL_MAD / np.sqrt(CUBIC_NOISE_GAIN))
+    return float(reference * np.median(np.abs(values)) / NORMAL_MAD)
 
 
 def untold_noise(tracks: Tracks) -> float | None:
@@ -48,6 +60,25 @@ def untold_noise(tracks: Tracks) -> float | None:
     kept = _kept(tracks.positions)
     moving = ~kept.all(axis=1)
     return noise if moving.any() and kept[moving].any(axis=1).all() else None
+
+
+def _third_difference(times: Float[np.ndarray, "window frame"]) -> Float[np.ndarray, "window frame"]:
+    """Weights of the frames of each window in their third divided difference, up to a factor."""
+    apart = times[:, :, None] - times[:, None, :]
+    apart[:, np.arange(WINDOW), np.arange(WINDOW)] = 1.0
+    weights = 1 / apart.prod(axis=-1)
+    return np.asarray(weights / np.linalg.norm(weights, axis=-1, keepdims=True))
+
+
+def stated_sd(tracks: Tracks) -> tuple[Float[np.ndarray, "time body"], float]:
+    """Standard deviation (m) of each position as it is stated, 1 where it is not, and that of the one in the middle."""
+    covariance = tracks.position_covariance
+    if covariance is None:
+        return np.ones(tracks.seen.shape), 1.0
+    sd = np.sqrt(np.trace(covariance, axis1=-2, axis2=-1) / 2)
+    known = sd[tracks.seen & (sd > 0)]
+    reference = float(np.median(known)) if known.size else 1.0
+    return np.where(sd > 0, sd, reference), reference
 
 
 def _kept(positions: Float[np.ndarray, "time body 2"]) -> Bool[np.ndarray, "body 2"]:

@@ -245,7 +245,7 @@ def _body_row(shown: dict[str, Any], parameter: ParameterSummary, words: str) ->
 
 def _pair_row(pair: PairSummary, objects: dict[str, dict[str, Any]], between: str) -> dict[str, Any]:
     row = _row([objects[body] for body in pair.objects], pair.summary)
-    words = "" if pair.determined else "The data say nothing of one of them."
+    words = "" if pair.determined else "The data say nothing of these two together."
     return {**row, "words": words, "known": pair.determined, "between": between}
 
 

@@ -27,6 +27,7 @@ from vrdp_prob.inference.several_videos import (
     together,
 )
 from vrdp_prob.inference.several_videos.gibbs import sample_gibbs
+from vrdp_prob.inference.several_videos.linking import LinkedVideo
 from vrdp_prob.models.effects.body_friction import BodyFriction
 from vrdp_prob.models.parameters import AIR_DRAG, Prior
 from vrdp_prob.models.physics import PhysicsModel
@@ -309,6 +310,17 @@ def test_bad_input_is_refused_in_one_sentence(arguments: dict[str, object], sent
     given: dict[str, object] = {"videos": [sliding(1)], "model": BASE} | arguments
     with pytest.raises(InputError, match=sentence):
         infer_together(**given)  # type: ignore[arg-type]  # some are wrong on purpose
+
+
+def test_a_video_that_fits_no_world_of_the_others_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    value = LinkedVideo.value
+
+    def impossible(video: LinkedVideo, *point: np.ndarray) -> float:
+        return -np.inf if video.name == "slide 2" else value(video, *point)
+
+    monkeypatch.setattr(LinkedVideo, "value", impossible)
+    with pytest.raises(InputError, match="no common world: slide 2 cannot be simulated"):
+        infer_together([sliding(1), sliding(2)], model=BASE)
 
 
 def test_a_video_without_motion_is_refused_by_name() -> None:

@@ -44,7 +44,10 @@ FINISHED = 3
 
 
 class ImpossibleStartError(Exception):
-    """A search was to begin where the world of some video cannot be simulated, or where it is not worth its while."""
+    """A search was to begin where the world of some video cannot be simulated, or where it is not worth its while.
+
+    Its text names the videos that cannot be simulated.
+    """
 
 
 @dataclass(frozen=True)
@@ -134,7 +137,9 @@ def climb(
         locals_ = in_parallel(lambda index: settle(videos[index], shared, [locals_[index]]), range(len(videos)))
     state, converged = _with_best_noise(numbers, videos, _State.at(videos, shared, locals_)), False
     if not state.total(numbers) > (-np.inf if least is None else least):
-        raise ImpossibleStartError
+        raise ImpossibleStartError(
+            ", ".join(video.name for video, value in zip(videos, state.values, strict=True) if not np.isfinite(value))
+        )
     slopes = _expanded(numbers, videos, state)
     if towards is not None and not np.array_equal(towards, shared):
         settled = _settled(videos, state, slopes.videos)

@@ -229,9 +229,8 @@ def fit_together(
     Raises
     ------
     InputError
-        If there is no video, two have one name, a name is none that videos can share, or a video shows no motion.
-    ImpossibleStartError
-        If some video has no world at what the videos' own fits agree on.
+        If there is no video, two have one name, a name is none that videos can share, a video shows no motion, or one
+        has no world at what the videos' own fits agree on.
     """
     check_videos(videos)
     if shared is not None:
@@ -240,7 +239,13 @@ def fit_together(
     with (progress or SilentProgress()).stage("Fitting each video (MAP)", total=len(videos)) as advance:
         fitted = partial(fit_alone, model=model, seed=seed, plan=plan, model_error=model_error)
         alone = in_processes(fitted, videos, advance=advance)
-        fits, joint = joined(alone, model, shared, seed=seed)
+        try:
+            fits, joint = joined(alone, model, shared, seed=seed)
+        except ImpossibleStartError as error:
+            raise InputError(
+                f"the videos have no common world: {error} cannot be simulated with what all say of the numbers that "
+                "they share; leave it out, or share less."
+            ) from error
     structures = tuple(structure_of(one.likelihood.coordinates) for one in fits)
     names = None if shared is None else tuple(shared)
     found = _finished(joint, model, fits, structures, names, model_error=model_error)

@@ -9,7 +9,7 @@ from jaxtyping import Float
 from vrdp_prob.errors import InputError
 from vrdp_prob.inference.assembly import posterior_from
 from vrdp_prob.inference.diagnostics import Reported, Statistics
-from vrdp_prob.inference.infer import check_counts, default_model
+from vrdp_prob.inference.infer import check_counts, check_model, default_model
 from vrdp_prob.inference.map_fit import MapFit
 from vrdp_prob.inference.mode_weights import doubts
 from vrdp_prob.inference.posterior import Posterior
@@ -77,9 +77,11 @@ def infer_together(
     ------
     InputError
         If there is no video, two have one name, a name is none that videos can share, a video shows no motion, the
-        sampler is unknown, fewer than 4 draws are asked for or the seed is negative.
+        model is none, the sampler is unknown, fewer than 4 draws are asked for, the seed is negative, or the videos
+        have no common world.
     """
     _check(sampler, draws, seed)
+    check_model(model)
     physics = default_model() if model is None else model
     fit = fit_together(videos, model=physics, shared=shared, seed=seed, model_error=model_error, progress=progress)
     return sample_together(fit, sampler=sampler, seed=seed, draws=draws, hand_on=hand_on, progress=progress)

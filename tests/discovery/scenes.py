@@ -25,6 +25,8 @@ class Setting:
         Numbers of videos, bodies in each and frames, and frames per second.
     shapes
         Solids that are drawn from; all of them are there where there are bodies enough.
+    resistance
+        Factor of friction and drag; 0 where bodies glide for ever.
     friction_spread, restitution_spread, mass_spread
         Standard deviation of the logarithm of the bodies' own factors.
     late
@@ -40,6 +42,7 @@ class Setting:
     frames: int = 100
     frame_rate: float = 25.0
     shapes: tuple[Shape, ...] = (Shape.SPHERE, Shape.CYLINDER, Shape.CUBE)
+    resistance: float = 1.0
     friction_spread: float = 0.05
     restitution_spread: float = 0.05
     mass_spread: float = 0.4
@@ -79,10 +82,10 @@ def _draw_bodies(setting: Setting, generator: np.random.Generator) -> Video:
         mass=np.exp(setting.mass_spread * generator.standard_normal(count)),
         radius=generator.uniform(0.15, 0.25, count),
         restitution=np.minimum(restitution, 0.99),
-        friction=np.where(rolling, ROLLING, SLIDING) * own,
+        friction=np.where(rolling, ROLLING, SLIDING) * own * setting.resistance,
         frames=setting.frames,
         frame_rate=setting.frame_rate,
-        laws=Laws(drag=0.03, spin_decay=0.5),
+        laws=Laws(drag=0.03 * setting.resistance, spin_decay=0.5),
         walls=() if setting.arena is None else _square(setting.arena),
     )
 

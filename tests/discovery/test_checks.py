@@ -47,6 +47,13 @@ def test_a_null_leaves_nothing_significant() -> None:
     assert all(np.isfinite([check.p_value, check.statistic]).all() for check in checks)
 
 
+@pytest.mark.parametrize("resistance", [0.0, 0.02])
+def test_a_table_that_hardly_brakes_is_no_misfit(resistance: float) -> None:
+    """Friction and drag are far from what is believed of them beforehand, which is no error of the model."""
+    _, fit = fitted(seed=1, setting=Setting(videos=6, bodies=1, frames=40, resistance=resistance))
+    assert min(check.p_value for check in run_checks(fit, seed=0)) > 0.001
+
+
 def test_the_same_seed_gives_the_same_checks() -> None:
     _, fit = fitted(seed=1)
     assert run_checks(fit, seed=3) == run_checks(fit, seed=3)

@@ -15,7 +15,7 @@ import vrdp_prob
 from tests.concepts.physical.words import UNSURE
 from tests.reasoning.hand_made import STORY, video
 from tests.reasoning.sliding_discs import Disc, KnownPosterior, tracks_of
-from vrdp_prob.discovery import discover
+from vrdp_prob.discovery.discover import discover
 from vrdp_prob.inference import infer_together
 from vrdp_prob.reasoning import ask
 from vrdp_prob.scene import Body, Choice, Question, Shape, Tracks

@@ -239,6 +239,13 @@ class ResidualModel:
         linear = LinearFit(tuple(video.linear for video in videos), prior.gradient, prior.curvature)
         return cls(linear, tuple(videos))
 
+    @property
+    def without_beliefs(self) -> "ResidualModel":
+        """The model of a fit that believes nothing of what videos share, as nothing is wrong with an unusual table."""
+        linear = self.linear
+        nothing = np.zeros_like(linear.prior_gradient), np.zeros_like(linear.prior)
+        return replace(self, linear=LinearFit(linear.videos, *nothing))
+
     def freed(self, columns: Sequence[Float[np.ndarray, "_ _"]]) -> "ResidualModel":
         """The model of a fit that could also absorb further patterns, some in each video."""
         videos = tuple(

@@ -65,7 +65,7 @@ class Outcome:
     def line(self) -> str:
         """The outcome in one line."""
         verdict = "ok" if self.succeeded else f"failed: {self.cause}"
-        ended = "" if self.converged else ", not converged"
+        ended = ("" if self.converged else ", not converged") + ("" if self.agreed else ", searches did not agree")
         return (
             f"seed {self.seed:3d}  {self.seconds:5.1f} s  {self.gain:7.1f} nats  {self.modes} modes  {verdict}{ended}"
         )

@@ -1,6 +1,7 @@
 """The search for what a model lacks."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -33,6 +34,8 @@ from vrdp_prob.progress import ProgressDisplay
 from vrdp_prob.report.wording import listed
 from vrdp_prob.scene import Tracks
 
+MIMIC = 0.5
+"""Probability that a cause only follows something outside the catalogue, where something outside it is at work."""
 EXPLAINED = 0.5
 """Share of what the model left unexplained beyond the noise, and of the checks that failed, that the named causes must
 explain for them to be the verdict where something is left."""
@@ -93,12 +96,7 @@ def discover(
         found = search(fit, looked_for, seed=seed, progress=progress)
         checks = run_checks(found.base.fit, seed=seed)
         after = _checks_after(found, checks, seed)
-        unlisted: Unlisted | None = None
-        laws = laws_of(after)
-        if found.best.causes and laws:
-            found, unlisted = without_mimics(found, laws, seed=seed, progress=progress)
-            if unlisted is not None and unlisted.mimics:
-                after = _checks_after(found, checks, seed)
+        found, after, unlisted = _without_mimics(found, checks, after, seed=seed, progress=progress)
         not_named: list[FoundCause] = []
         reasons: list[Doubt] = []
         while doubted := _doubted(found, after):
@@ -108,8 +106,12 @@ def discover(
                 reasons += [one for some in doubted.values() for one in some]
             found = found.without(list(doubted)) if other is None else other
             after = _checks_after(found, checks, seed)
+            found, after, further = _without_mimics(found, checks, after, seed=seed, progress=progress)
+            unlisted = further or unlisted
         verdict = Verdict.UNKNOWN if unlisted is not None or reasons else _verdict(found, checks, after)
         causes = _in_order([*_causes(found, {}, seed), *not_named])
+        if verdict is Verdict.UNKNOWN:
+            causes = [replace(one, probability=(1 - MIMIC) * one.probability) for one in causes]
         tried = tried_causes(found, {cause.name for cause in causes}, seed=seed)
     return Finding(
         verdict=verdict,
@@ -121,7 +123,7 @@ def discover(
         extended=extended_model(found.best, found.overdispersion),
         videos=tuple(tracks.video for tracks in videos),
         description=describe(found.best.fit, after) if verdict is Verdict.UNKNOWN else None,
-        notes=(*_notes(found, reasons, unlisted), *mass_scale_notes(_told(found, causes), videos)),
+        notes=(*_notes(found, reasons, unlisted, verdict), *mass_scale_notes(_told(found, causes), videos)),
         figures=residual_figures(
             found.base.fit,
             found.best.fit if found.best.causes else None,
@@ -149,6 +151,17 @@ def _catalogue(model: PhysicsModel, catalogue: Sequence[Effect] | None) -> list[
 def _checks_after(found: Search, checks: tuple[Check, ...], seed: int) -> tuple[Check, ...]:
     """The checks of the best model; those of the base model where it has no causes."""
     return run_checks(found.best.fit, seed=seed) if found.best.causes else checks
+
+
+def _without_mimics(
+    found: Search, before: tuple[Check, ...], after: tuple[Check, ...], *, seed: int, progress: ProgressDisplay | None
+) -> tuple[Search, tuple[Check, ...], Unlisted | None]:
+    """A search without the causes that a law of no particular cause explains away, its checks, and what that does."""
+    laws = laws_of(after)
+    if not found.best.causes or not laws:
+        return found, after, None
+    left, unlisted = without_mimics(found, laws, seed=seed, progress=progress)
+    return left, after if left is found else _checks_after(left, before, seed), unlisted
 
 
 def _doubted(found: Search, after: Sequence[Check]) -> dict[Effect, tuple[Doubt, ...]]:
@@ -271,8 +284,13 @@ def _bounds(found: Search) -> list[UpperBound]:
     ]
 
 
-def _notes(found: Search, doubted: Sequence[Doubt], unlisted: Unlisted | None) -> list[str]:
+def _notes(found: Search, doubted: Sequence[Doubt], unlisted: Unlisted | None, verdict: Verdict) -> list[str]:
     notes = []
+    if verdict is Verdict.UNKNOWN and found.best.causes:
+        notes.append(
+            "Something outside the catalogue is at work. What is named follows it as likely as not, and probabilities "
+            "count that."
+        )
     if unlisted is not None:
         notes.append(_unlisted_note(unlisted))
     if not found.best.fit.joint.converged:

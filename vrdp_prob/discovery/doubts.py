@@ -11,13 +11,15 @@ from vrdp_prob.discovery.body_checks import REBOUND, friction_against
 from vrdp_prob.discovery.contact_checks import DISTANCE, KICK, REBOUND_AT_WALLS, RUBBING, RUBBING_AT_WALLS
 from vrdp_prob.discovery.estimates import surprise
 from vrdp_prob.discovery.finding import Check
-from vrdp_prob.discovery.measurement_checks import DISTORTION
+from vrdp_prob.discovery.measurement_checks import DISTORTION, LOST, SINGLE
 from vrdp_prob.discovery.scores import happens_once
 from vrdp_prob.discovery.trials import Trial
+from vrdp_prob.models.effects.clock_error import ClockError
 from vrdp_prob.models.effects.contact_friction import ContactFriction
 from vrdp_prob.models.effects.contact_radius_error import ContactRadiusError
 from vrdp_prob.models.effects.effect import Effect
 from vrdp_prob.models.effects.external_impulse import ExternalImpulse
+from vrdp_prob.models.effects.irregular_frames import IrregularFrames
 from vrdp_prob.models.effects.lens_distortion import LensDistortion
 from vrdp_prob.models.effects.mass_dependent_friction import MassDependentFriction
 from vrdp_prob.models.effects.material_friction import MaterialFriction
@@ -30,6 +32,8 @@ OWN_CHECKS: Mapping[str, tuple[str, ...]] = {
     ContactFriction.name: (RUBBING, RUBBING_AT_WALLS),
     ContactRadiusError.name: (DISTANCE,),
     ExternalImpulse.name: (KICK,),
+    ClockError.name: (LOST,),
+    IrregularFrames.name: (SINGLE,),
     LensDistortion.name: (DISTORTION,),
     MassDependentFriction.name: (friction_against("mass"),),
     MaterialFriction.name: (friction_against("material"),),

@@ -44,7 +44,7 @@ class FitPlan:
     free_first: bool = False
     windows: int | tuple[int, ...] = 8
     alternatives: bool = True
-    attempts: int = 3
+    attempts: int = 5
     yaws: bool = True
 
     def ends(self, tracks: Tracks) -> list[int]:

@@ -9,6 +9,9 @@ import torch
 from vrdp_prob.models.effects.bowl import Bowl
 from vrdp_prob.models.effects.effect import Effect
 from vrdp_prob.models.effects.external_impulse import ExternalImpulse
+from vrdp_prob.models.effects.friction_patch import FrictionPatch
+from vrdp_prob.models.effects.hidden_obstacle import HiddenObstacle
+from vrdp_prob.models.effects.pair_force import PairForce
 from vrdp_prob.models.effects.surface_tilt import SurfaceTilt
 from vrdp_prob.models.effects.time_varying_friction import TimeVaryingFriction
 from vrdp_prob.models.effects.wall import Wall
@@ -25,6 +28,10 @@ LOOKED_FOR = [
 ]
 
 
+SIZES = {"patch_radius", "obstacle_radius", "pair_softening"}
+"""Parameters that are expected to go with the size of the scene; they are stated for one of a half width of 3 m."""
+
+
 def seen(middle: tuple[float, float] = (0.0, 0.0), *, begin: float = 0.0, half_width: float = 1.5) -> Tracks:
     """A body that crosses a square along its diagonal in 4 s."""
     times = begin + np.linspace(0.0, 4.0, 21)
@@ -34,10 +41,33 @@ def seen(middle: tuple[float, float] = (0.0, 0.0), *, begin: float = 0.0, half_w
 
 @pytest.mark.parametrize("effect", LOOKED_FOR, ids=lambda effect: effect.name)
 def test_a_small_scene_around_the_origin_changes_little(effect: Effect) -> None:
-    stated = {parameter.name: parameter for parameter in effect.parameters}
+    stated = {parameter.name: parameter for parameter in effect.parameters if parameter.name not in SIZES}
     for name, parameter in effect.expected([seen(half_width=0.5)]).items():
+        if name not in stated:
+            continue
         assert parameter.prior.mean == pytest.approx(stated[name].prior.mean, abs=0.5 * stated[name].prior.sd)
         assert parameter.prior.sd == pytest.approx(stated[name].prior.sd)
+
+
+@pytest.mark.parametrize("effect", [FrictionPatch(), HiddenObstacle(), PairForce()], ids=lambda effect: effect.name)
+def test_sizes_go_with_the_scene(effect: Effect) -> None:
+    """Ten times smaller, all that is looked for and expected is so, too."""
+    large, small = [seen(half_width=3.0)], [seen(half_width=0.3)]
+    for name, parameter in effect.expected(small).items():
+        if name in SIZES:
+            other = effect.expected(large)[name]
+            assert parameter.default == pytest.approx(0.1 * other.default)
+            assert parameter.prior.mean == pytest.approx(math.log(0.1) + other.prior.mean)
+            assert parameter.prior.sd == other.prior.sd
+            assert abs(other.prior.mean - stated_mean(effect, name)) < 0.1 * other.prior.sd
+    points, others = effect.search_points(small), effect.search_points(large)
+    assert len(points) == len(others)
+    for point, wide in zip(points, others, strict=True):
+        assert point == pytest.approx({name: 0.1 * value for name, value in wide.items()})
+
+
+def stated_mean(effect: Effect, name: str) -> float:
+    return next(one.prior.mean for one in effect.parameters if one.name == name)
 
 
 def test_a_place_moves_with_the_scene_and_is_as_wide_as_it() -> None:

@@ -280,7 +280,7 @@ def _bounds(found: Search) -> list[UpperBound]:
         bound
         for effect in left
         if effect.cause_name() not in named
-        for bound in upper_bounds(effect, scores.get(effect.name))
+        for bound in upper_bounds(effect, scores.get(effect.name), widening=float(np.sqrt(found.overdispersion.mean())))
     ]
 
 

@@ -159,7 +159,7 @@ def _unit(unit: str) -> str:
     return "" if unit == "1" else unit
 
 
-def upper_bounds(effect: Effect, score: CauseScore | None) -> list[UpperBound]:
+def upper_bounds(effect: Effect, score: CauseScore | None, *, widening: float = 1.0) -> list[UpperBound]:
     """How large the strengths of a cause may be (95 %), at the place where most could have hidden.
 
     Parameters
@@ -168,6 +168,8 @@ def upper_bounds(effect: Effect, score: CauseScore | None) -> list[UpperBound]:
         The cause.
     score
         What the residuals say of it; None where they say nothing, or it has no strength (a wall has none).
+    widening
+        Factor by which less is known than the residuals say.
     """
     names = dict.fromkeys([*effect.vanishes_at, *effect.vanishes_like]) or [effect.parameters[0].name]
     units = {parameter.name: parameter.unit for parameter in effect.parameters}
@@ -176,7 +178,7 @@ def upper_bounds(effect: Effect, score: CauseScore | None) -> list[UpperBound]:
         UpperBound(
             effect.cause_name(),
             name,
-            one.bound,
+            None if one.bound is None else widening * one.bound,
             units[name],
             _nothing(effect, name),
             places=one.places,

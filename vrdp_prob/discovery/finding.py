@@ -182,6 +182,8 @@ class Check:
 class UpperBound:
     """The largest strength of a cause that could have hidden (95 %).
 
+    That of a cause that happens once is for the time at which it fits best: just before the end anything could hide.
+
     Parameters
     ----------
     name, parameter

@@ -17,13 +17,14 @@ from vrdp_prob.discovery.scores import CauseScore
 from vrdp_prob.inference.several_videos.fitting import SharedFit
 from vrdp_prob.models.effects.effect import Effect
 from vrdp_prob.models.effects.hidden_obstacle import HiddenObstacle
+from vrdp_prob.models.effects.places import Region
 from vrdp_prob.models.effects.wall import Wall
 from vrdp_prob.models.parameters import RESTITUTION
 
 MOST_KICKS = 3
 """Kicks, the strongest first, from which hidden things are guessed."""
-RADII = (0.12, 0.25)
-"""Radii in m with which a hidden disc is tried."""
+RADII = (0.04, 0.08)
+"""Radii with which a hidden disc is tried, in half widths of the region where bodies were seen."""
 SLOWEST = 0.02
 """Speed in m/s across a surface below which nothing is said of its restitution."""
 EARLY = 0.001
@@ -96,7 +97,7 @@ def _surfaces(fit: SharedFit, kick: _Kick, effect: Effect) -> Iterator[dict[str,
             "hidden_wall_restitution": factor,
         }
         return
-    for size in RADII:
+    for size in (share * Region.of(fit.tracks).half_width for share in RADII):
         x, y = place + (radius + size) * into
         yield {
             "obstacle_x": float(x),

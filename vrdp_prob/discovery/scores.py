@@ -266,8 +266,9 @@ def _one_sided(score: Score, names: Sequence[str], effect: Effect) -> Score:
 
 
 def _starting(effect: Effect, estimate: Mapping[str, float]) -> dict[str, float]:
-    """Where a refit begins: at the estimates, positive where they have to be."""
+    """Where a refit begins: at the estimates, positive where they have to be, and where the motion has a slope."""
     least = {one.name: LEAST_START * one.default for one in effect.parameters if one.transform is Transform.LOG}
+    least |= effect.least_start
     return {name: max(value, least.get(name, value)) for name, value in estimate.items()}
 
 

@@ -87,7 +87,8 @@ class Trial:
         """Log predictive density (nats, up to constants of the tracks) of each video given the others.
 
         What it leaves unexplained is chance as it is most probable. An effect that happens once may have happened to
-        any body of any video, which counts against it.
+        any body of any video, and between any two frames where that is all that is known of its time, which counts
+        against it.
         """
         return self.fitted_density + self.unexplained.gains
 
@@ -184,7 +185,8 @@ class Trial:
             held.append({**structure.held, **absent, **steps})
             own.append(values)
         acting = np.array([min(len(mine), 1) for mine in sites])
-        choices = {**self.choices, effect.name: np.log(max(score.places, 1)) * acting}
+        times = [len(effect.search_points([one])) if effect.stepwise else 1 for one in self.fit.tracks]
+        choices = {**self.choices, effect.name: np.log(max(score.places, 1) * np.array(times)) * acting}
         model = self.fit.extended(effect)
         fit = self.fit.under(model, own=own, held=held, rounds=FIRST_ROUNDS, model_error=False)
         return replace(self, causes=(*self.causes, effect), fit=fit, choices=choices)

@@ -132,6 +132,8 @@ class Effect:
     """Whether its laws read `vrdp_prob.models.parameters.VIDEO_START` beside their parameters."""
     stepwise: ClassVar[frozenset[str]] = frozenset()
     """Parameters on which the motion depends in steps, without a slope: they are found by a scan, and held there."""
+    least_start: ClassVar[Mapping[str, float]] = {}
+    """Values of parameters below which no refit begins, where the motion has no slope beyond."""
 
     @classmethod
     def cause_name(cls) -> str:

@@ -26,11 +26,12 @@ PATCH_FRICTION = Parameter(
 )
 
 
-SEARCH_STEP, SEARCH_RADII = 0.3, (0.3, 0.6)
-"""Distance in m between the places where a patch is looked for, and radii in m that are tried."""
+SEARCH_STEP, SEARCH_RADII = 0.1, (0.1, 0.2)
+"""Distance between the places where a patch is looked for, and radii that are tried, in half widths of the region where
+bodies were seen."""
 
-REACH = 1.0
-"""Standard deviation of each coordinate of its place, in half widths of the region where bodies were seen."""
+REACH, SIZE = 1.0, 0.17
+"""Standard deviation of each coordinate of its place, and its radius, in half widths of that region."""
 
 
 class FrictionPatch(Effect):
@@ -46,17 +47,20 @@ class FrictionPatch(Effect):
     source: ClassVar = "dry friction of two materials"
     parameters: ClassVar = (PATCH_X, PATCH_Y, PATCH_RADIUS, PATCH_FRICTION)
     vanishes_at: ClassVar = {"patch_friction": 0.0}
+    least_start: ClassVar = {"patch_friction": -0.9}
 
     def expected(self, videos: Sequence[Tracks]) -> Mapping[str, Parameter]:
-        """The patch is somewhere where bodies were seen."""
-        return Region.of(videos).expected(PATCH_X, PATCH_Y, REACH)
+        """The patch is somewhere where bodies were seen, and not much larger or smaller than that."""
+        region = Region.of(videos)
+        return region.expected(PATCH_X, PATCH_Y, REACH) | region.expected_size(PATCH_RADIUS, SIZE)
 
     def search_points(self, videos: Sequence[Tracks]) -> Sequence[Mapping[str, float]]:
-        """Places a third of a metre apart wherever bodies were seen, with a small and a large radius."""
+        """Places next to one another wherever bodies were seen, with a small and a large radius."""
+        unit = Region.of(videos).half_width
         return [
-            {"patch_x": x, "patch_y": y, "patch_radius": radius}
+            {"patch_x": x, "patch_y": y, "patch_radius": radius * unit}
             for radius in SEARCH_RADII
-            for x, y in visited(videos, SEARCH_STEP)
+            for x, y in visited(videos, SEARCH_STEP * unit)
         ]
 
     def boundary(self, body: BodyView, parameters: Mapping[str, Scalar]) -> Scalar:

@@ -20,8 +20,9 @@ OBSTACLE_RADIUS = Parameter(
 )
 OBSTACLE_RESTITUTION = restitution_parameter("obstacle_restitution", "restitution factor of the obstacle")
 
-REACH = 1.0
-"""Standard deviation of each coordinate of its place, in half widths of the region where bodies were seen."""
+REACH, SIZE = 1.0, 0.07
+"""Standard deviation of each coordinate of its place, and its radius, in half widths of the region where bodies were
+seen."""
 
 
 class HiddenObstacle(Effect):
@@ -34,8 +35,9 @@ class HiddenObstacle(Effect):
     parameters: ClassVar = (OBSTACLE_X, OBSTACLE_Y, OBSTACLE_RADIUS, OBSTACLE_RESTITUTION)
 
     def expected(self, videos: Sequence[Tracks]) -> Mapping[str, Parameter]:
-        """The obstacle is somewhere where bodies were seen."""
-        return Region.of(videos).expected(OBSTACLE_X, OBSTACLE_Y, REACH)
+        """The obstacle is somewhere where bodies were seen, and small beside that."""
+        region = Region.of(videos)
+        return region.expected(OBSTACLE_X, OBSTACLE_Y, REACH) | region.expected_size(OBSTACLE_RADIUS, SIZE)
 
     def obstacles(self, parameters: Mapping[str, Float[Tensor, "..."]]) -> Sequence[Obstacle]:
         """The disc."""

@@ -5,6 +5,7 @@ from collections.abc import Mapping, Sequence
 from typing import ClassVar
 
 from vrdp_prob.models.effects.effect import BodyView, Effect
+from vrdp_prob.models.effects.places import Region
 from vrdp_prob.models.parameters import Parameter, Prior, Transform
 from vrdp_prob.models.simulator.formula import Scalar
 from vrdp_prob.models.simulator.mathematics import sqrt
@@ -29,8 +30,9 @@ PAIR_SOFTENING = Parameter(
 )
 
 
-SEARCH_SOFTENINGS = (0.05, 0.2, 0.6)
-"""Softening lengths in m with which the force is looked for."""
+SEARCH_SOFTENINGS, SIZE = (0.02, 0.07, 0.2), 0.07
+"""Softening lengths with which the force is looked for, and the expected one, in half widths of the region where
+bodies were seen."""
 
 
 class PairForce(Effect):
@@ -49,9 +51,14 @@ class PairForce(Effect):
     parameters: ClassVar = (PAIR_STRENGTH, PAIR_SOFTENING)
     vanishes_at: ClassVar = {"pair_strength": 0.0}
 
+    def expected(self, videos: Sequence[Tracks]) -> Mapping[str, Parameter]:
+        """The softening length is small beside the region where bodies were seen."""
+        return Region.of(videos).expected_size(PAIR_SOFTENING, SIZE)
+
     def search_points(self, videos: Sequence[Tracks]) -> Sequence[Mapping[str, float]]:
         """With a short and a long range of the softening."""
-        return [{"pair_softening": length} for length in SEARCH_SOFTENINGS]
+        unit = Region.of(videos).half_width
+        return [{"pair_softening": share * unit} for share in SEARCH_SOFTENINGS]
 
     def pair_force(
         self, time: Scalar, first: BodyView, second: BodyView, parameters: Mapping[str, Scalar]

@@ -50,6 +50,11 @@ class Region:
         width = reach * self.half_width
         return {one.name: _moved(one, middle, width) for one, middle in zip((x, y), self.middle, strict=True)}
 
+    def expected_size(self, size: Parameter, share: float) -> dict[str, Parameter]:
+        """A size, believed to be a share of half the width of the region, as far off as is stated."""
+        middle = math.log(share * self.half_width)
+        return {size.name: replace(size, prior=replace(size.prior, mean=middle), default=math.exp(middle))}
+
     def expected_distance(self, distance: Parameter, reach: float) -> dict[str, Parameter]:
         """A distance from the origin to something that lies as far from the middle of the region as is stated.
 

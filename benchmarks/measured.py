@@ -4,7 +4,8 @@
 
 Runs what `vrdp-prob discover FOLDER` runs, on each set of ../shared/data that motion capture has measured: whole runs
 are left out and predicted. Then an effect of known strength is added to the same tracks, so that noise and misfit are
-real and the truth is known. `finding.html` of each run is kept in `--results`, and a run that was interrupted goes on;
+real and the truth is known. `finding.html` of each run is kept in `--results`, and a run that was interrupted goes on
+where it was (its steps are kept there, too; the seconds are then those since);
 delete that folder after a change of the code. `--docs` writes the tables into `measured-data.md` there.
 """
 
@@ -38,16 +39,18 @@ TRUE_PARAMETER = {"surface_tilt": "tilt_x", "linear_drag": "linear_drag", "lens_
 
 @dataclass(frozen=True)
 class Task:
-    """A set of tracks, and what is added to it."""
+    """A set of tracks (the first few videos of it, where a number is given), and what is added to it."""
 
     tracks: str
     way: str | None = None
     strength: float = 0.0
+    first: int | None = None
 
     @property
     def name(self) -> str:
         """A name, also of the folder of its finding."""
-        return self.tracks if self.way is None else f"{self.tracks}+{self.way}-{self.strength:g}"
+        chosen = self.tracks if self.first is None else f"{self.tracks}-first-{self.first}"
+        return chosen if self.way is None else f"{chosen}+{self.way}-{self.strength:g}"
 
 
 TASKS = (
@@ -59,6 +62,9 @@ TASKS = (
     Task(FREE, "lens_distortion", 0.1),
     Task(GLIDERS),
     Task(GLIDERS, "lens_distortion", 0.1),
+    Task(GLIDERS, first=8),
+    Task(PUCKS, first=8),
+    Task(PUCKS, "surface_tilt", 0.003, first=8),
     Task(PUCKS),
     Task(PUCKS, "lens_distortion", 0.2),
 )
@@ -101,11 +107,11 @@ class _Searched:
 
     def __call__(self, task: Task) -> Result:
         torch.set_num_threads(1)
-        videos = load_all(DATA / task.tracks)
+        videos = load_all(DATA / task.tracks)[: task.first]
         if task.way is not None:
             videos = [injected(one, task.way, task.strength) for one in videos]
         begin = time.process_time()
-        finding = discover(videos, seed=0, processes=1)
+        finding = discover(videos, seed=0, processes=1, checkpoint=self.folder / "steps" / task.name)
         seconds = time.process_time() - begin
         write_finding(finding, self.folder / task.name)
         return {"name": task.name, "videos": len(videos), "seconds": seconds, **_summary(finding)}

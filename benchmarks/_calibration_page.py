@@ -108,7 +108,7 @@ def tables(results: Results) -> str:
     parts = [_table(("sampler", *_SUMMARY), [(name, *_summary(found)) for name, found in results.items()])]
     parts += [f"{name}: commit {', '.join(_versions(found))}." for name, found in results.items()]
     for name, found in results.items():
-        for group, chosen in groups(found).items():
+        for group, chosen in {**groups(found), "all": answered(found)}.items():
             kinds = calibrations(chosen)
             if not kinds:
                 parts.append(f"### {name}, {group}: {len(chosen)} scenes")

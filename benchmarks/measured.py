@@ -4,9 +4,9 @@
 
 Runs what `vrdp-prob discover FOLDER` runs, on each set of ../shared/data that motion capture has measured: whole runs
 are left out and predicted. Then an effect of known strength is added to the same tracks, so that noise and misfit are
-real and the truth is known. `finding.html` of each run is kept in `--results`, and a run that was interrupted goes on
-where it was (its steps are kept there, too; the seconds are then those since);
-delete that folder after a change of the code. `--docs` writes the tables into `measured-data.md` there.
+real and the truth is known. `finding.html` of each run is kept in `--results`, as are its steps, so that a run that was
+interrupted goes on (its seconds are then those since); delete that folder after a change of the code. `--docs` writes
+the tables into `measured-data.md` there.
 """
 
 import argparse
@@ -156,7 +156,7 @@ def _recovered(results: Sequence[Result], tasks: Mapping[str, Task]) -> list[str
             continue
         cause = next((one for one in result["causes"] if one["name"] == task.way), None)
         others = [one["name"] for one in result["causes"] if one["named"] and one["name"] != task.way]
-        cells = [f"`{task.tracks}`", f"`{task.way}`", f"{task.strength:g}", result["verdict"]]
+        cells = [f"`{result['name'].partition('+')[0]}`", f"`{task.way}`", f"{task.strength:g}", result["verdict"]]
         if cause is None:
             cells += ["-", "-", "-"]
         else:

@@ -39,8 +39,8 @@ class _Number:
 def linear_errors(scene: PriorScene) -> dict[str, float]:
     """Errors of means in standard deviations, by the names that ranks give them.
 
-    Those of positions and velocities are standard normal to first order over scenes from the prior, however scenes are
-    chosen by their measurement.
+    Those of positions, velocities and mass ratios of pairs that meet are standard normal to first order over scenes
+    from the prior, however scenes are chosen by their measurement.
     """
     numbers = _unknowns(scene)
     values = np.array([one.value for one in numbers])
@@ -58,6 +58,11 @@ def linear_errors(scene: PriorScene) -> dict[str, float]:
         for one, size in zip(numbers, error, strict=True)
         if one.field in ("position", "velocity")
     }
+    masses = {one.place[0]: k for k, one in enumerate(numbers) if one.field == MASS.name}
+    for i, j in {tuple(sorted(map(int, pair))) for pair in scene.pairs}:
+        ratio = np.zeros(len(numbers))
+        ratio[[masses[i], masses[j]]] = 1.0, -1.0
+        found[f"mass {i}/{j}"] = float(ratio @ mean / np.sqrt(ratio @ covariance @ ratio))
     generator = np.random.default_rng(scene.seed)
     draws = generator.multivariate_normal(mean, covariance, DRAWS, method="cholesky")
     return found | {"log likelihood": _log_likelihood_error(noise, slopes @ draws.T, generator)}

@@ -18,12 +18,16 @@ def test_its_errors_are_standard_normal_over_scenes() -> None:
     chosen = [_one_of(scene, "position", "velocity") for scene in _scenes(SCENES)]
     low, high = chi2.ppf([FALSE_ALARM / 2, 1 - FALSE_ALARM / 2], SCENES)
     assert low < np.square(chosen).sum() < high
+    ratios = [_one_of(scene, "mass") for scene in _scenes(SCENES) if len(scene.pairs)]
+    low, high = chi2.ppf([FALSE_ALARM / 2, 1 - FALSE_ALARM / 2], len(ratios))
+    assert len(ratios) > SCENES / 2
+    assert low < np.square(ratios).sum() < high
 
 
 @pytest.mark.slow
 def test_its_squared_errors_are_one_over_many_scenes() -> None:
     scenes = list(_scenes(MANY))
-    for kind in ("position", "velocity", "log likelihood"):
+    for kind in ("position", "velocity", "mass", "log likelihood"):
         squares = np.square([_one_of(scene, kind) for scene in scenes])
         error = squares.std() / np.sqrt(MANY)
         assert abs(squares.mean() - 1) < norm.ppf(1 - FALSE_ALARM / 2) * error, kind

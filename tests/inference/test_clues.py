@@ -24,6 +24,15 @@ def test_a_body_that_drifts_slowly_moves(rate: int, seed: int) -> None:
     assert lone(0.05 * times - 0.003 * times**2, times, seed).moving == {0}
 
 
+@pytest.mark.parametrize("seed", range(60))
+def test_a_body_at_rest_rests_whatever_the_noise(seed: int) -> None:
+    """Also where errors of the camera wander by as much as they scatter."""
+    generator, times = np.random.default_rng(seed), np.arange(125) / 25
+    wander = np.cumsum(generator.normal(0, NOISE / np.sqrt(125), 125))
+    assert lone(0 * times, times, seed).moving == frozenset()
+    assert lone(wander, times, seed).moving == frozenset()
+
+
 @pytest.mark.parametrize("rate", [25, 100])
 @pytest.mark.parametrize("seed", range(5))
 def test_a_body_rests_until_a_push_that_was_not_seen(rate: int, seed: int) -> None:

@@ -170,7 +170,7 @@ def test_a_law_that_depends_on_mass_fixes_the_scale() -> None:
 
 def test_groups_say_which_combinations_are_determined() -> None:
     video, pairs = tracks(5), [(0, 1), (1, 2)]
-    (group,) = collision_groups(video, pairs, information(video, pairs, []))
+    (group,) = collision_groups(video, pairs, [], information(video, pairs, []))
     assert group.bodies == ("0", "1", "2")
     told = {one.name: one for one in group.combinations}
     ratio = told["mass ratio of objects 0 and 1"]
@@ -185,7 +185,7 @@ def test_groups_say_which_combinations_are_determined() -> None:
 def test_a_contact_that_tells_nothing_between_groups_determines_nothing() -> None:
     video, clear, all_of_them = tracks(4), [(0, 1), (2, 3)], [(0, 1), (1, 2), (2, 3)]
     known = information(video, clear, [])
-    (group,) = collision_groups(video, all_of_them, known)
+    (group,) = collision_groups(video, all_of_them, [], known)
     determined = {one.name: one.determined for one in group.combinations}
     assert determined["mass ratio of objects 0 and 1"]
     assert not determined["mass ratio of objects 1 and 2"]
@@ -196,7 +196,7 @@ def test_a_contact_that_tells_nothing_between_groups_determines_nothing() -> Non
 def test_what_a_chain_of_contacts_tells_is_told_of_its_ends(told: list[tuple[int, int]]) -> None:
     """A chain tells all ratios, and products of two that are an odd number of steps apart."""
     video, end = tracks(4), len(told)
-    (group,) = collision_groups(video, [*told, (0, end)], information(video, told, []))
+    (group,) = collision_groups(video, [*told, (0, end)], [], information(video, told, []))
     determined = {one.name: one.determined for one in group.combinations}
     assert determined[f"mass ratio of objects 0 and {end}"]
     assert determined[f"restitution product of objects 0 and {end}"] is (end % 2 == 1)

@@ -12,6 +12,7 @@ from vrdp_prob.models.effects.external_impulse import ExternalImpulse
 from vrdp_prob.models.effects.friction_patch import FrictionPatch
 from vrdp_prob.models.effects.hidden_obstacle import HiddenObstacle
 from vrdp_prob.models.effects.pair_force import PairForce
+from vrdp_prob.models.effects.places import Region
 from vrdp_prob.models.effects.surface_tilt import SurfaceTilt
 from vrdp_prob.models.effects.time_varying_friction import TimeVaryingFriction
 from vrdp_prob.models.effects.wall import Wall
@@ -32,10 +33,12 @@ SIZES = {"patch_radius", "obstacle_radius", "pair_softening"}
 """Parameters that are expected to go with the size of the scene; they are stated for one of a half width of 3 m."""
 
 
-def seen(middle: tuple[float, float] = (0.0, 0.0), *, begin: float = 0.0, half_width: float = 1.5) -> Tracks:
+def seen(
+    middle: tuple[float, float] = (0.0, 0.0), *, begin: float = 0.0, half_width: float = 1.5, frames: int = 801
+) -> Tracks:
     """A body that crosses a square along its diagonal in 4 s."""
-    times = begin + np.linspace(0.0, 4.0, 21)
-    path = np.asarray(middle) + half_width * np.linspace(-1.0, 1.0, 21)[:, None]
+    times = begin + np.linspace(0.0, 4.0, frames)
+    path = np.asarray(middle) + half_width * np.linspace(-1.0, 1.0, frames)[:, None]
     return Tracks.from_arrays("one", (Body("a", Shape.CYLINDER, 0.1),), times, path[:, None])
 
 
@@ -59,11 +62,19 @@ def test_sizes_go_with_the_scene(effect: Effect) -> None:
             assert parameter.default == pytest.approx(0.1 * other.default)
             assert parameter.prior.mean == pytest.approx(math.log(0.1) + other.prior.mean)
             assert parameter.prior.sd == other.prior.sd
-            assert abs(other.prior.mean - stated_mean(effect, name)) < 0.1 * other.prior.sd
+            assert abs(other.prior.mean - stated_mean(effect, name)) < 0.2 * other.prior.sd
     points, others = effect.search_points(small), effect.search_points(large)
     assert len(points) == len(others)
     for point, wide in zip(points, others, strict=True):
         assert point == pytest.approx({name: 0.1 * value for name, value in wide.items()})
+
+
+def test_an_outlier_does_not_make_the_scene_large() -> None:
+    tracks = seen()
+    positions = tracks.positions.copy()
+    positions[7:9] = 100.0
+    spoilt = Tracks.from_arrays("one", tracks.bodies, tracks.times, positions)
+    assert Region.of([spoilt]).half_width == pytest.approx(Region.of([tracks]).half_width)
 
 
 def stated_mean(effect: Effect, name: str) -> float:
@@ -74,7 +85,7 @@ def test_a_place_moves_with_the_scene_and_is_as_wide_as_it() -> None:
     expected = Bowl().expected([seen((6.0, -3.0), half_width=8.0)])
     assert (expected["bowl_x"].prior.mean, expected["bowl_y"].prior.mean) == pytest.approx((6.0, -3.0))
     assert (expected["bowl_x"].default, expected["bowl_y"].default) == pytest.approx((6.0, -3.0))
-    assert expected["bowl_x"].prior.sd == pytest.approx(4.0)
+    assert expected["bowl_x"].prior.sd == pytest.approx(4.0, rel=0.01)
     assert "bowl_stiffness" not in expected
 
 
@@ -100,7 +111,7 @@ def test_a_model_believes_it_and_forgets_it_with_the_effect() -> None:
 
 @pytest.mark.parametrize("begin", [0.0, 1000.0, 1.7e9])
 def test_friction_changes_from_the_first_frame_of_a_video_on(begin: float) -> None:
-    effect, tracks = TimeVaryingFriction(), seen(begin=begin)
+    effect, tracks = TimeVaryingFriction(), seen(begin=begin, frames=21)
     model = PhysicsModel.base().with_effect(effect)
     structure = Structure(moving=frozenset({0}), colliding=frozenset())
     likelihood = Likelihood(tracks, model, unknowns(tracks, model, structure))

@@ -5,7 +5,8 @@ import pytest
 
 from tests.inference.generator import Scene, observe
 from vrdp_prob.inference import infer
-from vrdp_prob.models.roughness import noise_scale, untold_noise
+from vrdp_prob.inference.clues import Clues
+from vrdp_prob.models.roughness import noise_scale, stated_sd, untold_noise
 from vrdp_prob.scene import Body, Shape, Tracks
 
 RADIUS = 0.2
@@ -63,6 +64,19 @@ def test_noise_that_is_stated_differently_for_each_position_is_that_of_the_middl
     told = Tracks.from_arrays("v", body, times, positions[:, None], position_covariance=covariance)
     assert noise_scale(told) == pytest.approx(0.003, rel=0.1)
     assert noise_scale(Tracks.from_arrays("v", body, times, positions[:, None])) > 0.0045
+
+
+@pytest.mark.parametrize("covariance", [np.nan, 0.0])
+def test_a_covariance_that_says_nothing_is_none(covariance: float) -> None:
+    plain = seen(0.003)
+    shape = (*plain.seen.shape, 2, 2)
+    told = Tracks.from_arrays(
+        "v", plain.bodies, plain.times, plain.positions, position_covariance=np.full(shape, covariance)
+    )
+    assert stated_sd(told) is None
+    assert noise_scale(told) == noise_scale(plain)
+    assert Clues.of(told).moving == Clues.of(plain).moving
+    assert Clues.of(told).position_sd == pytest.approx(Clues.of(plain).position_sd)
 
 
 def test_computed_positions_get_a_small_noise() -> None:

@@ -107,8 +107,8 @@ def discover(
             found = found.without(list(doubted)) if other is None else other
             after = _checks_after(found, checks, seed)
             found, after, further = _without_mimics(found, checks, after, seed=seed, progress=progress)
-            unlisted = further or unlisted
-        verdict = Verdict.UNKNOWN if unlisted is not None or reasons else _verdict(found, checks, after)
+            unlisted += further
+        verdict = Verdict.UNKNOWN if unlisted or reasons else _verdict(found, checks, after)
         causes = _in_order([*_causes(found, {}, seed), *not_named])
         if verdict is Verdict.UNKNOWN:
             causes = [replace(one, probability=(1 - MIMIC) * one.probability) for one in causes]
@@ -123,7 +123,10 @@ def discover(
         extended=extended_model(found.best, found.overdispersion),
         videos=tuple(tracks.video for tracks in videos),
         description=describe(found.best.fit, after) if verdict is Verdict.UNKNOWN else None,
-        notes=(*_notes(found, reasons, unlisted, verdict), *mass_scale_notes(_told(found, causes), videos)),
+        notes=(
+            *_notes(found, reasons, unlisted, doubtful=verdict is Verdict.UNKNOWN and bool(causes)),
+            *mass_scale_notes(_told(found, causes), videos),
+        ),
         figures=residual_figures(
             found.base.fit,
             found.best.fit if found.best.causes else None,
@@ -155,13 +158,14 @@ def _checks_after(found: Search, checks: tuple[Check, ...], seed: int) -> tuple[
 
 def _without_mimics(
     found: Search, before: tuple[Check, ...], after: tuple[Check, ...], *, seed: int, progress: ProgressDisplay | None
-) -> tuple[Search, tuple[Check, ...], Unlisted | None]:
+) -> tuple[Search, tuple[Check, ...], tuple[Unlisted, ...]]:
     """A search without the causes that a law of no particular cause explains away, its checks, and what that does."""
     laws = laws_of(after)
     if not found.best.causes or not laws:
-        return found, after, None
+        return found, after, ()
     left, unlisted = without_mimics(found, laws, seed=seed, progress=progress)
-    return left, after if left is found else _checks_after(left, before, seed), unlisted
+    told = () if unlisted is None else (unlisted,)
+    return left, after if left is found else _checks_after(left, before, seed), told
 
 
 def _doubted(found: Search, after: Sequence[Check]) -> dict[Effect, tuple[Doubt, ...]]:
@@ -284,15 +288,14 @@ def _bounds(found: Search) -> list[UpperBound]:
     ]
 
 
-def _notes(found: Search, doubted: Sequence[Doubt], unlisted: Unlisted | None, verdict: Verdict) -> list[str]:
+def _notes(found: Search, doubted: Sequence[Doubt], unlisted: Sequence[Unlisted], *, doubtful: bool) -> list[str]:
     notes = []
-    if verdict is Verdict.UNKNOWN and found.best.causes:
+    if doubtful:
         notes.append(
-            "Something outside the catalogue is at work. What is named follows it as likely as not, and probabilities "
-            "count that."
+            "Something outside the catalogue is at work. Causes may only follow it, as likely as not, which their "
+            "probabilities count."
         )
-    if unlisted is not None:
-        notes.append(_unlisted_note(unlisted))
+    notes += [_unlisted_note(one) for one in unlisted]
     if not found.best.fit.joint.converged:
         notes.append(
             "The joint fit ended before it had converged: some video is at the edge between two courses of events."

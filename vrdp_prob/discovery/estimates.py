@@ -169,7 +169,7 @@ def upper_bounds(effect: Effect, score: CauseScore | None, *, widening: float = 
     score
         What the residuals say of it; None where they say nothing, or it has no strength (a wall has none).
     widening
-        Factor by which less is known than the residuals say.
+        Factor by which standard deviations are larger than the residuals say.
     """
     names = dict.fromkeys([*effect.vanishes_at, *effect.vanishes_like]) or [effect.parameters[0].name]
     units = {parameter.name: parameter.unit for parameter in effect.parameters}
@@ -178,7 +178,7 @@ def upper_bounds(effect: Effect, score: CauseScore | None, *, widening: float = 
         UpperBound(
             effect.cause_name(),
             name,
-            None if one.bound is None else widening * one.bound,
+            one.widened(widening),
             units[name],
             _nothing(effect, name),
             places=one.places,

@@ -69,11 +69,18 @@ class Largest:
         anything; None where none does.
     places, told
         Number of places, and of those that tell anything.
+    spread
+        The part of the bound that is due to the standard deviation.
     """
 
     bound: float | None
     places: int
     told: int
+    spread: float = 0.0
+
+    def widened(self, factor: float) -> float | None:
+        """The bound where the standard deviation is larger by a factor than the residuals say."""
+        return None if self.bound is None else self.bound + (factor - 1) * self.spread
 
 
 @dataclass(frozen=True)
@@ -207,8 +214,10 @@ def _largest(places: Sequence[Iterable[tuple[str, float, float]]], effect: Effec
         seen = [row for row in rows if row[2] > 0]
         enough = max(expected[name], min((sd for *_, sd in seen), default=0.0))
         told = [row for row in seen if row[2] <= enough]
-        bound = max((abs(estimate) + ONE_SIDED * sd for _, estimate, sd in told), default=None)
-        largest[name] = Largest(bound, len({row[0] for row in rows}), len({row[0] for row in told}))
+        bound, spread = max(
+            ((abs(estimate) + ONE_SIDED * sd, ONE_SIDED * sd) for _, estimate, sd in told), default=(None, 0.0)
+        )
+        largest[name] = Largest(bound, len({row[0] for row in rows}), len({row[0] for row in told}), spread)
     return largest
 
 

@@ -63,7 +63,8 @@ def posterior_from(
     information = Information(fit.likelihood.coordinates, fit.modes[0])
     told = _telling(fit)
     felt = felt_masses(fit.likelihood.model, structure_of(fit.likelihood.coordinates).moving)
-    status = identifiability(tracks, told, wall_contacts(fit.rollout, 0), information, felt)
+    walls = wall_contacts(fit.rollout, 0)
+    status = identifiability(tracks, told, walls, information, felt)
     changed = _changed_order(fit, samples.points)
     convergence = replace(convergence, collision_order_changes=float(changed.mean()))
     names = [body.id for body in tracks.bodies]
@@ -79,7 +80,7 @@ def posterior_from(
         convergence=convergence,
         warnings=tuple(_warnings(fit, convergence, status, drawn=draw_defaults)),
         pairs=tuple((names[i], names[j]) for i, j in fit.contacts),
-        groups=collision_groups(tracks, told, information),
+        groups=collision_groups(tracks, told, walls, information),
         misfit=fit.misfit,
     )
 

@@ -22,7 +22,7 @@ from vrdp_prob.models.roughness import noise_scale, stated_sd, untold_noise
 from vrdp_prob.scene import Tracks
 
 SIGNIFICANT = 5.0
-"""A body moves if its speed is so many standard deviations."""
+"""A body moves if its speed, or its way, is so many standard deviations."""
 REST_TEST = 3.0
 """A body rests until its first contact if its scatter about one place exceeds the noise by less than so many sd."""
 REST_LOOK = 0.6
@@ -134,25 +134,33 @@ class Clues:
         if self._stays(body, times < contact):
             return True
         look = start + REST_LOOK
-        return self._stays(body, times < look) and (contact <= look or self._sets_off(body, look, contact))
+        return self._stays(body, times < look) and (contact <= look or not self._drifts(body, look, contact))
 
-    def _sets_off(self, body: int, earliest: float, until: float) -> bool:
-        """Whether rest and then motion explain the positions of a body better than motion from its release does.
+    def _drifts(self, body: int, look: float, until: float) -> bool:
+        """Whether a body is seen to move from its release on, though it stays within the noise for a while.
 
-        A slow body may stay within the noise for a while, and is seen to drift in all the time there is.
+        It goes far beyond the noise, and no rest with a push after that while explains its positions better: a push
+        that was not seen as a contact is one, too.
         """
         chosen = (self.tracks.times < until) & self.clean.seen[:, body]
         times, sd = self.tracks.times[chosen], self.position_sd[chosen, body, None]
         places = self.clean.positions[chosen, body] / sd
-        starts = times[times >= earliest]
-        starts = starts[np.unique(np.linspace(0, len(starts) - 1, MOST_STARTS).astype(int))] if len(starts) else starts
+        pushes = times[times >= look]
+        if not len(pushes):
+            return False
+        pushes = pushes[np.unique(np.linspace(0, len(pushes) - 1, MOST_STARTS).astype(int))]
 
-        def left(start: float) -> float:
-            moved = np.maximum(times - start, 0.0)
-            law = np.stack([np.ones_like(moved), moved, moved**2], axis=1) / sd
-            return float(((places - law @ np.linalg.lstsq(law, places, rcond=None)[0]) ** 2).sum())
+        def moved(start: float) -> tuple[float, float]:
+            """Squares that a motion from some time on leaves, in units of the noise, and how far (m) it leads."""
+            since = np.maximum(times - start, 0.0)
+            law = np.stack([np.ones_like(since), since, since**2], axis=1)
+            found = np.linalg.lstsq(law / sd, places, rcond=None)[0]
+            way = law[:, 1:] @ found[1:]
+            return float(((places - law / sd @ found) ** 2).sum()), float(np.linalg.norm(np.ptp(way, axis=0)))
 
-        return min(map(left, starts.tolist()), default=np.inf) < left(float(times[0])) - REST_TEST**2
+        drift, way = moved(float(times[0]))
+        pushed = min(moved(start)[0] for start in pushes.tolist())
+        return way > SIGNIFICANT * float(np.median(sd)) and pushed >= drift - REST_TEST**2
 
     def _stays(self, body: int, chosen: Bool[np.ndarray, "time"]) -> bool:
         """Whether positions and angles in some frames scatter about one value, and are enough to tell."""
@@ -173,8 +181,10 @@ def _position_sd(tracks: Tracks, noise: float) -> Float[np.ndarray, "time body"]
 
     Errors that last look like motion, and make no roughness.
     """
-    stated, reference = stated_sd(tracks)
-    return stated * (noise / reference if tracks.position_covariance is None else max(noise / reference, 1.0))
+    if (stated := stated_sd(tracks)) is None:
+        return np.full(tracks.seen.shape, noise)
+    sd, reference = stated
+    return sd * max(noise / reference, 1.0)
 
 
 def _roughness(tracks: Tracks) -> float:

@@ -145,10 +145,10 @@ def identifiability(
 
 
 def collision_groups(
-    tracks: Tracks, pairs: Sequence[tuple[int, int]], information: Information
+    tracks: Tracks, pairs: Sequence[tuple[int, int]], walls: Pairs, information: Information
 ) -> tuple[CollisionGroup, ...]:
-    """Which combinations of masses and restitutions the data determine, group by group."""
-    contacts, _ = _graphs(tracks, pairs, ())
+    """Which combinations of masses and restitutions the data determine, group by group; arguments as above."""
+    contacts, with_walls = _graphs(tracks, pairs, walls)
     masses, restitutions = _Unknowns.masses(tracks, information), _Unknowns.restitutions(tracks, information)
     names = [body.id for body in tracks.bodies]
     groups, left = [], [name for name in names if contacts[name]]
@@ -160,11 +160,11 @@ def collision_groups(
             ratio = {(MASS.name, first): 1.0, (MASS.name, second): -1.0}
             product = {(RESTITUTION.name, first): 1.0, (RESTITUTION.name, second): 1.0}
             both = (names[first], names[second])
-            for quantity, weights, unknowns in (
-                ("mass_ratio", ratio, masses),
-                ("restitution_product", product, restitutions),
+            for quantity, weights, unknowns, graph in (
+                ("mass_ratio", ratio, masses, contacts),
+                ("restitution_product", product, restitutions, with_walls),
             ):
-                linked = unknowns.told_together(*both, contacts)
+                linked = unknowns.told_together(*both, graph)
                 found.append(replace(_combination(quantity, both, weights, information), linked=linked))
         scale = {(MASS.name, names.index(name)): 1 / len(members) for name in members}
         found.append(_combination("mass_scale", tuple(members), scale, information))

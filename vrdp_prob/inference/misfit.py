@@ -8,7 +8,7 @@ from jaxtyping import Bool, Float
 from scipy.ndimage import median_filter
 
 from vrdp_prob.inference.clues import Clues
-from vrdp_prob.inference.outliers import FARTHEST
+from vrdp_prob.inference.outliers import FARTHEST, FEWEST_LEFT
 from vrdp_prob.models.likelihood import Likelihood
 from vrdp_prob.models.model_error import ModelError
 from vrdp_prob.models.noise import NoiseFamily
@@ -49,7 +49,7 @@ class Misfit:
     worst
         Id of the body with the largest residuals, and `worst_sd` their standard deviation in m.
     outliers
-        Number of positions that lie far off those before and after.
+        Number of positions that lie far off those before and after, or off what the fit leaves of these.
     outliers_count
         Whether they count in full, since the noise is not Student-t.
     error_acceleration, error_duration
@@ -105,7 +105,7 @@ class Misfit:
                 taken = "Gaussian and larger there, which discounts them"
             else:
                 taken = "Student-t, which discounts them"
-            found += (f"{positions} far off those before and after; the noise is taken as {taken}.",)
+            found += (f"{positions} far off the motion around them; the noise is taken as {taken}.",)
         elif self.error_acceleration is not None and not self.outliers_count:
             found += (
                 "Beside an unknown acceleration the noise is taken as Gaussian, not Student-t as was asked for; only "
@@ -244,6 +244,7 @@ def with_outliers(clues: Clues, likelihood: Likelihood, point: Float[np.ndarray,
         return clues
     rest = np.where((clues.outliers | found)[..., None], np.nan, residuals) / clues.position_sd[..., None]
     explained = np.nanmean(rest**2) <= HARDLY_MORE**2 and _neighbour_correlation(rest) <= ALIKE
+    explained &= bool((np.isfinite(rest[..., 0]).sum(axis=0) >= FEWEST_LEFT).all())
     return replace(clues, outliers=clues.outliers | found) if explained else clues
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 from jaxtyping import Bool, Float
 
-from vrdp_prob.models.observation import prior_noise
+from vrdp_prob.models.observation import SMALLEST_SHARE, prior_noise
 from vrdp_prob.scene import Tracks
 
 FEWEST = 8
@@ -33,7 +33,7 @@ def noise_scale(tracks: Tracks) -> float:
     count = len(positions) - WINDOW + 1
     if count < 1:
         return float("nan")
-    sd, reference = stated_sd(tracks)
+    sd, reference = stated_sd(tracks) or (np.ones(tracks.seen.shape), 1.0)
     windows = np.arange(count)[:, None] + np.arange(WINDOW)
     weights = _third_difference(tracks.times[windows])
     spread = np.sqrt(np.einsum("wf,wfb->wb", weights**2, sd[windows] ** 2))
@@ -70,15 +70,21 @@ def _third_difference(times: Float[np.ndarray, "window frame"]) -> Float[np.ndar
     return np.asarray(weights / np.linalg.norm(weights, axis=-1, keepdims=True))
 
 
-def stated_sd(tracks: Tracks) -> tuple[Float[np.ndarray, "time body"], float]:
-    """Standard deviation (m) of each position as it is stated, 1 where it is not, and that of the one in the middle."""
+def stated_sd(tracks: Tracks) -> tuple[Float[np.ndarray, "time body"], float] | None:
+    """Standard deviations (m) of positions as they are stated, and that of the one in the middle; None where none is.
+
+    A position without a statement is like the one in the middle; none is believed to be far more exact than that.
+    """
     covariance = tracks.position_covariance
     if covariance is None:
-        return np.ones(tracks.seen.shape), 1.0
-    sd = np.sqrt(np.trace(covariance, axis1=-2, axis2=-1) / 2)
-    known = sd[tracks.seen & (sd > 0)]
-    reference = float(np.median(known)) if known.size else 1.0
-    return np.where(sd > 0, sd, reference), reference
+        return None
+    variance = np.trace(covariance, axis1=-2, axis2=-1) / 2
+    known = np.isfinite(variance) & (variance > 0)
+    if not (known & tracks.seen).any():
+        return None
+    reference = float(np.sqrt(np.median(variance[known & tracks.seen])))
+    sd = np.sqrt(np.where(known, variance, reference**2))
+    return np.maximum(sd, SMALLEST_SHARE * reference), reference
 
 
 def _kept(positions: Float[np.ndarray, "time body 2"]) -> Bool[np.ndarray, "body 2"]:

@@ -13,6 +13,7 @@ import torch
 from jaxtyping import Bool, Float
 from scipy.optimize import minimize
 
+from vrdp_prob.errors import InputError
 from vrdp_prob.inference.noise_fit import NOISE_FIELDS, best_noise
 from vrdp_prob.inference.parallel import in_parallel
 from vrdp_prob.inference.several_videos.arrow import Expansion, Expansions
@@ -48,6 +49,10 @@ class ImpossibleStartError(Exception):
 
     Its text names the videos that cannot be simulated.
     """
+
+
+class NoCommonWorldError(ImpossibleStartError, InputError):
+    """Some video has no world at what all of them say of the numbers that they share."""
 
 
 @dataclass(frozen=True)
@@ -137,9 +142,8 @@ def climb(
         locals_ = in_parallel(lambda index: settle(videos[index], shared, [locals_[index]]), range(len(videos)))
     state, converged = _with_best_noise(numbers, videos, _State.at(videos, shared, locals_)), False
     if not state.total(numbers) > (-np.inf if least is None else least):
-        raise ImpossibleStartError(
-            ", ".join(video.name for video, value in zip(videos, state.values, strict=True) if not np.isfinite(value))
-        )
+        values = zip(videos, state.values, strict=True)
+        raise ImpossibleStartError(", ".join(video.name for video, value in values if not np.isfinite(value)))
     slopes = _expanded(numbers, videos, state)
     if towards is not None and not np.array_equal(towards, shared):
         settled = _settled(videos, state, slopes.videos)

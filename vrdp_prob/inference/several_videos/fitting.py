@@ -17,7 +17,7 @@ from vrdp_prob.inference.model_error_fit import TURNS, next_model_error
 from vrdp_prob.inference.parallel import in_processes
 from vrdp_prob.inference.plan import IN_DOUBT, FitPlan
 from vrdp_prob.inference.several_videos.agreement import following_ones
-from vrdp_prob.inference.several_videos.ascent import ROUNDS, ImpossibleStartError, climb
+from vrdp_prob.inference.several_videos.ascent import ROUNDS, ImpossibleStartError, NoCommonWorldError, climb
 from vrdp_prob.inference.several_videos.joining import joined
 from vrdp_prob.inference.several_videos.joint_fit import JointFit, with_alternatives
 from vrdp_prob.inference.several_videos.linking import check_names, link
@@ -229,8 +229,9 @@ def fit_together(
     Raises
     ------
     InputError
-        If there is no video, two have one name, a name is none that videos can share, a video shows no motion, or one
-        has no world at what the videos' own fits agree on.
+        If there is no video, two have one name, a name is none that videos can share, or a video shows no motion.
+    NoCommonWorldError
+        If some video has no world at what the videos' own fits agree on; that is an `InputError`, too.
     """
     check_videos(videos)
     if shared is not None:
@@ -242,9 +243,9 @@ def fit_together(
         try:
             fits, joint = joined(alone, model, shared, seed=seed)
         except ImpossibleStartError as error:
-            raise InputError(
-                f"the videos have no common world: {error} cannot be simulated with what all say of the numbers that "
-                "they share; leave it out, or share less."
+            raise NoCommonWorldError(
+                f"the videos have no common world: {str(error) or 'one of them'} cannot be simulated with what all say "
+                "of the numbers that they share; leave it out, or share less."
             ) from error
     structures = tuple(structure_of(one.likelihood.coordinates) for one in fits)
     names = None if shared is None else tuple(shared)

@@ -23,7 +23,8 @@ def stream(seed: int, video: str) -> np.random.Generator:
 
 def fit_alone(tracks: Tracks, model: PhysicsModel, *, seed: int, plan: FitPlan, model_error: bool = False) -> MapFit:
     """The fit of one of several videos by itself, with its own randomness."""
-    return fit_map(tracks, model, stream(seed, tracks.video), plan=plan, model_error=model_error)
+    family = Clues.of(tracks).noise_family  # not by the fit: fits of a video are compared, so they believe in one noise
+    return fit_map(tracks, model, stream(seed, tracks.video), noise=family, plan=plan, model_error=model_error)
 
 
 def carried_starts(fits: Sequence[MapFit], videos: Sequence[LinkedVideo]) -> list[Float[np.ndarray, "_ _"]]:

@@ -7,12 +7,17 @@ from itertools import product
 
 import numpy as np
 from jaxtyping import Float
+from scipy.ndimage import median_filter
 
 from vrdp_prob.models.parameters import Parameter
 from vrdp_prob.scene import Tracks
 
 REACH_IN_TIME = 0.6
 """Standard deviation of the time of an event, in halves of the time in which something was seen."""
+
+
+AROUND = 5
+"""Positions in a row whose middle is where a body was."""
 
 
 @dataclass(frozen=True)
@@ -98,12 +103,17 @@ def places_around(videos: Sequence[Tracks], shares: Sequence[float]) -> list[tup
 
 def visited(videos: Sequence[Tracks], step: float) -> list[tuple[float, float]]:
     """Points of a square grid, `step` m apart, near which a body was seen."""
-    seen = np.concatenate([one.positions[one.seen] for one in videos])
-    cells = np.unique(np.round(seen / step).astype(int), axis=0)
+    cells = np.unique(np.round(_paths(videos) / step).astype(int), axis=0)
     return [(float(x * step), float(y * step)) for x, y in cells]
 
 
 def _bounds(videos: Sequence[Tracks]) -> tuple[Float[np.ndarray, "2"], Float[np.ndarray, "2"]]:
     """Smallest and largest coordinates in m at which a body was seen."""
-    seen = np.concatenate([one.positions[one.seen] for one in videos])
-    return seen.min(axis=0), seen.max(axis=0)
+    paths = _paths(videos)
+    return paths.min(axis=0), paths.max(axis=0)
+
+
+def _paths(videos: Sequence[Tracks]) -> Float[np.ndarray, "place 2"]:
+    """Where bodies were seen in m, each place that in the middle of those around it, so that no outlier counts."""
+    seen = [tracks.positions[tracks.seen[:, body], body] for tracks in videos for body in range(len(tracks.bodies))]
+    return np.concatenate([median_filter(path, size=(AROUND, 1), mode="mirror") for path in seen if len(path)])

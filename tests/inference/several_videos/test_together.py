@@ -16,6 +16,7 @@ from vrdp_prob.errors import InputError
 from vrdp_prob.inference import Posterior
 from vrdp_prob.inference.diagnostics import Reported, chain_statistics
 from vrdp_prob.inference.mode_search import ModeSearch
+from vrdp_prob.inference.samples import Gaussian, evaluate, evaluate_with_gradient
 from vrdp_prob.inference.several_videos import (
     SharedFit,
     SharedPosterior,
@@ -28,6 +29,7 @@ from vrdp_prob.inference.several_videos import (
 )
 from vrdp_prob.inference.several_videos.gibbs import sample_gibbs
 from vrdp_prob.inference.several_videos.linking import LinkedVideo
+from vrdp_prob.inference.several_videos.whole_vector import WholeVector
 from vrdp_prob.models.effects.body_friction import BodyFriction
 from vrdp_prob.models.parameters import AIR_DRAG, Prior
 from vrdp_prob.models.physics import PhysicsModel
@@ -101,6 +103,36 @@ def test_both_samplers_agree_with_plain_emcee_on_the_whole_vector() -> None:
             error = sd * np.sqrt(lasting[place] / plain[..., 0].size) + standard_error(ours)
             assert abs(plain[..., place].mean() - ours.mean()) < 4 * error
             assert ours.std() == pytest.approx(sd, rel=0.12)
+
+
+def test_the_whole_vector_has_the_density_of_its_videos_and_its_slope() -> None:
+    fit = two()
+    vector = WholeVector.of(fit.joint)
+    whitened = 0.3 * np.random.default_rng(0).standard_normal((20, fit.joint.gaussian.dimension))
+    cloud = Gaussian.from_precision(vector.mode(fit.joint).point, vector.mode(fit.joint).precision)
+    points = cloud.mean + whitened @ cloud.root.T
+    assert evaluate(vector, points) == pytest.approx(joint_density(fit, whitened), abs=1e-8)
+    along = 1e-5 * cloud.root.T
+    _, slopes = evaluate_with_gradient(vector, points[:1])
+    changes = (evaluate(vector, points[0] + along) - evaluate(vector, points[0] - along)) / 2
+    assert changes == pytest.approx(along @ slopes[0], rel=1e-3, abs=1e-7)
+
+
+@pytest.mark.parametrize("sampler", ["emcee", pytest.param("nuts", marks=pytest.mark.slow)])
+def test_samplers_of_one_video_agree_with_gibbs_on_two(sampler: str) -> None:
+    fit = fit_together([sliding(1), sliding(2)], model=BASE)
+    ours, theirs = (sample_together(fit, sampler=name, draws=800) for name in (sampler, "gibbs"))
+    assert ours.convergence.converged, ours.convergence.sentence
+    for place in range(len(fit.joint.numbers)):
+        first, second = ours.points[..., place], theirs.points[..., place]
+        error = np.hypot(standard_error(first), standard_error(second))
+        assert abs(first.mean() - second.mean()) < 4.5 * error
+        assert first.std() == pytest.approx(second.std(), rel=0.25)
+    video = ours.video("slide 1")
+    np.testing.assert_allclose(
+        video.data["posterior"]["sliding_friction"].values, ours.shared["sliding_friction"].values
+    )
+    assert video.convergence.sampler == sampler
 
 
 def standard_error(draws: np.ndarray) -> float:
@@ -301,7 +333,7 @@ def test_a_video_that_the_model_does_not_explain_is_named() -> None:
         ({"videos": [sliding(1), sliding(1)]}, "2 videos have the name 'slide 1'"),
         ({"shared": ["wind"]}, "videos cannot share 'wind' under the model base"),
         ({"shared": ["mass"]}, "videos cannot share 'mass'"),
-        ({"sampler": "nuts"}, "sampler 'nuts' is not known for several videos"),
+        ({"sampler": "metropolis"}, "sampler 'metropolis' is not known for several videos"),
         ({"draws": 2}, "draws is 2"),
         ({"seed": -1}, "seed is -1"),
     ],

@@ -12,6 +12,7 @@ from functools import cached_property
 import numpy as np
 import torch
 from jaxtyping import Bool, Float, Int
+from torch import Tensor
 
 from vrdp_prob.errors import InputError
 from vrdp_prob.inference.noise_fit import NOISE_FIELDS
@@ -78,10 +79,19 @@ class SharedNumbers:
         """Mean of the Gaussian prior."""
         return self._prior.prior_mean
 
+    @cached_property
+    def prior_sd(self) -> Float[np.ndarray, "shared"]:
+        """Standard deviation of the Gaussian prior."""
+        return self._prior.prior_sd
+
     def log_prior(self, shared: Float[np.ndarray, "point shared"]) -> Float[np.ndarray, "point"]:
         """Log prior up to a constant."""
-        values: np.ndarray = self._prior.log_prior(torch.from_numpy(np.ascontiguousarray(shared))).sum(dim=1).numpy()
+        values: np.ndarray = self.log_density(torch.from_numpy(np.ascontiguousarray(shared))).numpy()
         return values
+
+    def log_density(self, shared: Float[Tensor, "point shared"]) -> Float[Tensor, "point"]:
+        """The same, differentiable."""
+        return self._prior.log_prior(shared).sum(dim=1)
 
     def prior_residuals(self, shared: Float[np.ndarray, "point shared"]) -> Float[np.ndarray, "point residual"]:
         """Numbers whose half sum of squares is the negative log prior."""

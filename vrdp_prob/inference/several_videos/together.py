@@ -1,7 +1,8 @@
 """From the tracks of several videos to one posterior: the joint fit first, then draws of everything together."""
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float
@@ -9,22 +10,32 @@ from jaxtyping import Float
 from vrdp_prob.errors import InputError
 from vrdp_prob.inference.assembly import posterior_from
 from vrdp_prob.inference.diagnostics import Reported, Statistics
+from vrdp_prob.inference.emcee_sampler import sample_emcee
 from vrdp_prob.inference.infer import check_counts, check_model, default_model
 from vrdp_prob.inference.map_fit import MapFit
 from vrdp_prob.inference.mode_weights import doubts
+from vrdp_prob.inference.nuts_sampler import sample_nuts
 from vrdp_prob.inference.posterior import Posterior
+from vrdp_prob.inference.proposals import proposals
+from vrdp_prob.inference.rate_steps import RateSteps
 from vrdp_prob.inference.samples import ESS_GOAL, PARETO_K_GOAL, Convergence, ModeWeight, Samples, assess
 from vrdp_prob.inference.several_videos.fitting import SharedFit, fit_together
 from vrdp_prob.inference.several_videos.gibbs import sample_gibbs
 from vrdp_prob.inference.several_videos.importance import sample_by_importance
+from vrdp_prob.inference.several_videos.linking import LinkedVideo
 from vrdp_prob.inference.several_videos.parts import stream
 from vrdp_prob.inference.several_videos.posterior import SharedPosterior, VideoPosteriors
+from vrdp_prob.inference.several_videos.whole_vector import WholeVector
 from vrdp_prob.inference.yaw_search import unseen_yaws
 from vrdp_prob.models.physics import PhysicsModel
 from vrdp_prob.progress import ProgressDisplay
 from vrdp_prob.scene import Tracks
 
-SAMPLERS = ("gibbs", "laplace")
+WHOLE: Mapping[str, Callable[..., Samples]] = {"emcee": sample_emcee, "nuts": sample_nuts}
+"""Samplers of the vector of all numbers."""
+WORK_LIMIT = 40_000_000
+"""Work for each video after which they stop (see `work.py` of the simulator)."""
+SAMPLERS = ("gibbs", "laplace", *WHOLE)
 
 
 @dataclass(frozen=True)
@@ -60,8 +71,8 @@ def infer_together(
     model
         The physics; `default_model()` where None.
     sampler
-        `gibbs` (chains that move the shared numbers and each video's own in turn) or `laplace` (fast: the Gaussian of
-        the joint fit, corrected by importance sampling).
+        `gibbs` (chains that move the shared numbers and each video's own in turn), `laplace` (fast: the Gaussian of
+        the joint fit, corrected by importance sampling), or, for a few videos, `emcee` or `nuts` (all numbers at once).
     seed
         Seed of all randomness: the same seed gives the same posterior.
     draws
@@ -105,6 +116,8 @@ def sample_together(
     ]
     if sampler == "gibbs":
         drawn = _by_gibbs(fit, reported, generator, progress)
+    elif sampler in WHOLE:
+        drawn = _by_whole_vector(fit, WHOLE[sampler], reported, draws=draws, generator=generator, progress=progress)
     else:
         drawn = _by_importance(fit, draws, generator, progress)
         if hand_on and (reason := _distrust(drawn.shared, draws)):
@@ -167,6 +180,42 @@ def _by_gibbs(
         samples(video.points(found.shared, own), log_prior + value, modes) for video, own, value, modes in parts
     )
     return _Drawn(shared, videos, fit.log_evidence)
+
+
+def _by_whole_vector(
+    fit: SharedFit, sample: Callable[..., Samples], reported: Sequence[Reported], **options: Any
+) -> _Drawn:
+    """Draws of all numbers at once, by a sampler of one video."""
+    joint = fit.joint
+    vector, work = WholeVector.of(joint), len(fit.videos) * WORK_LIMIT
+    mode = vector.mode(joint)
+    found = sample(
+        vector,
+        proposals([mode], vector.residuals, vector.rates),
+        reported=vector.reported(reported),
+        rate_steps=RateSteps.of(mode, vector.rates),
+        work_limit=work,
+        **options,
+    )
+    found = replace(found, doubts=(*found.doubts, *_further_modes(fit)))
+    shared = found.points[..., : len(joint.numbers)]
+    flat = shared.reshape(-1, shared.shape[-1])
+    log_prior = joint.numbers.log_prior(flat)
+
+    def of_video(video: LinkedVideo, own: Float[np.ndarray, "chain draw _"]) -> Samples:
+        value = log_prior + video.log_density(flat, own.reshape(len(flat), -1))
+        return replace(found, points=video.points(shared, own), log_density=value.reshape(shared.shape[:2]))
+
+    parts = zip(joint.videos, vector.own_places, strict=True)
+    videos = tuple(of_video(video, found.points[..., own]) for video, own in parts)
+    return _Drawn(replace(found, points=shared), videos, fit.log_evidence)
+
+
+def _further_modes(fit: SharedFit) -> Iterator[str]:
+    """A sentence for videos with modes that are not set out from."""
+    several = [name for index, name in enumerate(fit.videos) if len(fit.joint.modes(index)) > 1]
+    if several:
+        yield f"There are several modes in {', '.join(several)}, of which only the best is set out from; take gibbs."
 
 
 def _by_importance(

@@ -32,8 +32,14 @@ SPIN_CHANGE = "Spin after a contact, against its normal impulse"
 def held_out(millimetres: float, coverage: tuple[float, float]) -> HeldOut:
     """A prediction whose error, beyond a noise of 3 mm, is half as large one second ahead and doubled at the end."""
     excess = (millimetres**2 - 9.0) ** 0.5
+    half, most = coverage
+    known = (0.0, (1 - most) / 2, (1 - half) / 2, (1 + half) / 2, (1 + most) / 2, 1.0)
+    tenths = np.diff(np.interp(np.linspace(0.0, 1.0, 11), (0.0, 0.05, 0.25, 0.75, 0.95, 1.0), known))
     return HeldOut(
-        millimetres / 1000, *(float(np.hypot(3.0, factor * excess)) / 1000 for factor in (0.5, 2.0)), *coverage
+        millimetres / 1000,
+        *(float(np.hypot(3.0, factor * excess)) / 1000 for factor in (0.5, 2.0)),
+        *coverage,
+        tuple(tenths.tolist()),
     )
 
 

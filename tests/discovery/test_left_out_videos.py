@@ -87,6 +87,9 @@ def test_forecasts_of_a_null_are_as_far_off_as_they_say() -> None:
     assert found.rmse_end is not None
     assert found.coverage_50 < found.coverage_90
     assert found.coverage_90 > 0.6
+    assert sum(found.pit) == pytest.approx(1.0)
+    assert len(found.pit) == 10
+    assert found.pit[0] + found.pit[-1] < 0.5
 
 
 def test_a_body_that_comes_after_the_fitted_frames_is_not_predicted() -> None:

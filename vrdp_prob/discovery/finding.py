@@ -53,6 +53,10 @@ class HeldOut:
         log predictive density.
     coverage_50, coverage_90
         Share of the observations in the middle 50 % and 90 % of their predictive distributions.
+    pit
+        Shares of the observations (per axis) in the tenths of their predictive distributions, the lowest first: the
+        histogram of the probability integral transform, flat where the model is right; empty where nothing is
+        predicted.
     """
 
     rmse: float
@@ -60,6 +64,7 @@ class HeldOut:
     rmse_end: float | None
     coverage_50: float
     coverage_90: float
+    pit: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True)

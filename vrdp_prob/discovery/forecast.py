@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 import torch
 from jaxtyping import Float
+from scipy.stats import norm
 
 from vrdp_prob.discovery.finding import HeldOut
 from vrdp_prob.discovery.held_out import Cavity
@@ -27,6 +28,7 @@ AROUND = 2
 """Frames on each side over which it is averaged, and twice as many at the end."""
 HALF, NINE_TENTHS = 0.6745, 1.6449
 """Half widths of the middle 50 % and 90 % of a normal distribution."""
+TENTHS = 10
 FEWEST_SEEN = 2
 """Times that a body must have been seen by then, for what comes next to be predicted."""
 ITERATIONS = 20
@@ -64,7 +66,8 @@ def held_out(videos: Sequence[LinkedVideo], points: Sequence[np.ndarray], caviti
         What the other videos say.
     """
     forecasts = in_parallel(lambda k: _forecast(videos[k], points[k], cavities[k]), range(len(videos)))
-    standardised = np.abs(np.concatenate([one.standardised.ravel() for one in forecasts]))
+    errors = np.concatenate([one.standardised.ravel() for one in forecasts])
+    standardised = np.abs(errors)
     frame = min(float(np.median(np.diff(video.likelihood.tracks.times))) for video in videos)
     one_second = [np.abs(one.ahead - AHEAD) <= (AROUND + 0.5) * frame for one in forecasts]
     end = [one.ahead > one.ahead.max(initial=0.0) - (2 * AROUND + 0.5) * frame for one in forecasts]
@@ -74,7 +77,17 @@ def held_out(videos: Sequence[LinkedVideo], points: Sequence[np.ndarray], caviti
         rmse_end=_in_the_middle([one.squares[late] for one, late in zip(forecasts, end, strict=True)]),
         coverage_50=float((standardised < HALF).mean()),
         coverage_90=float((standardised < NINE_TENTHS).mean()),
+        pit=_tenths(errors),
     )
+
+
+def _tenths(standardised: Float[np.ndarray, "error"]) -> tuple[float, ...]:
+    """Shares of the observations in the tenths of their predictive distributions."""
+    if not len(standardised):
+        return ()
+    below = norm.cdf(-standardised)  # of the prediction, whose errors these are, lies so much below what was observed
+    counts, _ = np.histogram(below, bins=TENTHS, range=(0.0, 1.0))
+    return tuple((counts / counts.sum()).tolist())
 
 
 def _in_the_middle(squares: Sequence[Float[np.ndarray, "_"]]) -> float | None:

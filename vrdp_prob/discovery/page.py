@@ -12,6 +12,7 @@ from markupsafe import Markup
 from vrdp_prob.datasets.folder import some
 from vrdp_prob.discovery.changed_answers import rows
 from vrdp_prob.discovery.finding import Check, Description, Finding, FoundCause, UpperBound, Verdict
+from vrdp_prob.discovery.forecast import TENTHS
 from vrdp_prob.discovery.gain_figure import error_figure, video_figure
 from vrdp_prob.discovery.summary import POSSIBLE, possible, summary, verdict_sentence
 from vrdp_prob.discovery.wording import (
@@ -39,6 +40,8 @@ ALIKE = (
     "other starts, speeds or places would tell more."
 )
 ASKED_LATER = "Only with the named causes is enough known to ask this."
+EVEN_BAR = 30.0
+"""Height of bars of equal shares, in per cent of the room for them."""
 NOT_EXCLUDED = "The likeliest causes of the catalogue. None of them explains the videos well enough to be named."
 
 
@@ -58,6 +61,8 @@ def render(finding: Finding) -> str:
         **_others(finding),
         "tried": _tried(finding),
         "coverage": _coverage(named),
+        "even": EVEN_BAR,
+        "even_tenths": [EVEN_BAR] * TENTHS,
         "checks": _checks(finding),
         "figures": [(name, _inline(figure, index)) for index, (name, figure) in enumerate(finding.figures.items())],
         "bounds": _bounds(finding),
@@ -122,17 +127,24 @@ def _tried(finding: Finding) -> dict[str, Any] | None:
     }
 
 
-def _coverage(causes: Sequence[FoundCause]) -> list[dict[str, str]]:
+def _coverage(causes: Sequence[FoundCause]) -> list[dict[str, Any]]:
     """Calibration of the predictions, without and with each cause."""
     return [
         {
             "words": f"{word} {cause_title(cause)}",
             "half": _percent(held.coverage_50),
             "most": _percent(held.coverage_90),
+            "tenths": _bars(held.pit),
+            "tenths_words": ", ".join(_percent(share) for share in held.pit),
         }
         for cause in causes
         for word, held in (("without", cause.gain.before), ("with", cause.gain.after))
     ]
+
+
+def _bars(shares: Sequence[float]) -> list[float]:
+    """Heights of bars in per cent of the room for them, in which those of equal shares are `EVEN_BAR`."""
+    return [min(EVEN_BAR * len(shares) * share, 100.0) for share in shares]
 
 
 def _percent(share: float) -> str:

@@ -6,6 +6,8 @@ import numpy as np
 from jaxtyping import Float
 from scipy.special import logsumexp
 
+from vrdp_prob.errors import InputError
+from vrdp_prob.inference.clues import Clues
 from vrdp_prob.inference.importance import effective_count, resampled, smoothed_weights
 from vrdp_prob.inference.map_fit import fit_map
 from vrdp_prob.inference.samples import PARETO_K_GOAL
@@ -74,10 +76,11 @@ def predictive_log_density(
     Raises
     ------
     InputError
-        If no object moves.
+        If no object moves, or the video has no world at what the other ones say.
     """
     generator = stream(seed, tracks.video)
-    fit = fit_map(tracks, posterior.model, generator, progress)
+    family = Clues.of(tracks).noise_family  # not by the fit: models are compared, so they believe in one noise
+    fit = fit_map(tracks, posterior.model, generator, progress, noise=family)
     structure = structure_of(fit.likelihood.coordinates)
     video = linked(plain_likelihood(fit.clues, posterior.model, structure), posterior.numbers)
     draws = posterior.points.reshape(-1, posterior.points.shape[-1])
@@ -85,6 +88,11 @@ def predictive_log_density(
     source, target = fit.likelihood.coordinates, video.likelihood.coordinates
     starts = np.array([video.split(source.carried(one.point, target))[1] for one in fit.modes])
     modes = local_modes(video, posterior.numbers, mean, starts)
+    if not modes:
+        raise InputError(
+            f"{tracks.video}: cannot be simulated with what the other videos say of the numbers that all share; "
+            "leave it out."
+        )
     arrow = ArrowGaussian(mean, root, (modes[0].gaussian,), posterior.numbers.logarithms)
     clouds = Clouds.of(video, arrow, modes, generator)
     whitened = arrow.shared_whitened(draws)

@@ -1,5 +1,6 @@
 """The most probable values of several videos at once, the Gaussian around them, and further modes of single videos."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -208,9 +209,11 @@ def local_modes(
     nothing = np.zeros(len(shared))
     for start in starts:
         own = settle(video, shared, [start])
+        if not math.isfinite(value := video.value(shared, own)):  # it has no world at what all videos say
+            continue
         if any(np.abs(one.whitened(own, nothing)).max() < SAME_MODE for one, _ in found):
             continue
         gaussian = expand(video, shared, own, central=True).around(own, numbers.logarithms)
-        found.append((gaussian, video.value(shared, own) + gaussian.log_volume))
-    best = max(weight for _, weight in found)
+        found.append((gaussian, value + gaussian.log_volume))
+    best = max((weight for _, weight in found), default=0.0)
     return tuple(LocalMode(one, weight - best) for one, weight in found if weight > best - HOPELESS or one is first)

@@ -323,8 +323,10 @@ def _notes(found: Search, doubted: Sequence[Doubt], unlisted: Sequence[Unlisted]
 
 
 def _unlisted_note(unlisted: Unlisted) -> str:
-    than = listed(f"'{name}'" for name in unlisted.mimics)
-    rest = f"; {than} may only follow it, and {'are' if len(unlisted.mimics) > 1 else 'is'} not named" if than else ""
+    rest = ""
+    if unlisted.mimics:
+        than = listed(f"'{name}'" for name in unlisted.mimics)
+        rest = f"; {than} may only follow it, and {'are' if len(unlisted.mimics) > 1 else 'is'} not named"
     laws = listed(f"{law.sentence[0].lower()}{law.sentence[1:].rstrip('.')}" for law in unlisted.laws)
     better = "better" if unlisted.gain > NORMAL_95 * unlisted.error else "at least as well, as far as they can tell,"
     size = f"{unlisted.gain:.0f} ± {unlisted.error:.0f} nats"

@@ -5,7 +5,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
-from tests.discovery.fitted import fitted
+from tests.discovery.fitted import fitted, moved
 from tests.discovery.test_describe import PAIRS
 from vrdp_prob.discovery.contact_checks import DISTANCE
 from vrdp_prob.discovery.figures import residual_figures
@@ -39,6 +39,17 @@ def test_windows_of_a_tilted_table_show_its_push_and_those_of_a_null_nothing() -
     np.testing.assert_allclose(found.along**2 + found.across**2, (found.acceleration**2).sum(axis=1), rtol=1e-6)
     _, null = fitted(seed=1)
     assert windows(null).size < 0.2 * found.size
+
+
+def test_a_video_that_lost_its_course_says_nothing_of_accelerations() -> None:
+    _, tilted = fitted("surface_tilt", seed=2, setting=PAIRS)
+    model = ResidualModel.of(tilted)
+    changes = [np.zeros((*video.motion.speed.shape, 2)) for video in model.videos]
+    changes[1][:, 0, 0] = 20.0 * model.videos[1].motion.times ** 2
+    found = missing_acceleration(FreeFlight.of(moved(model, changes)).model, roughness(model))
+    assert found.lost == (model.videos[1].linear.name,)
+    assert set(found.video) == {0.0, 2.0}
+    assert found.size == pytest.approx(windows(tilted).size, rel=0.5)
 
 
 def test_there_is_a_figure_of_each_aspect_and_it_is_an_svg_element() -> None:

@@ -15,6 +15,7 @@ from vrdp_prob.discovery.residual_model import ResidualModel
 from vrdp_prob.discovery.sparse_formula import SparseFormula, sparse_formula
 from vrdp_prob.discovery.words import number
 from vrdp_prob.inference.several_videos.fitting import SharedFit
+from vrdp_prob.report.wording import listed
 
 CLEARLY = 1.5
 """Ratio of sizes from which on one part of the motion is said to show more of an effect than another."""
@@ -96,6 +97,11 @@ def _share_sentences(model: ResidualModel, freed: ResidualModel, noise: float) -
 
 def _window_sentences(windows: Windows) -> Iterator[str]:
     """Size and direction of the missing acceleration, and where in speed, time and place there is more of it."""
+    if windows.lost:
+        yield (
+            f"Far more is missing in {listed(windows.lost)} than in the other videos, as where a contact is missed; it "
+            "is left out of what is said of accelerations."
+        )
     if windows.size == 0 or len(windows.time) < 6:
         yield "No missing acceleration shows in free flight."
         return

@@ -19,6 +19,9 @@ FEWEST = 3
 """Frames that a window has at least."""
 SIZES = np.concatenate([[0.0], np.geomspace(1e-5, 10.0, 61)])
 """Sizes (m/s^2) of the missing acceleration among which the most probable one is chosen."""
+FAR, EXTREME = 10.0, 3.0
+"""A video is lost that asks for so many times what the one in the middle does, and for more than so many m/s^2: its fit
+misses a contact."""
 
 
 @dataclass(frozen=True)
@@ -35,6 +38,8 @@ class Windows:
         Mean place in m and velocity in m/s.
     acceleration, sd
         Mean and standard deviation in m/s^2 of the posterior of both components.
+    lost
+        Names of videos that have no windows, since no acceleration is what the model misses there.
     """
 
     size: float
@@ -45,6 +50,7 @@ class Windows:
     velocity: Float[np.ndarray, "window 2"]
     acceleration: Float[np.ndarray, "window 2"]
     sd: Float[np.ndarray, "window 2"]
+    lost: tuple[str, ...] = ()
 
     @property
     def speed(self) -> Float[np.ndarray, "window"]:
@@ -120,21 +126,23 @@ def missing_acceleration(model: ResidualModel, noise: float) -> Windows:
         (values**2 / noise, (left.T @ residuals) ** 2 / noise)
         for (left, values, _), residuals in zip(decomposed, separate.residuals, strict=True)
     ]
-    known = np.concatenate([one for one, _ in parts]), np.concatenate([one for _, one in parts])
-    size = float(max(SIZES, key=lambda one: _evidence(known, one)))
+    own = [_size(*part) for part in parts]
+    lost = [one > max(FAR * float(np.median(own)), EXTREME) for one in own]
+    usual = [part for part, far in zip(parts, lost, strict=True) if not far]
+    size = _size(*(np.concatenate(rows) for rows in zip(*usual, strict=True)))
     means, spreads = [], []
     for (left, values, right), residuals in zip(decomposed, separate.residuals, strict=True):
         shrunk = size**2 / (size**2 * values**2 + noise)
         means.append(right.T @ (shrunk * values * (left.T @ residuals)))
         variance = size**2 - size**2 * (right**2 * (shrunk * values**2)[:, None]).sum(axis=0)
         spreads.append(np.sqrt(np.maximum(variance, 0.0)))
-    return _gathered(model, windows, size, np.concatenate(means), np.concatenate(spreads))
+    return _gathered(model, windows, size, (means, spreads), lost)
 
 
-def _evidence(known: tuple[np.ndarray, np.ndarray], size: float) -> float:
-    """Log probability of the residuals for a size of the missing acceleration, up to a constant."""
-    growth = 1 + size**2 * known[0]
-    return -float((np.log(growth) + known[1] / growth).sum()) / 2
+def _size(information: Float[np.ndarray, "number"], squares: Float[np.ndarray, "number"]) -> float:
+    """Most probable size (m/s^2) of the missing acceleration."""
+    growth = 1 + SIZES[:, None] ** 2 * information
+    return float(SIZES[np.argmin((np.log(growth) + squares / growth).sum(axis=1))])
 
 
 def _windows(motion: FittedMotion) -> list[tuple[int, np.ndarray]]:
@@ -155,10 +163,12 @@ def _gathered(
     model: ResidualModel,
     windows: Sequence[Sequence[tuple[int, np.ndarray]]],
     size: float,
-    mean: Float[np.ndarray, "component"],
-    sd: Float[np.ndarray, "component"],
+    found: tuple[Sequence[Float[np.ndarray, "_"]], Sequence[Float[np.ndarray, "_"]]],
+    lost: Sequence[bool],
 ) -> Windows:
-    rows = [(k, body, frames) for k, mine in enumerate(windows) for body, frames in mine]
+    """The windows of the videos that are not lost."""
+    rows = [(k, body, frames) for k, mine in enumerate(windows) if not lost[k] for body, frames in mine]
+    mean, sd = (np.concatenate([one for one, far in zip(part, lost, strict=True) if not far]) for part in found)
     motions = [video.motion for video in model.videos]
     return Windows(
         size,
@@ -169,4 +179,5 @@ def _gathered(
         np.array([motions[k].velocity[frames, body].mean(axis=0) for k, body, frames in rows]).reshape(-1, 2),
         mean.reshape(-1, 2),
         sd.reshape(-1, 2),
+        tuple(video.linear.name for video, far in zip(model.videos, lost, strict=True) if far),
     )

@@ -46,7 +46,9 @@ def describe(fit: SharedFit, checks: Sequence[Check]) -> Description:
     noise = roughness(model)
     windows = missing_acceleration(flight.model, noise)
     shown = [k for k, one in enumerate(flight.patterns) if _may_show(flight, one)]
-    separate = Separate.of(flight.model, [rows[:, shown] for rows in flight.rows], noise)
+    separate = Separate.of(flight.model, [rows[:, shown] for rows in flight.rows], noise).without(
+        [video.linear.name in windows.lost for video in flight.model.videos]
+    )
     found = sparse_formula(separate)
     places = [shown[k] for k in found.terms]
     formula = _formula([flight.patterns[k] for k in places], found.coefficients)

@@ -19,6 +19,9 @@ from vrdp_prob.inference.least_squares import jacobian, minimise
 from vrdp_prob.inference.noise_fit import NOISE_FIELDS
 from vrdp_prob.inference.parallel import in_parallel
 from vrdp_prob.inference.several_videos.linking import LinkedVideo
+from vrdp_prob.models.likelihood import Likelihood
+from vrdp_prob.models.noise import NoiseFamily
+from vrdp_prob.models.unknowns import DEGREES_OF_FREEDOM
 
 SEEN_SHARE = 0.6
 """Share of a video's frames to which its own unknowns are fitted."""
@@ -121,12 +124,25 @@ def _forecast(video: LinkedVideo, point: Float[np.ndarray, "dimension"], cavity:
     count = len(observations.frame)
     begun = np.bincount(observations.body[observations.frame < frames], minlength=len(tracks.bodies)) >= FEWEST_SEEN
     late = (observations.frame >= frames) & begun[observations.body]
-    rows = derivative[: 2 * count, used]
+    scale = _unit_scale(likelihood, fitted)
+    rows = scale * derivative[: 2 * count, used]
     variance = 1.0 + np.einsum("ri,ij,rj->r", rows, covariance, rows).reshape(count, 2)
     predicted = likelihood.predicted(torch.from_numpy(fitted[None]))[0, :, :, :2]
     errors = (predicted - tracks.positions)[observations.frame, observations.body]
     return Forecast(
         ahead=tracks.times[observations.frame[late]] - tracks.times[frames - 1],
         squares=(errors[late] ** 2).mean(axis=1),
-        standardised=(residuals[: 2 * count].reshape(count, 2) / np.sqrt(variance))[late],
+        standardised=(scale * residuals[: 2 * count].reshape(count, 2) / np.sqrt(variance))[late],
     )
+
+
+def _unit_scale(likelihood: Likelihood, point: Float[np.ndarray, "dimension"]) -> float:
+    """Factor by which residuals of positions are standard normal where the model is right.
+
+    The root of twice the negative log density of a bivariate Student-t variable is a normal one with a variance of
+    (nu + 2) / nu.
+    """
+    if likelihood.noise is NoiseFamily.GAUSSIAN:
+        return 1.0
+    degrees = float(likelihood.coordinates.quantities(torch.from_numpy(point[None]))[DEGREES_OF_FREEDOM][0, 0])
+    return math.sqrt(degrees / (degrees + 2))

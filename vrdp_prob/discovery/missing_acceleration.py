@@ -6,6 +6,7 @@ size the data tell (empirical Bayes); in videos that the model explains it shrin
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float
@@ -101,6 +102,14 @@ class Separate:
             degrees.append(linear.data - linear.absorbed)
         return cls(tuple(left), tuple(residuals), noise, tuple(degrees))
 
+    def without(self, lost: Sequence[bool]) -> "Separate":
+        """What the videos say that are not lost."""
+
+        def kept(parts: Sequence[Any]) -> tuple[Any, ...]:
+            return tuple(one for one, far in zip(parts, lost, strict=True) if not far)
+
+        return Separate(kept(self.patterns), kept(self.residuals), self.noise, kept(self.degrees))
+
 
 def missing_acceleration(model: ResidualModel, noise: float) -> Windows:
     """Accelerations that a model misses.
@@ -127,7 +136,8 @@ def missing_acceleration(model: ResidualModel, noise: float) -> Windows:
         for (left, values, _), residuals in zip(decomposed, separate.residuals, strict=True)
     ]
     own = [_size(*part) for part in parts]
-    lost = [one > max(FAR * float(np.median(own)), EXTREME) for one in own]
+    middle = float(np.median([one for one, mine in zip(own, windows, strict=True) if mine] or [0.0]))
+    lost = [one > max(FAR * middle, EXTREME) for one in own]
     usual = [part for part, far in zip(parts, lost, strict=True) if not far]
     size = _size(*(np.concatenate(rows) for rows in zip(*usual, strict=True)))
     means, spreads = [], []

@@ -69,18 +69,20 @@ class Largest:
         anything; None where none does.
     places, told
         Number of places, and of those that tell anything.
-    spread
-        The part of the bound that is due to the standard deviation.
+    strengths
+        Estimate and standard deviation at each place that tells anything, if these are what the bound is made of.
     """
 
     bound: float | None
     places: int
     told: int
-    spread: float = 0.0
+    strengths: tuple[tuple[float, float], ...] = ()
 
     def widened(self, factor: float) -> float | None:
-        """The bound where the standard deviation is larger by a factor than the residuals say."""
-        return None if self.bound is None else self.bound + (factor - 1) * self.spread
+        """The bound where standard deviations are larger by a factor than the residuals say."""
+        if self.strengths:
+            return max(abs(estimate) + factor * ONE_SIDED * sd for estimate, sd in self.strengths)
+        return None if self.bound is None else factor * self.bound
 
 
 @dataclass(frozen=True)
@@ -214,10 +216,9 @@ def _largest(places: Sequence[Iterable[tuple[str, float, float]]], effect: Effec
         seen = [row for row in rows if row[2] > 0]
         enough = max(expected[name], min((sd for *_, sd in seen), default=0.0))
         told = [row for row in seen if row[2] <= enough]
-        bound, spread = max(
-            ((abs(estimate) + ONE_SIDED * sd, ONE_SIDED * sd) for _, estimate, sd in told), default=(None, 0.0)
-        )
-        largest[name] = Largest(bound, len({row[0] for row in rows}), len({row[0] for row in told}), spread)
+        each = tuple((estimate, sd) for _, estimate, sd in told)
+        bound = max((abs(estimate) + ONE_SIDED * sd for estimate, sd in each), default=None)
+        largest[name] = Largest(bound, len({row[0] for row in rows}), len({row[0] for row in told}), each)
     return largest
 
 

@@ -172,7 +172,8 @@ def joined(draws: Float[np.ndarray, "group chain draw axis"]) -> Float[np.ndarra
 
     R-hat of many short chains is large by chance alone: about 100 effective draws of each are needed for 1.01.
     """
-    return draws.reshape(len(draws), -1, draws.shape[-1])
+    group, chain, draw, axis = draws.shape
+    return draws.reshape(group, chain * draw, axis)
 
 
 def ordered(draws: Float[np.ndarray, "group chain draw axis"]) -> Float[np.ndarray, "group several axis"]:

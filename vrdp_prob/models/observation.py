@@ -143,7 +143,7 @@ def _whitening(
     if covariance is None:
         return whitening, reference
     seen = covariance[frame, body]
-    known = np.isfinite(seen).all(axis=(-1, -2))
+    known = np.isfinite(seen).all(axis=(-1, -2)) & (np.trace(seen, axis1=-2, axis2=-1) > 0)
     if not known.any():
         return whitening, reference
     variance = np.trace(seen[known], axis1=-2, axis2=-1) / 2

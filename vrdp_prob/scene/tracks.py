@@ -118,10 +118,12 @@ class Tracks:
 
     @property
     def position_covariance(self) -> Float[np.ndarray, "time body 2 2"] | None:
-        """Covariance in m^2 of the measured positions; None where it is not known."""
+        """Covariance in m^2 of the measured positions; None where it is not known, or says nothing of any position."""
         if "position_covariance" not in self.data:
             return None
-        return np.asarray(self.data["position_covariance"].values, dtype=float)
+        covariance = np.asarray(self.data["position_covariance"].values, dtype=float)
+        variance = np.trace(covariance, axis1=-2, axis2=-1)
+        return covariance if (self.seen & np.isfinite(variance) & (variance > 0)).any() else None
 
     @property
     def seen(self) -> Bool[np.ndarray, "time body"]:

@@ -246,6 +246,11 @@ def test_what_is_not_shared_stays_each_video_s_own() -> None:
     alone = sample_together(one, sampler="laplace", draws=100, hand_on=False)
     assert list(alone.shared) == []
     assert alone.video("slide 1").draw_count == 100
+    for sampler in ("gibbs", "emcee"):
+        chains = sample_together(one, sampler=sampler, draws=100)
+        assert list(chains.shared) == []
+        assert chains.video("slide 1").draw_count >= 100
+        assert np.isfinite(predictive_log_density(chains, sliding(2)).log_density)
 
 
 def test_walls_at_the_same_place_share_their_restitution() -> None:

@@ -83,7 +83,8 @@ def predictive_log_density(
     fit = fit_map(tracks, posterior.model, generator, progress, noise=family)
     structure = structure_of(fit.likelihood.coordinates)
     video = linked(plain_likelihood(fit.clues, posterior.model, structure), posterior.numbers)
-    draws = posterior.points.reshape(-1, posterior.points.shape[-1])
+    chains, length, count = posterior.points.shape
+    draws = posterior.points.reshape(chains * length, count)
     mean, root = draws.mean(axis=0), _root(draws)
     source, target = fit.likelihood.coordinates, video.likelihood.coordinates
     starts = np.array([video.split(source.carried(one.point, target))[1] for one in fit.modes])

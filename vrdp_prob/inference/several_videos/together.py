@@ -13,7 +13,7 @@ from vrdp_prob.inference.diagnostics import Reported, Statistics
 from vrdp_prob.inference.emcee_sampler import sample_emcee
 from vrdp_prob.inference.infer import check_counts, check_model, default_model
 from vrdp_prob.inference.map_fit import MapFit
-from vrdp_prob.inference.mode_weights import doubts
+from vrdp_prob.inference.mode_weights import UNSURE, doubts
 from vrdp_prob.inference.nuts_sampler import sample_nuts
 from vrdp_prob.inference.posterior import Posterior
 from vrdp_prob.inference.proposals import proposals
@@ -22,7 +22,6 @@ from vrdp_prob.inference.samples import ESS_GOAL, PARETO_K_GOAL, Convergence, Mo
 from vrdp_prob.inference.several_videos.fitting import SharedFit, fit_together
 from vrdp_prob.inference.several_videos.gibbs import sample_gibbs
 from vrdp_prob.inference.several_videos.importance import sample_by_importance
-from vrdp_prob.inference.several_videos.linking import LinkedVideo
 from vrdp_prob.inference.several_videos.parts import stream
 from vrdp_prob.inference.several_videos.posterior import SharedPosterior, VideoPosteriors
 from vrdp_prob.inference.several_videos.whole_vector import WholeVector
@@ -162,7 +161,8 @@ def _by_gibbs(
     """Draws of chains, which go on for a reason where they were not asked for."""
     found = sample_gibbs(fit.joint, generator=generator, progress=progress, reported=reported)
     shape = found.shared.shape
-    log_prior = fit.joint.numbers.log_prior(found.shared.reshape(-1, shape[-1])).reshape(shape[:2])
+    flat = found.shared.reshape(shape[0] * shape[1], shape[2])
+    log_prior = fit.joint.numbers.log_prior(flat).reshape(shape[:2])
     notes = found.notes if reason is None else (reason, *found.notes)
 
     def samples(
@@ -189,6 +189,8 @@ def _by_whole_vector(
     joint = fit.joint
     vector, work = WholeVector.of(joint), len(fit.videos) * WORK_LIMIT
     mode = vector.mode(joint)
+    if sample is sample_nuts:
+        options["courses"] = vector.courses
     found = sample(
         vector,
         proposals([mode], vector.residuals, vector.rates),
@@ -197,25 +199,33 @@ def _by_whole_vector(
         work_limit=work,
         **options,
     )
-    found = replace(found, doubts=(*found.doubts, *_further_modes(fit)))
     shared = found.points[..., : len(joint.numbers)]
-    flat = shared.reshape(-1, shared.shape[-1])
+    chains, length, count = shared.shape
+    flat = shared.reshape(chains * length, count)
     log_prior = joint.numbers.log_prior(flat)
+    doubtful = [tuple(_further_modes(fit, index)) for index in range(len(joint.videos))]
 
-    def of_video(video: LinkedVideo, own: Float[np.ndarray, "chain draw _"]) -> Samples:
-        value = log_prior + video.log_density(flat, own.reshape(len(flat), -1))
-        return replace(found, points=video.points(shared, own), log_density=value.reshape(shared.shape[:2]))
+    def of_video(index: int) -> Samples:
+        video, own = joint.videos[index], found.points[..., vector.own_places[index]]
+        value = log_prior + video.log_density(flat, own.reshape(len(flat), own.shape[-1]))
+        return replace(
+            found,
+            points=video.points(shared, own),
+            log_density=value.reshape(chains, length),
+            doubts=(*found.doubts, *doubtful[index]),
+        )
 
-    parts = zip(joint.videos, vector.own_places, strict=True)
-    videos = tuple(of_video(video, found.points[..., own]) for video, own in parts)
-    return _Drawn(replace(found, points=shared), videos, fit.log_evidence)
+    together = replace(found, points=shared, doubts=(*found.doubts, *(one for some in doubtful for one in some)))
+    return _Drawn(together, tuple(map(of_video, range(len(joint.videos)))), fit.log_evidence)
 
 
-def _further_modes(fit: SharedFit) -> Iterator[str]:
-    """A sentence for videos with modes that are not set out from."""
-    several = [name for index, name in enumerate(fit.videos) if len(fit.joint.modes(index)) > 1]
-    if several:
-        yield f"There are several modes in {', '.join(several)}, of which only the best is set out from; take gibbs."
+def _further_modes(fit: SharedFit, index: int) -> Iterator[str]:
+    """A sentence for a video that has modes with a weight beside the one that is set out from."""
+    weights = np.exp([mode.log_weight for mode in fit.joint.modes(index)])
+    if (left_out := float(weights[1:].sum() / weights.sum())) > UNSURE:
+        yield (
+            f"Further modes in {fit.videos[index]} hold {left_out:.2f} of what it says, from which only gibbs sets out."
+        )
 
 
 def _by_importance(

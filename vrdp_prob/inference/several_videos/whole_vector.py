@@ -4,7 +4,7 @@ Each step simulates all videos, and an ensemble needs a few walkers for each num
 and a check of `gibbs`, which is for many.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
@@ -16,6 +16,7 @@ from scipy.linalg import solve_triangular
 from torch import Tensor
 
 from vrdp_prob.inference.diagnostics import Reported
+from vrdp_prob.inference.events import Pairs, courses_at
 from vrdp_prob.inference.mode import Mode
 from vrdp_prob.inference.several_videos.joint_fit import JointFit
 from vrdp_prob.inference.several_videos.linking import LinkedVideo, SharedNumbers
@@ -44,14 +45,22 @@ class WholeVector:
 
     def __call__(self, points: Float[Tensor, "point dimension"]) -> Float[Tensor, "point"]:
         """Log density (nats, up to a constant); differentiable."""
-        shared = points[:, : len(self.numbers)]
-        total = self.numbers.log_density(shared)
-        for video, own in zip(self.videos, self.own_places, strict=True):
-            used = shared[:, torch.from_numpy(video.shared_columns)] + torch.from_numpy(video.offset)
-            both = torch.cat([used, points[:, torch.from_numpy(own)]], dim=1)
-            order = np.argsort(np.concatenate([video.shared_places, video.local_places]))
-            total = total + video.data.log_density(both[:, torch.from_numpy(order)])
+        total = self.numbers.log_density(points[:, : len(self.numbers)])
+        for video, vectors in zip(self.videos, self._vectors(points), strict=True):
+            total = total + video.data.log_density(vectors)
         return total
+
+    def courses(self, points: Float[Tensor, "point dimension"]) -> list[tuple[Pairs, ...]]:
+        """Which bodies meet, in which order, in the worlds of all videos."""
+        parts = zip(self.videos, self._vectors(points), strict=True)
+        return list(zip(*(courses_at(video.data, vectors) for video, vectors in parts), strict=True))
+
+    def _vectors(self, points: Float[Tensor, "point dimension"]) -> Iterator[Float[Tensor, "point _"]]:
+        """The vectors of each video in turn."""
+        for video, places in zip(self.videos, self._places, strict=True):
+            offset = np.zeros(len(places))
+            offset[video.shared_places] = video.offset
+            yield points[:, torch.from_numpy(places)] + torch.from_numpy(offset)
 
     @cached_property
     def own_places(self) -> tuple[Int[np.ndarray, "_"], ...]:

@@ -116,4 +116,5 @@ def _bounds(videos: Sequence[Tracks]) -> tuple[Float[np.ndarray, "2"], Float[np.
 def _paths(videos: Sequence[Tracks]) -> Float[np.ndarray, "place 2"]:
     """Where bodies were seen in m, each place that in the middle of those around it, so that no outlier counts."""
     seen = [tracks.positions[tracks.seen[:, body], body] for tracks in videos for body in range(len(tracks.bodies))]
-    return np.concatenate([median_filter(path, size=(AROUND, 1), mode="mirror") for path in seen if len(path)])
+    around = [median_filter(path, size=(AROUND, 1), mode="mirror") if len(path) > AROUND else path for path in seen]
+    return np.concatenate(around)

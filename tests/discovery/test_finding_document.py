@@ -113,6 +113,7 @@ def test_what_is_not_finite_is_null_or_where_a_number_is_required_the_largest_on
         "rmse_end": None,
         "coverage_50": None,
         "coverage_90": 0.0,
+        "pit": [],
     }
     assert set(gain["elpd_difference_by_video"].values()) == {None}
     assert found["evidence"][0]["p_value"] is None

@@ -80,7 +80,9 @@ def test_named_causes_with_parameters_probability_and_gain():
     assert "surface tilt probability > 99 %" in text
     assert "Sine of the table's slope, component in which x falls tilt_x 0.00217 0.00188 to 0.00246" in text
     assert "Law: a = g (tilt_x, tilt_y)" in text
-    assert "without surface tilt 21 % 48 % with surface tilt 38 % 77 %" in text
+    assert "without surface tilt 21 % 48 %" in text
+    assert "with surface tilt 38 % 77 %" in text
+    assert "10 % each" in render(named())
     assert "measurement noise, 3.0 mm" in text
     assert "12 of 12 videos are predicted better." in text
     assert "Also possible" in text

@@ -18,7 +18,7 @@ from vrdp_prob.discovery.trials import Trial, gain
 from vrdp_prob.models.effects.clock_error import ClockError
 from vrdp_prob.models.effects.irregular_frames import IrregularFrames
 
-SIZE, SEED = 3.0, 1
+SIZE, SEED = 3.0, 2
 NULLS = 24
 LARGEST = 0.1 / 25
 """A tenth of the time in s between two frames."""

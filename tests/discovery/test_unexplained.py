@@ -75,7 +75,7 @@ def test_accelerations_at_random_are_found(size: float, monkeypatch: pytest.Monk
 @pytest.fixture(scope="module")
 def without() -> Trial:
     """Videos of a slope without it."""
-    _, fit = fitted("surface_tilt", seed=2)
+    _, fit = fitted("surface_tilt", seed=3)
     return Trial((), fit.under(with_learned_population(fit), model_error=False))
 
 

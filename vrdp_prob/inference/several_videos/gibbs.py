@@ -366,7 +366,7 @@ def _in_groups(
     sweeps: Sequence[Float[np.ndarray, "chain dimension"]],
 ) -> Float[np.ndarray, "group member sweep dimension"]:
     steps = np.stack(sweeps, axis=1)
-    return steps.reshape(GROUPS, -1, *steps.shape[1:])
+    return steps.reshape(GROUPS, len(steps) // GROUPS, *steps.shape[1:])
 
 
 def _by_chain(sweeps: Sequence[Float[np.ndarray, "chain dimension"]]) -> Float[np.ndarray, "group draw dimension"]:

@@ -28,10 +28,10 @@ def run_checks(fit: SharedFit, *, seed: int) -> tuple[Check, ...]:
     -------
     All checks that these videos allow, the most significant first. A p-value is that of replications of the fitted
     model: noise of the fitted family and scale, less what the fit absorbs of it. What is believed beforehand of shared
-    numbers pulls at neither. Where a statistic is linear or
-    quadratic in the residuals its law is known, which stands for endlessly many replications; elsewhere there are a few
-    hundred, and beyond their reach the tail of a fitted normal or chi-square law. A check is significant by the false
-    discovery rate over all of them (Benjamini and Hochberg, 5 %).
+    numbers pulls at neither. Where a statistic is linear or quadratic in the residuals its law is known, which stands
+    for endlessly many replications; elsewhere there are a few hundred, and beyond their reach the tail of a fitted
+    normal or chi-square law. A check is significant by the false discovery rate over all of them (Benjamini and
+    Hochberg, 5 %).
     """
     model = ResidualModel.of(fit).without_beliefs
     generator = np.random.default_rng(seed)

@@ -13,12 +13,14 @@ from vrdp_prob.discovery.free_flight_checks import SEEN
 from vrdp_prob.discovery.replications import sum_p_value, two_sided_p_value
 from vrdp_prob.discovery.residual_model import ResidualModel, VideoResiduals
 from vrdp_prob.discovery.words import number, opposite
-from vrdp_prob.models.roughness import CUBIC_NOISE_GAIN, NORMAL_MAD
+from vrdp_prob.models.roughness import NORMAL_MAD
 
 LOST, SINGLE, OUTLIERS = "time stamps: lost frames", "time stamps: single frames", "outliers"
 MEMORY, SIZE = GENERAL = ("memory of the residuals", "size of the residuals")
 """Checks that say that something is wrong, and not what."""
 DISTORTION = "distortion of positions"
+CUBIC_NOISE_GAIN = 20.0
+"""Variance of a third difference of independent noise of unit variance: 1 + 9 + 9 + 1."""
 GROSS = 1e-4
 """A position is grossly off if noise puts it as far from those before and after less often."""
 FEWEST = 30

@@ -97,7 +97,8 @@ def _surfaces(fit: SharedFit, kick: _Kick, effect: Effect) -> Iterator[dict[str,
             "hidden_wall_restitution": factor,
         }
         return
-    for size in (share * Region.of(fit.tracks).half_width for share in RADII):
+    unit = Region.of(fit.tracks).half_width
+    for size in (share * unit for share in RADII):
         x, y = place + (radius + size) * into
         yield {
             "obstacle_x": float(x),

@@ -148,8 +148,6 @@ def _whitening(
         return whitening, reference
     variance = np.trace(seen[known], axis1=-2, axis2=-1) / 2
     reference = float(np.sqrt(np.median(variance)))
-    if not reference > 0:
-        return whitening, prior_noise(tracks)
     floor = (SMALLEST_SHARE * reference) ** 2
     values, vectors = np.linalg.eigh(seen[known])
     scale = 1 / np.sqrt(np.maximum(values, floor))

@@ -10,8 +10,6 @@ FEWEST = 8
 """Third differences below which nothing is said."""
 WINDOW = 4
 """Frames of a third difference."""
-CUBIC_NOISE_GAIN = 20.0
-"""Variance of a third difference of independent noise of unit variance: 1 + 9 + 9 + 1."""
 NORMAL_MAD = 0.6745
 """Median of the absolute value of a standard normal number."""
 SHARPEST = 1e-3
@@ -80,8 +78,6 @@ def stated_sd(tracks: Tracks) -> tuple[Float[np.ndarray, "time body"], float] | 
         return None
     variance = np.trace(covariance, axis1=-2, axis2=-1) / 2
     known = np.isfinite(variance) & (variance > 0)
-    if not (known & tracks.seen).any():
-        return None
     reference = float(np.sqrt(np.median(variance[known & tracks.seen])))
     sd = np.sqrt(np.where(known, variance, reference**2))
     return np.maximum(sd, SMALLEST_SHARE * reference), reference

@@ -107,9 +107,9 @@ def test_both_samplers_agree_with_plain_emcee_on_the_whole_vector() -> None:
 
 def test_the_whole_vector_has_the_density_of_its_videos_and_its_slope() -> None:
     fit = two()
-    vector = WholeVector.of(fit.joint)
+    vector = WholeVector(fit.joint)
     whitened = 0.3 * np.random.default_rng(0).standard_normal((20, fit.joint.gaussian.dimension))
-    cloud = Gaussian.from_precision(vector.mode(fit.joint).point, vector.mode(fit.joint).precision)
+    cloud = Gaussian.from_precision(vector.mode.point, vector.mode.precision)
     points = cloud.mean + whitened @ cloud.root.T
     assert evaluate(vector, points) == pytest.approx(joint_density(fit, whitened), abs=1e-8)
     along = 1e-5 * cloud.root.T

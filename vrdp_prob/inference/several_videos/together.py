@@ -187,8 +187,8 @@ def _by_whole_vector(
 ) -> _Drawn:
     """Draws of all numbers at once, by a sampler of one video."""
     joint = fit.joint
-    vector, work = WholeVector.of(joint), len(fit.videos) * WORK_LIMIT
-    mode = vector.mode(joint)
+    vector, work = WholeVector(joint), len(fit.videos) * WORK_LIMIT
+    mode = vector.mode
     if sample is sample_nuts:
         options["courses"] = vector.courses
     found = sample(

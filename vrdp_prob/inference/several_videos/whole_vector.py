@@ -29,19 +29,21 @@ class WholeVector:
 
     Parameters
     ----------
-    numbers
-        The shared numbers.
-    videos
-        The videos in terms of them.
+    fit
+        The fit of the videos.
     """
 
-    numbers: SharedNumbers
-    videos: tuple[LinkedVideo, ...]
+    fit: JointFit
 
-    @classmethod
-    def of(cls, fit: JointFit) -> "WholeVector":
-        """That of the videos of a fit."""
-        return cls(fit.numbers, fit.videos)
+    @property
+    def numbers(self) -> SharedNumbers:
+        """The shared numbers."""
+        return self.fit.numbers
+
+    @property
+    def videos(self) -> tuple[LinkedVideo, ...]:
+        """The videos in terms of them."""
+        return self.fit.videos
 
     def __call__(self, points: Float[Tensor, "point dimension"]) -> Float[Tensor, "point"]:
         """Log density (nats, up to a constant); differentiable."""
@@ -77,9 +79,10 @@ class WholeVector:
         rows = [video.data.residuals(one) for video, one in zip(self.videos, own, strict=True)]
         return np.concatenate([self.numbers.prior_residuals(shared), *rows], axis=1)
 
-    def mode(self, fit: JointFit) -> Mode:
+    @property
+    def mode(self) -> Mode:
         """The most probable values and the curvature around them."""
-        gaussian, count = fit.gaussian, len(self.numbers)
+        gaussian, count = self.fit.gaussian, len(self.numbers)
         root = np.zeros((gaussian.dimension, gaussian.dimension))
         root[:count, :count] = gaussian.root
         for own, local in zip(self.own_places, gaussian.locals, strict=True):
@@ -87,7 +90,7 @@ class WholeVector:
             root[np.ix_(own, own)] = local.root
         inverse = solve_triangular(root, np.eye(len(root)), lower=True)
         point = np.concatenate([gaussian.mean, *(local.centre for local in gaussian.locals)])
-        return Mode(point, inverse.T @ inverse, fit.log_density)
+        return Mode(point, inverse.T @ inverse, self.fit.log_density)
 
     @cached_property
     def rates(self) -> Rates:

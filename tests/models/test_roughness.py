@@ -6,7 +6,7 @@ import pytest
 from tests.inference.generator import Scene, observe
 from vrdp_prob.inference import infer
 from vrdp_prob.inference.clues import Clues
-from vrdp_prob.models.roughness import noise_scale, stated_sd, untold_noise
+from vrdp_prob.models.roughness import noise_scale, untold_noise
 from vrdp_prob.scene import Body, Shape, Tracks
 
 RADIUS = 0.2
@@ -66,14 +66,18 @@ def test_noise_that_is_stated_differently_for_each_position_is_that_of_the_middl
     assert noise_scale(Tracks.from_arrays("v", body, times, positions[:, None])) > 0.0045
 
 
-@pytest.mark.parametrize("covariance", [np.nan, 0.0])
-def test_a_covariance_that_says_nothing_is_none(covariance: float) -> None:
+@pytest.mark.parametrize(
+    "covariance",
+    [np.full((2, 2), np.nan), np.zeros((2, 2)), np.array([[1.0, np.nan], [np.nan, 1.0]])],
+    ids=["unknown", "nothing", "half unknown"],
+)
+def test_a_covariance_that_says_nothing_is_none(covariance: np.ndarray) -> None:
     plain = seen(0.003)
     shape = (*plain.seen.shape, 2, 2)
     told = Tracks.from_arrays(
         "v", plain.bodies, plain.times, plain.positions, position_covariance=np.full(shape, covariance)
     )
-    assert stated_sd(told) is None
+    assert (told.position_covariance, told.position_variance) == (None, None)
     assert noise_scale(told) == noise_scale(plain)
     assert Clues.of(told).moving == Clues.of(plain).moving
     assert Clues.of(told).position_sd == pytest.approx(Clues.of(plain).position_sd)

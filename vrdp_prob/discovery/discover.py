@@ -118,7 +118,7 @@ def discover(
         causes=tuple(causes),
         checks=checks,
         checks_after=after,
-        upper_bounds=tuple(_bounds(found)),
+        upper_bounds=tuple(_bounds(found, causes)),
         model=physics,
         extended=extended_model(found.best, found.overdispersion),
         videos=tuple(tracks.video for tracks in videos),
@@ -276,14 +276,15 @@ def _told(found: Search, causes: Sequence[FoundCause]) -> list[Effect]:
     return [effect for effect in found.refits.catalogue if effect.cause_name() in names]
 
 
-def _bounds(found: Search) -> list[UpperBound]:
-    named = {cause.cause_name() for cause in found.best.causes}
+def _bounds(found: Search, told: Sequence[FoundCause]) -> list[UpperBound]:
+    """Bounds of the causes that are not told of, which have estimates instead."""
+    estimated = {cause.name for cause in told}
     scores = {score.effect.name: score for score in found.left.beside_chance}
     left = sorted(found.refits.catalogue, key=lambda effect: effect.name not in scores)
     return [
         bound
         for effect in left
-        if effect.cause_name() not in named
+        if effect.cause_name() not in estimated
         for bound in upper_bounds(effect, scores.get(effect.name), widening=float(np.sqrt(found.overdispersion.mean())))
     ]
 

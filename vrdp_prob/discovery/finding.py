@@ -314,7 +314,7 @@ class Finding:
     checks
         Tests of the model that was given, and `checks_after` of the extended one.
     upper_bounds
-        Of every cause that was not named.
+        Of every cause that `causes` does not tell of.
     model, extended
         The model that was given, and the same with the named causes for further videos of the same table: it believes
         what the videos say of what they share, and of single bodies (masses, restitutions, frictions) what they say of

@@ -18,7 +18,7 @@ from vrdp_prob.inference.free_flight import (
 from vrdp_prob.inference.outliers import gross_outliers, without
 from vrdp_prob.models.noise import NoiseFamily
 from vrdp_prob.models.observation import prior_noise
-from vrdp_prob.models.roughness import noise_scale, stated_sd, untold_noise
+from vrdp_prob.models.roughness import noise_scale, position_sd, untold_noise
 from vrdp_prob.scene import Tracks
 
 SIGNIFICANT = 5.0
@@ -56,7 +56,7 @@ class Clues:
     @classmethod
     def of(cls, tracks: Tracks) -> "Clues":
         """The clues of a video."""
-        return cls(tracks, gross_outliers(tracks, _position_sd(tracks, _roughness(tracks))))
+        return cls(tracks, gross_outliers(tracks, position_sd(tracks, _roughness(tracks))))
 
     @cached_property
     def clean(self) -> Tracks:
@@ -71,7 +71,7 @@ class Clues:
     @cached_property
     def position_sd(self) -> Float[np.ndarray, "time body"]:
         """Standard deviation (m) of each position per axis: the noise, or the stated ones where these are larger."""
-        return _position_sd(self.tracks, self.noise)
+        return position_sd(self.tracks, self.noise)
 
     @property
     def noise_family(self) -> NoiseFamily:
@@ -174,17 +174,6 @@ class Clues:
         angles = self.tracks.angles
         turning = 0.0 if angles is None else float(np.std(_finite(angles[chosen, body])))
         return bool(scatter <= freedom + REST_TEST * np.sqrt(2 * freedom)) and turning <= STILL_ANGLE_SD
-
-
-def _position_sd(tracks: Tracks, noise: float) -> Float[np.ndarray, "time body"]:
-    """Standard deviation (m) per axis: the stated ones, all larger where the tracks are rougher.
-
-    Errors that last look like motion, and make no roughness.
-    """
-    if (stated := stated_sd(tracks)) is None:
-        return np.full(tracks.seen.shape, noise)
-    sd, reference = stated
-    return sd * max(noise / reference, 1.0)
 
 
 def _roughness(tracks: Tracks) -> float:

@@ -134,25 +134,24 @@ def prior_noise(tracks: Tracks) -> float:
     return NOISE_SHARE_OF_RADIUS * float(np.median(radii)) if radii else NOISE_WITHOUT_RADIUS
 
 
+def stated_reference(tracks: Tracks) -> float | None:
+    """Standard deviation (m) of the position in the middle as it is stated; None where none is."""
+    variance = tracks.position_variance
+    return None if variance is None else float(np.sqrt(np.nanmedian(variance[tracks.seen])))
+
+
 def _whitening(
     tracks: Tracks, frame: Int[np.ndarray, "observation"], body: Int[np.ndarray, "observation"]
 ) -> tuple[Float[np.ndarray, "observation 2 2"], float]:
-    reference = prior_noise(tracks)
-    covariance = tracks.position_covariance
+    covariance, variance = tracks.position_covariance, tracks.position_variance
+    reference = stated_reference(tracks) or prior_noise(tracks)
     whitening = np.tile(np.eye(2) / reference, (len(frame), 1, 1))
-    if covariance is None:
+    if covariance is None or variance is None:
         return whitening, reference
-    seen = covariance[frame, body]
-    known = np.isfinite(seen).all(axis=(-1, -2)) & (np.trace(seen, axis1=-2, axis2=-1) > 0)
-    if not known.any():
-        return whitening, reference
-    variance = np.trace(seen[known], axis1=-2, axis2=-1) / 2
-    reference = float(np.sqrt(np.median(variance)))
-    floor = (SMALLEST_SHARE * reference) ** 2
-    values, vectors = np.linalg.eigh(seen[known])
-    scale = 1 / np.sqrt(np.maximum(values, floor))
-    whitening = np.tile(np.eye(2) / reference, (len(frame), 1, 1))
-    whitening[known] = scale[..., :, None] * np.swapaxes(vectors, -1, -2)
+    stated = np.isfinite(variance[frame, body])
+    values, vectors = np.linalg.eigh(covariance[frame, body][stated])
+    scale = 1 / np.sqrt(np.maximum(values, (SMALLEST_SHARE * reference) ** 2))
+    whitening[stated] = scale[..., :, None] * np.swapaxes(vectors, -1, -2)
     return whitening, reference
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 from jaxtyping import Bool, Float
 
-from vrdp_prob.models.observation import SMALLEST_SHARE, prior_noise
+from vrdp_prob.models.observation import SMALLEST_SHARE, prior_noise, stated_reference
 from vrdp_prob.scene import Tracks
 
 FEWEST = 8
@@ -31,7 +31,7 @@ def noise_scale(tracks: Tracks) -> float:
     count = len(positions) - WINDOW + 1
     if count < 1:
         return float("nan")
-    sd, reference = stated_sd(tracks) or (np.ones(tracks.seen.shape), 1.0)
+    sd, reference = _stated_sd(tracks) or (np.ones(tracks.seen.shape), 1.0)
     windows = np.arange(count)[:, None] + np.arange(WINDOW)
     weights = _third_difference(tracks.times[windows])
     spread = np.sqrt(np.einsum("wf,wfb->wb", weights**2, sd[windows] ** 2))
@@ -68,19 +68,33 @@ def _third_difference(times: Float[np.ndarray, "window frame"]) -> Float[np.ndar
     return np.asarray(weights / np.linalg.norm(weights, axis=-1, keepdims=True))
 
 
-def stated_sd(tracks: Tracks) -> tuple[Float[np.ndarray, "time body"], float] | None:
+def position_sd(tracks: Tracks, noise: float) -> Float[np.ndarray, "time body"]:
+    """Standard deviation (m) per axis: the stated ones, all larger where the tracks are rougher.
+
+    Errors that last look like motion, and make no roughness.
+
+    Parameters
+    ----------
+    tracks
+        The tracks.
+    noise
+        The noise (m) that they are taken to have.
+    """
+    if (stated := _stated_sd(tracks)) is None:
+        return np.full(tracks.seen.shape, noise)
+    sd, reference = stated
+    return sd * max(noise / reference, 1.0)
+
+
+def _stated_sd(tracks: Tracks) -> tuple[Float[np.ndarray, "time body"], float] | None:
     """Standard deviations (m) of positions as they are stated, and that of the one in the middle; None where none is.
 
     A position without a statement is like the one in the middle; none is believed to be far more exact than that.
     """
-    covariance = tracks.position_covariance
-    if covariance is None:
+    variance, reference = tracks.position_variance, stated_reference(tracks)
+    if variance is None or reference is None:
         return None
-    variance = np.trace(covariance, axis1=-2, axis2=-1) / 2
-    known = np.isfinite(variance) & (variance > 0)
-    reference = float(np.sqrt(np.median(variance[known & tracks.seen])))
-    sd = np.sqrt(np.where(known, variance, reference**2))
-    return np.maximum(sd, SMALLEST_SHARE * reference), reference
+    return np.maximum(np.sqrt(np.nan_to_num(variance, nan=reference**2)), SMALLEST_SHARE * reference), reference
 
 
 def _kept(positions: Float[np.ndarray, "time body 2"]) -> Bool[np.ndarray, "body 2"]:

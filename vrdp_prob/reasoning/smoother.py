@@ -12,7 +12,7 @@ from functools import cached_property
 import numpy as np
 from jaxtyping import Bool, Float
 
-from vrdp_prob.models.roughness import noise_scale
+from vrdp_prob.models.roughness import noise_scale, position_sd
 from vrdp_prob.scene import Tracks
 
 POSITION_SD = 10.0
@@ -61,13 +61,8 @@ def body_tracks(tracks: Tracks) -> tuple[BodyTrack, ...]:
     """The tracks of all bodies with the noise that was measured with them, else estimated from third differences."""
     estimated = noise_scale(tracks)
     scale = max(estimated, SMALLEST_NOISE) if np.isfinite(estimated) else LIKELY_NOISE
-    covariance, positions, seen = tracks.position_covariance, tracks.positions, tracks.seen
-    noise = np.full(seen.shape, scale)
-    if covariance is not None:
-        stated = np.sqrt(np.trace(covariance, axis1=-2, axis2=-1) / 2)
-        usable = np.isfinite(stated) & seen
-        # perception states how the noise varies; how large it is, the track itself knows better
-        noise[usable] = stated[usable] * max(scale / np.median(stated[usable]), 1.0) if usable.any() else scale
+    noise = position_sd(tracks, scale)
+    positions, seen = tracks.positions, tracks.seen
     return tuple(
         BodyTrack(tracks.times[seen[:, body]], positions[seen[:, body], body], noise[seen[:, body], body])
         for body in range(len(tracks.bodies))

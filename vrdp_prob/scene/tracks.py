@@ -122,8 +122,16 @@ class Tracks:
         if "position_covariance" not in self.data:
             return None
         covariance = np.asarray(self.data["position_covariance"].values, dtype=float)
-        variance = np.trace(covariance, axis1=-2, axis2=-1)
-        return covariance if (self.seen & np.isfinite(variance) & (variance > 0)).any() else None
+        return covariance if (self.seen & np.isfinite(_mean_variance(covariance))).any() else None
+
+    @property
+    def position_variance(self) -> Float[np.ndarray, "time body"] | None:
+        """Stated variance in m^2 of the measured positions, the mean of both coordinates; NaN where none is stated.
+
+        None where the covariance is.
+        """
+        covariance = self.position_covariance
+        return None if covariance is None else _mean_variance(covariance)
 
     @property
     def seen(self) -> Bool[np.ndarray, "time body"]:
@@ -234,6 +242,12 @@ class Tracks:
                         f"({wall.x2:g}, {wall.y2:g}) m at {self.times[frame]:g} s (centre {distance:.3g} m from it, "
                         f"radius {body.radius:g} m); check positions, radii and walls."
                     )
+
+
+def _mean_variance(covariance: Float[np.ndarray, "time body 2 2"]) -> Float[np.ndarray, "time body"]:
+    """Mean variance of both coordinates; NaN where it is none."""
+    variance = np.trace(covariance, axis1=-2, axis2=-1) / 2
+    return np.where(np.isfinite(covariance).all(axis=(-1, -2)) & (variance > 0), variance, np.nan)
 
 
 def _numbers(video: str, name: str, values: ArrayLike) -> Float[np.ndarray, "..."]:

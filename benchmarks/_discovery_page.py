@@ -86,7 +86,7 @@ def _recall(results: Sequence[Result]) -> str:
 
 def _confusion(results: Sequence[Result]) -> str:
     rows: dict[str, Counter[str]] = {}
-    for result in of(results, Kind.ONE, Kind.NULL, Kind.ROUGH_NULL, Kind.OUTSIDE):
+    for result in of(results, Kind.ONE, *NULLS, Kind.OUTSIDE):
         if result["kind"] == Kind.ONE and reached(result) < REACHED * SIZES[0]:
             continue
         title = ALL[result["ways"][0]].name if result["ways"] else result["kind"]
@@ -106,7 +106,7 @@ def _confusion(results: Sequence[Result]) -> str:
 
 def _nulls(results: Sequence[Result]) -> str:
     rows = []
-    for title, kinds in ((Kind.NULL, NULLS[:1]), (Kind.ROUGH_NULL, NULLS[1:]), ("both", NULLS)):
+    for title, kinds in (*((kind, (kind,)) for kind in NULLS), ("all", NULLS)):
         mine = of(results, *kinds)
         called = Counter(name for result in mine for name in named(result))
         shown = ", ".join(f"{name} {count}" for name, count in called.most_common()) or "-"

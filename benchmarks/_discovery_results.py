@@ -14,7 +14,7 @@ from vrdp_prob.discovery.search import gain_needed
 SURE, LIKELY = 0.9, 0.5
 REACHED = 0.95
 """Share of an effect size from which it counts as reached: the search for a strength is no finer."""
-NULLS = (Kind.NULL, Kind.ROUGH_NULL)
+NULLS = (Kind.NULL, Kind.ROUGH_NULL, Kind.GLIDING_NULL)
 NEEDED = gain_needed(len(CATALOGUE) + len(VARIANTS))
 """Gain (nats) without which the search names nothing, when it looks for all causes."""
 CERTAIN = 0.95

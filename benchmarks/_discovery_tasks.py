@@ -10,6 +10,7 @@ import _project  # noqa: F401  the generator belongs to the tests, which lie bes
 from tests.discovery.causes import CATALOGUE, VARIANTS
 from tests.discovery.data_set import DataSet
 from tests.discovery.other_effects import OTHERS
+from tests.discovery.scenes import Setting
 from vrdp_prob import load_all
 from vrdp_prob.scene import Tracks
 
@@ -19,6 +20,8 @@ STRONG = 6.0
 """Effect size of what has no name in the catalogue, or whose name is taken out of it."""
 TOGETHER = 4.0
 """Effect size of each of two causes."""
+HARDLY = 0.05
+"""Share of the usual friction and drag of a table that hardly brakes."""
 PAIRS = (
     ("surface_tilt", "linear_drag"),
     ("surface_tilt", "contact_radius_error"),
@@ -46,6 +49,7 @@ class Kind(StrEnum):
     TWO = "two causes"
     NULL = "null"
     ROUGH_NULL = "null, outliers and dropouts"
+    GLIDING_NULL = "null, a table that hardly brakes"
     OUTSIDE = "outside the catalogue"
     REMOVED = "removed from the catalogue"
 
@@ -102,7 +106,8 @@ def tasks(
     seeds
         Data sets of each cause and size, of each pair and of each effect outside the catalogue.
     nulls
-        Data sets with nothing hidden, every other one with outliers and dropouts.
+        Data sets with nothing hidden, every other one with outliers and dropouts; a third as many more are of tables
+        that hardly brake.
     videos, bodies
         Numbers of videos, and of bodies in each.
     """
@@ -118,9 +123,16 @@ def tasks(
             found += [Task(Kind.REMOVED, (way,), STRONG, seed) for way in single]
         rounds.append(found)
     empty = [Task((Kind.NULL, Kind.ROUGH_NULL)[k % 2], (), 0.0, k // 2 + 1) for k in range(nulls)]
-    share = -(-nulls // max(seeds, 1))
+    empty += [Task(Kind.GLIDING_NULL, (), 0.0, k + 1) for k in range(nulls // 3)]
+    share = -(-len(empty) // max(seeds, 1))
     listed = [task for k, found in enumerate(rounds) for task in (*found, *empty[k * share : (k + 1) * share])]
     return [replace(task, videos=videos, bodies=bodies) for task in (listed if rounds else empty)]
+
+
+def setting(task: Task) -> Setting:
+    """What kind of videos a data set is made of."""
+    resistance = HARDLY if task.kind is Kind.GLIDING_NULL else 1.0
+    return Setting(videos=task.videos, bodies=task.bodies, resistance=resistance)
 
 
 def handed_over(data: DataSet) -> list[Tracks]:

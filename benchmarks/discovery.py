@@ -25,13 +25,12 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 import torch
 from _discovery_page import page, tables
 from _discovery_results import checks
-from _discovery_tasks import SIZES, Kind, Task, handed_over, tasks
+from _discovery_tasks import SIZES, Kind, Task, handed_over, setting, tasks
 from _resumable import Result, measured, read
 
 from tests.discovery.data_set import Truth
 from tests.discovery.hidden import ROUGH, hide, true_values
 from tests.discovery.other_effects import ALL
-from tests.discovery.scenes import Setting
 from tests.discovery.videos import UnendingMotionError
 from vrdp_prob.discovery.discover import discover
 from vrdp_prob.discovery.finding import Finding, FoundCause
@@ -101,9 +100,8 @@ def one(task: Task) -> Result:
     torch.set_num_threads(1)
     facts: dict[str, Any] = {"task": task.name, **asdict(task)}
     rough = ROUGH if task.kind is Kind.ROUGH_NULL else None
-    setting = Setting(videos=task.videos, bodies=task.bodies)
     try:
-        data = hide(task.ways, seed=task.seed, effect_size=task.effect_size, setting=setting, measurement=rough)
+        data = hide(task.ways, seed=task.seed, effect_size=task.effect_size, setting=setting(task), measurement=rough)
     except (UnendingMotionError, ValueError) as error:  # scenes in which this cause finds no room
         return {**facts, "not_drawn": str(error)}
     facts["hidden"] = [

@@ -133,7 +133,7 @@ def test_videos_with_kicks_are_searched_anew_without_them(
     base, winner = _searcher(needed=2.0).chosen(tilt, search.Step(Mock(spec=refits.Left), (kicked,)))
     assert base.causes[0] == goes_on_from
     assert (winner and winner.causes[0]) == taken
-    tilt.mended.assert_called_once_with([2], seed=0)
+    tilt.mended.assert_called_once_with([2], seed=0, thorough=True)
 
 
 def _judge_by_gain(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -215,21 +215,23 @@ def test_a_video_is_searched_again_only_where_the_last_search_has_found_somethin
     assert found.searched_anew(tilt, [1, 2]) is better
     for _ in range(2):
         assert found.searched_anew(better, [1, 2]) is better
-    tilt.mended.assert_called_once_with([1, 2], seed=0)
+    tilt.mended.assert_called_once_with([1, 2], seed=0, thorough=True)
     followed.mended.assert_called_once_with([3], seed=0)
-    better.mended.assert_called_once_with([2], seed=1)
+    better.mended.assert_called_once_with([2], seed=1, thorough=True)
 
 
-def test_a_course_for_which_another_video_loses_its_own_is_a_wrong_one(monkeypatch: pytest.MonkeyPatch) -> None:
-    tilt, wrong = _refit("tilt", 5.0), _refit("a wrong course", 9.0)
-    tilt.fit = wrong.fit = Mock(fits=[""] * 4)
-    tilt.mended.return_value = wrong.mended.return_value = wrong
-    tilt.fallen_from.return_value, wrong.fallen_from.return_value = [2], [3]
+@pytest.mark.parametrize(("lost", "is_wrong"), [([1, 3], True), ([1], False)], ids=["lost", "explained still"])
+def test_a_course_for_which_another_video_loses_its_own_is_a_wrong_one(
+    lost: list[int], is_wrong: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    tilt, other = _refit("tilt", 5.0), _refit("another course", 9.0)
+    tilt.fit = other.fit = Mock(fits=[""] * 4)
+    tilt.mended.return_value = other.mended.return_value = other
+    tilt.fallen_from.return_value, other.fallen_from.return_value = [2], [3]
     monkeypatch.setattr(refits, "may_take_another_course", lambda _fit: True)
-    found = _refits()
-    for _ in range(2):
-        assert found.searched_anew(tilt, [2]) is tilt
-    tilt.mended.assert_called_once_with([2], seed=0)
+    monkeypatch.setattr(refits, "lost_videos", lambda _fit: lost)
+    assert _refits().searched_anew(tilt, [2]) is (tilt if is_wrong else other)
+    tilt.mended.assert_called_once_with([2], seed=0, thorough=True)
 
 
 @pytest.mark.parametrize(("brought", "followed"), [(200.0, True), (500.0, False)], ids=["less", "as promised"])

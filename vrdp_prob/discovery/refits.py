@@ -145,15 +145,17 @@ class Refits:
     def searched_anew(self, trial: Trial, videos: Sequence[int]) -> Trial:
         """A model with some videos searched anew, as far as they may take another course.
 
-        A course for which other videos lose theirs, and do not find it again, is a wrong one. A video of which a
-        search has found nothing better is not searched again; where it has, a further search takes another seed.
+        A course for which other videos lose theirs, and do not find it again, is a wrong one; one with which others
+        are a little less probable and explained still is none. A video of which a search has found nothing better is
+        not searched again; where it has, a further search takes another seed.
         """
         settled, passed = self._anew.get(trial, (frozenset(), 0))
         now = [one for one in videos if one not in settled and may_take_another_course(trial.fit.fits[one])]
-        found = trial.mended(now, seed=self.seed + passed) if now else trial
+        found = trial.mended(now, seed=self.seed + passed, thorough=True) if now else trial
         if found is not trial and (fallen := found.fallen_from(trial)):
             found = found.mended(fallen, seed=self.seed + passed)
-            found = trial if found.fallen_from(trial) else found
+            if (fallen := found.fallen_from(trial)) and not set(fallen).isdisjoint(lost_videos(found.fit)):
+                found = trial
         settled |= frozenset(now).difference([] if found is trial else trial.fallen_from(found))
         self._anew[trial] = self._anew[found] = (settled, passed + 1)
         return found

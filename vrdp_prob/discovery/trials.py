@@ -227,9 +227,9 @@ class Trial:
         kicked = [entry.owner for entry in entries if entry.field in own and entry.owner is not None]
         return kicked_at_contact(part.rollout.events, part.likelihood.tracks.times, kicked)
 
-    def mended(self, lost: Sequence[int], *, seed: int) -> "Trial":
+    def mended(self, lost: Sequence[int], *, seed: int, thorough: bool = False) -> "Trial":
         """The fit with some videos searched anew; itself where that finds nothing better."""
-        fit = self.fit.mended(lost, seed=seed)
+        fit = self.fit.mended(lost, seed=seed, thorough=thorough)
         return self if fit is self.fit else replace(self, fit=fit)
 
     def without(self, cause: Effect) -> "Trial":

@@ -146,7 +146,7 @@ class SharedFit:
         found = climb(numbers, videos, shared, locals_, towards=towards, least=least, rounds=rounds)
         return _finished(found, model, self.fits, structures, self.shared, model_error=model_error)
 
-    def mended(self, lost: Sequence[int], *, seed: int) -> "SharedFit":
+    def mended(self, lost: Sequence[int], *, seed: int, thorough: bool = False) -> "SharedFit":
         """The fit with a new search for what happened in some videos, given what the others say; the better of both.
 
         Videos in which single numbers are held keep what they have.
@@ -157,6 +157,8 @@ class SharedFit:
             Videos that may have lost their course of events.
         seed
             Seed of the searches.
+        thorough
+            Whether a search goes on where it explains a video as well as others are explained.
         """
         joint = self.joint
         lost = [index for index in lost if not self.structures[index].held]
@@ -175,7 +177,16 @@ class SharedFit:
             replace(fit, modes=(replace(fit.modes[0], point=points.get(index, joint.point(index))),))
             for index, fit in enumerate(self.fits)
         ]
-        fits = look_again(settled, lost, self.model, self.shared, seed=seed, looks=MENDING_LOOKS, asked=others)
+        fits = look_again(
+            settled,
+            lost,
+            self.model,
+            self.shared,
+            seed=seed,
+            looks=MENDING_LOOKS,
+            asked=others,
+            thorough=thorough,
+        )
         changed = [index for index in lost if fits[index] is not settled[index]]
         if not changed:
             return self

@@ -87,6 +87,7 @@ def look_again(
     looks: int = LOOKS,
     islands: bool = False,
     asked: Collection[int] | None = None,
+    thorough: bool = False,
 ) -> list[MapFit]:
     """The fits of single videos, with some of them searched anew, and improved where that is better.
 
@@ -108,11 +109,13 @@ def look_again(
         See `consensus`.
     asked
         Videos that say something of the shared parameters, as far as they are trusted; all where None.
+    thorough
+        Whether the looks go on where a fit is as good as those of other videos.
     """
     if not chosen:
         return list(fits)
     excess = _excess(fits)
-    goal = WORSE * float(np.median([one.misfit.residual_sd for one in fits]))
+    goal = 0.0 if thorough else WORSE * float(np.median([one.misfit.residual_sd for one in fits]))
     ways = [(look % 2 == 0, IN_DOUBT) for look in range(looks)] + ([(True, TURNING)] if explained(fits) else [])
     among = range(len(fits)) if asked is None else asked
     look = _Look(model, _told(fits, model, shared, among, islands=islands), goal, seed, tuple(ways))

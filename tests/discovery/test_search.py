@@ -144,23 +144,37 @@ def _judge_by_gain(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(search._Searcher, "doubted", doubted)
 
 
-def test_lost_videos_are_searched_once_and_only_where_refits_leave_something(monkeypatch: pytest.MonkeyPatch) -> None:
-    plain, leaving, lost = _refit("", 0.0), _refit("tilt", 1.0), _refit("tilt+friction", 50.0)
+@pytest.mark.parametrize("enough", [True, False], ids=["enough", "too little"])
+@pytest.mark.parametrize("refitted", [True, False], ids=["refitted before", "not refitted"])
+def test_lost_videos_are_searched_once_and_refits_made_only_where_that_leaves_something(
+    *, refitted: bool, enough: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    tilt, drag, lost = _refit("tilt", 1.0), _refit("drag", 5.0), _refit("tilt+friction", 50.0)
     asked: list[Trial] = []
 
     def searched(_self: object, trial: Trial, _found: object) -> list[Trial]:
         asked.append(trial)
         return [lost]
 
-    monkeypatch.setattr(refits.Refits, "_new", lambda _self, trial: [_refit("drag", 5.0)])
-    monkeypatch.setattr(refits.Refits, "settled", lambda _self, trial, _found: trial is plain)
+    monkeypatch.setattr(refits.Refits, "_new", lambda _self, _trial: [drag])
+    monkeypatch.setattr(refits.Refits, "settled", lambda _self, _trial, found: enough and found[:1] == [lost])
     monkeypatch.setattr(refits.Refits, "_lost", searched)
     found = _refits()
-    assert [one.causes for one in found.with_lost(plain)] == [("drag",)]
+    if refitted:
+        found.of(tilt)
     for _ in range(2):
-        assert [one.causes for one in found.with_lost(leaving)] == [("tilt", "friction"), ("drag",)]
-    assert found.of(leaving) == found.with_lost(leaving)
-    assert asked == [leaving]
+        assert found.with_lost(tilt) == ([lost] if enough and not refitted else [lost, drag])
+    assert found.of(tilt) == found.with_lost(tilt)
+    assert asked == [tilt]
+
+
+def test_lost_videos_are_not_searched_where_refits_leave_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    plain, drag = _refit("", 0.0), _refit("drag", 5.0)
+    monkeypatch.setattr(refits.Refits, "_new", lambda _self, _trial: [drag])
+    monkeypatch.setattr(refits.Refits, "settled", lambda _self, _trial, found: found == [drag])
+    monkeypatch.setattr(refits.Refits, "_lost", Mock(side_effect=AssertionError))
+    found = _refits()
+    assert found.of(plain) == found.with_lost(plain) == [drag]
 
 
 @pytest.mark.parametrize(

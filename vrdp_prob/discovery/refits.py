@@ -94,9 +94,9 @@ class Refits:
         """Refits of a model, the best first."""
         return self._made[trial] if trial in self._made else self._keep(trial, self._new(trial))
 
-    def made(self, trial: Trial) -> Sequence[Trial]:
+    def made(self, trial: Trial) -> list[Trial]:
         """Refits of a model as far as any were made, the best first."""
-        return self._made.get(trial, ())
+        return self._made.get(trial, [])
 
     def _keep(self, trial: Trial, found: Sequence[Trial]) -> list[Trial]:
         """Refits of a model, the best first, as which they count from now on."""
@@ -118,11 +118,17 @@ class Refits:
         return found
 
     def with_lost(self, trial: Trial) -> list[Trial]:
-        """The refits, and where they leave something fits from the beginning, which count among them from then on."""
-        found = self.of(trial)
+        """The refits, and where these leave something fits from the beginning, which count among them from then on.
+
+        Where nothing was refitted yet, fits from the beginning come first: scores of a fit that has lost videos call
+        for many causes, each of which costs more than the search for the one that explains such a video.
+        """
+        refitted, found = trial in self._made, self.made(trial)
         if trial not in self._searched and not self.settled(trial, found):
             self._searched.add(trial)
-            return self._keep(trial, [*found, *self._lost(trial, found)])
+            found = self._keep(trial, [*found, *self._lost(trial, found)])
+            if not refitted and not self.settled(trial, found):
+                found = self._keep(trial, [*found, *self._new(trial)])
         return found
 
     def with_lost_found(self, trial: Trial, one: Trial) -> Trial:

@@ -315,7 +315,8 @@ class _Searcher:
     def _rivals(self, best: Trial, lesser: Sequence[Trial], steps: Sequence[Step]) -> tuple[tuple[Trial, ...], ...]:
         """For each cause of a model: models in which another one takes its place.
 
-        A rival was tried when that cause was, and came close to it.
+        A rival was tried when that cause was, and came close to it. Of a single cause all that was tried on the model
+        that was given are rivals.
         """
         found = []
         for cause, without in zip(best.causes, lesser, strict=True):
@@ -327,6 +328,8 @@ class _Searcher:
                 close = {one.causes[-1].name for one in others if gain(one, without)[0] > least}
                 again = [one for one in step.left.scores if one.effect.name in close][:MOST_RIVALS]
                 others = self.refits.made_of(without, again)
+                if len(best.causes) == 1:
+                    others += [one for one in steps[0].tried if one.causes[-1].name not in {*best.names, *close}]
             found.append(tuple(one for one in others if not one.patches(one.causes[-1])))
         return tuple(found)
 

@@ -38,6 +38,8 @@ class LinearVideo:
         Number of the residuals that are of the data.
     whitening
         What makes the data's residuals independent, where they stray; None where they are independent.
+    at_edge
+        Whether the fit ends at an edge between two courses of events, where derivatives promise what does not come.
     """
 
     name: str
@@ -46,6 +48,7 @@ class LinearVideo:
     shared: Float[np.ndarray, "residual shared"]
     data: int
     whitening: Whitening | None = None
+    at_edge: bool = False
 
     @cached_property
     def _decomposed(
@@ -85,9 +88,23 @@ class LinearVideo:
         return float((self._basis[: self.data] ** 2).sum())
 
     @property
+    def promised(self) -> float:
+        """Gain (nats) that the derivatives promise where the own unknowns follow."""
+        return float(((self._basis.T @ self.residuals) ** 2).sum()) / 2
+
+    @property
     def left(self) -> Float[np.ndarray, "residual"]:
         """The residuals when the own unknowns are at their best, the shared ones being those of the fit."""
-        return self.without_own(self.residuals[:, None])[:, 0]
+        return self.settled(self.residuals[:, None])[:, 0]
+
+    def settled(self, residuals: Float[np.ndarray, "residual column"]) -> Float[np.ndarray, "residual column"]:
+        """What is left of residuals when the own unknowns are at their best; at an edge they are there already."""
+        return residuals if self.at_edge else self.without_own(residuals)
+
+    def slope(self, left: Float[np.ndarray, "residual column"]) -> Float[np.ndarray, "shared column"]:
+        """Derivative of half the sum of squares of such residuals by the shared unknowns; none at an edge."""
+        slope: np.ndarray = self.reduced_shared.T @ left
+        return np.zeros_like(slope) if self.at_edge else slope
 
     def without_own(
         self, directions: Float[np.ndarray, "residual direction"]
@@ -297,6 +314,13 @@ class LinearFit:
         left = self.left_of([video.residuals[:, None] for video in self.videos], self.prior_gradient[:, None])
         return tuple(one[:, 0] for one in left)
 
+    @property
+    def slopes(self) -> list[Float[np.ndarray, "shared"]]:
+        """Derivative of each video's negative log density by the shared unknowns when all are at their best."""
+        slopes = [video.slope(video.left[:, None])[:, 0] for video in self.videos]
+        step = self._step(self.prior_gradient + sum(slopes))
+        return [slope - curvature @ step for slope, curvature in zip(slopes, self.curvatures, strict=True)]
+
     @cached_property
     def degrees(self) -> float:
         """Number of the data's residuals, less what the unknowns can absorb of noise."""
@@ -311,12 +335,10 @@ class LinearFit:
         prior_gradient: Float[np.ndarray, "shared column"],
     ) -> tuple[Float[np.ndarray, "_ column"], ...]:
         """What all unknowns together leave of some residuals, each column by itself."""
-        reduced = [video.without_own(one) for video, one in zip(self.videos, residuals, strict=True)]
-        gradient = prior_gradient + sum(
-            video.reduced_shared.T @ one for video, one in zip(self.videos, reduced, strict=True)
-        )
+        settled = [video.settled(one) for video, one in zip(self.videos, residuals, strict=True)]
+        gradient = prior_gradient + sum(video.slope(one) for video, one in zip(self.videos, settled, strict=True))
         step = self._step(gradient)
-        return tuple(one - video.reduced_shared @ step for video, one in zip(self.videos, reduced, strict=True))
+        return tuple(one - video.reduced_shared @ step for video, one in zip(self.videos, settled, strict=True))
 
     def score(self, directions: Sequence[Float[np.ndarray, "_ strength"] | None]) -> Score:
         """Score of strengths, given what each does to the data's residuals of each video (None where nothing)."""

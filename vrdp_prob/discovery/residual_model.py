@@ -19,6 +19,7 @@ from vrdp_prob.discovery.linear import LinearFit, LinearVideo, Score
 from vrdp_prob.inference.least_squares import jacobian
 from vrdp_prob.inference.noise_fit import NOISE_FIELDS
 from vrdp_prob.inference.parallel import in_parallel
+from vrdp_prob.inference.several_videos.ascent import STEEP
 from vrdp_prob.inference.several_videos.fitting import SharedFit
 from vrdp_prob.inference.several_videos.joint_fit import expand_prior
 from vrdp_prob.inference.several_videos.linking import LinkedVideo
@@ -160,8 +161,9 @@ class VideoResiduals:
         columns[:, video.shared_columns] = derivative[:, video.shared_places]
         own = [place for place in video.local_places if world[place]]
         predicted = likelihood.fitted(torch.from_numpy(point[None]))[0, observations.frame, observations.body, :2]
+        linear = LinearVideo(video.name, values, derivative[:, own], columns, data)
         return cls(
-            LinearVideo(video.name, values, derivative[:, own], columns, data),
+            replace(linear, at_edge=linear.promised > STEEP),
             likelihood,
             FittedMotion.of(likelihood, point),
             noise,

@@ -304,11 +304,16 @@ def _log_densities(linear: LinearFit, stretched: Sequence[float]) -> Float[np.nd
         Logarithm of the factor by which those of each video were stretched.
     """
     found = []
-    for video, left, log_factor, others in zip(
-        linear.videos, linear.left, stretched, all_but_each(linear.prior, linear.curvatures), strict=True
+    for video, left, slope, log_factor, others in zip(
+        linear.videos,
+        linear.left,
+        linear.slopes,
+        stretched,
+        all_but_each(linear.prior, linear.curvatures),
+        strict=True,
     ):
-        own, rows = video.log_volume + log_factor - float(left @ left) / 2, video.reduced_shared
-        found.append(left_out(own, rows.T @ left, rows, others, np.zeros(rows.shape[1])).log_density)
+        own = video.log_volume + log_factor - float(left @ left) / 2
+        found.append(left_out(own, slope, video.reduced_shared, others, np.zeros(len(slope))).log_density)
     return np.array(found)
 
 

@@ -7,6 +7,7 @@ from tests.discovery.fitted import SMALL, fitted
 from tests.discovery.hidden import hide
 from tests.discovery.scenes import Setting
 from vrdp_prob.discovery import discover as module
+from vrdp_prob.discovery import outcome
 from vrdp_prob.discovery.body_checks import REBOUND
 from vrdp_prob.discovery.checks import run_checks
 from vrdp_prob.discovery.contact_checks import AT_WALLS, KICK, REBOUND_AT_WALLS
@@ -77,7 +78,7 @@ def test_a_doubted_cause_is_told_of_and_not_part_of_the_extended_model(monkeypat
     data, _ = fitted("surface_tilt", 5.0, seed=2, setting=SMALL)
     described: list[SharedFit] = []
     monkeypatch.setattr(module, "describe", lambda fit, checks: described.append(fit) or describe(fit, checks))
-    monkeypatch.setattr(module, "doubts", lambda *_given: [Doubt(0.1, "It is something else.")])
+    monkeypatch.setattr(outcome, "doubts", lambda *_given: [Doubt(0.1, "It is something else.")])
     finding = module.discover(data.tracks, catalogue=[SurfaceTilt()], processes=1)
     assert finding.verdict is Verdict.UNKNOWN
     assert finding.named == ()
@@ -97,7 +98,7 @@ def test_of_two_causes_only_the_doubted_one_is_left_out(monkeypatch: pytest.Monk
     def only_the_tilt(_trial: Trial, cause: Effect, _left: object = ()) -> list[Doubt]:
         return [Doubt(0.1, "It is something else.")] if cause.name == SurfaceTilt.name else []
 
-    monkeypatch.setattr(module, "doubts", only_the_tilt)
+    monkeypatch.setattr(outcome, "doubts", only_the_tilt)
     finding = module.discover(data.tracks, catalogue=[SurfaceTilt(), LinearDrag()], processes=1)
     assert finding.verdict is Verdict.UNKNOWN
     assert [one.name for one in finding.named] == [LinearDrag.name]

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from tests.discovery.findings import TILT, WIND
-from vrdp_prob.discovery import discover, tried
+from vrdp_prob.discovery import outcome, tried
 from vrdp_prob.discovery.finding import Check, Verdict
 from vrdp_prob.discovery.search import Search
 from vrdp_prob.discovery.trials import Trial
@@ -53,21 +53,21 @@ def test_the_verdict(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     found = _search(causes)
-    monkeypatch.setattr(discover, "_excess", lambda trial: excess if trial is found.best else 3.0)
-    assert discover._verdict(found, _checks(12), after) is verdict
+    monkeypatch.setattr(outcome, "_excess", lambda trial: excess if trial is found.best else 3.0)
+    assert outcome._verdict(found, _checks(12), after) is verdict
 
 
 def test_a_cause_that_may_take_the_place_of_several_is_told_once() -> None:
     other, rival = replace(WIND, named=False, probability=0.07), replace(WIND, named=False, probability=0.12)
-    assert discover._in_order([TILT, other, rival]) == [TILT, rival]
-    assert discover._in_order([TILT, replace(TILT, named=False, probability=1.0)]) == [TILT]
+    assert outcome._in_order([TILT, other, rival]) == [TILT, rival]
+    assert outcome._in_order([TILT, replace(TILT, named=False, probability=1.0)]) == [TILT]
 
 
 def test_causes_stand_named_ones_first_and_by_probability_doubted_ones_among_the_others() -> None:
     rival, doubted = (replace(WIND, name=name, named=False) for name in ("rival", "doubted"))
     rival, doubted = replace(rival, probability=0.1), replace(doubted, probability=0.6)
     sure, less = replace(TILT, name="sure", probability=0.99), replace(TILT, probability=0.85)
-    assert discover._in_order([less, sure, rival, doubted]) == [sure, less, doubted, rival]
+    assert outcome._in_order([less, sure, rival, doubted]) == [sure, less, doubted, rival]
 
 
 @pytest.mark.parametrize(

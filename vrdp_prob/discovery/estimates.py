@@ -8,6 +8,7 @@ from jaxtyping import Float
 from scipy.stats import chi2
 
 from vrdp_prob.discovery.finding import Estimate, UpperBound
+from vrdp_prob.discovery.reach import Reach, reach_of
 from vrdp_prob.discovery.scores import CauseScore, Largest
 from vrdp_prob.discovery.unexplained import Unexplained
 from vrdp_prob.inference.several_videos.fitting import SharedFit
@@ -53,7 +54,12 @@ def estimates(
             words = place_words(key[1])
             name = f"{key[0]}[{words}]" if words else key[0]
             mean, sd = float(joint.gaussian.mean[place]), float(shared_sd[place])
-            found[name] = _estimate(units[key[0]].transform, mean, sd, units[key[0]].unit)
+            parameter, far = units[key[0]], reach_of(fit, place, sd / float(joint.gaussian.sd[place]))
+            found[name] = (
+                _estimate(parameter.transform, mean, sd, parameter.unit)
+                if far is None
+                else _reaching(parameter.transform, far, parameter.unit)
+            )
     for index, video in enumerate(joint.videos):
         coordinates, point = video.likelihood.coordinates, joint.point(index)
         sd = np.sqrt(factors[index] * np.diag(np.linalg.inv(joint.precision(index))))
@@ -105,6 +111,13 @@ def _estimate(transform: Transform, mean: float, sd: float, unit: str) -> Estima
         return Estimate(mean, sd, low, high, unit)
     middle = math.exp(mean + sd**2 / 2)
     return Estimate(middle, middle * math.sqrt(math.expm1(sd**2)), math.exp(low), math.exp(high), unit)
+
+
+def _reaching(transform: Transform, far: Reach, unit: str) -> Estimate:
+    """An estimate of what reaches farther than a Gaussian says."""
+    value = np.exp if transform is Transform.LOG else np.asarray
+    low, high = (float(value(far.quantile(share))) for share in ((1 - CERTAIN) / 2, (1 + CERTAIN) / 2))
+    return Estimate(*far.moments(value), low, high, unit)
 
 
 def _between_frames(middle: float, tracks: Tracks, unit: str) -> Estimate:

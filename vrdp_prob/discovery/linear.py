@@ -317,9 +317,9 @@ class LinearFit:
     @property
     def slopes(self) -> list[Float[np.ndarray, "shared"]]:
         """Derivative of each video's negative log density by the shared unknowns when all are at their best."""
-        slopes = [video.slope(video.left[:, None])[:, 0] for video in self.videos]
-        step = self._step(self.prior_gradient + sum(slopes))
-        return [slope - curvature @ step for slope, curvature in zip(slopes, self.curvatures, strict=True)]
+        slopes = [video.slope(video.left[:, None]) for video in self.videos]
+        step = self._step(self.prior_gradient[:, None] + sum(slopes))
+        return [(slope - curvature @ step)[:, 0] for slope, curvature in zip(slopes, self.curvatures, strict=True)]
 
     @cached_property
     def degrees(self) -> float:

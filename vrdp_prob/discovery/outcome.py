@@ -1,0 +1,198 @@
+"""What a search for causes has found, and what is believed of it: doubts, probabilities and the verdict."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from jaxtyping import Float
+
+from vrdp_prob.discovery.checks import run_checks
+from vrdp_prob.discovery.doubts import Doubt, doubts, with_doubts
+from vrdp_prob.discovery.estimates import cause_sentence, estimates
+from vrdp_prob.discovery.finding import Check, FoundCause, Gain, Verdict
+from vrdp_prob.discovery.mimics import Unlisted, laws_of, without_mimics
+from vrdp_prob.discovery.search import Search, search
+from vrdp_prob.discovery.trials import Trial, gain, gains, weights
+from vrdp_prob.inference.several_videos.fitting import SharedFit
+from vrdp_prob.models.effects.effect import Effect
+from vrdp_prob.progress import ProgressDisplay
+
+MIMIC = 0.5
+"""Probability that a cause only follows something outside the catalogue, where something outside it is at work."""
+EXPLAINED = 0.5
+"""Share of what the model left unexplained beyond the noise, and of the checks that failed, that the named causes must
+explain for them to be the verdict where something is left."""
+LEFT_LEVEL = 0.005
+"""Probability, over all checks, with which a model that explains everything is taken to leave something."""
+LEAST_SHARE = 0.01
+"""Probability from which a cause is told of that could take the place of a named one."""
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What a search has found, and what is believed of it.
+
+    Parameters
+    ----------
+    found
+        The search, doubted causes taken out.
+    checks, after
+        Checks of the model that was given, and of the best one.
+    verdict
+        What is said of the videos.
+    causes
+        Causes that are told of.
+    reasons, unlisted
+        Why causes are doubted, and what outside the catalogue explains others away.
+    """
+
+    found: Search
+    checks: tuple[Check, ...]
+    after: tuple[Check, ...]
+    verdict: Verdict
+    causes: tuple[FoundCause, ...]
+    reasons: tuple[Doubt, ...]
+    unlisted: tuple[Unlisted, ...]
+
+
+def outcome_of(fit: SharedFit, catalogue: Sequence[Effect], *, seed: int, progress: ProgressDisplay | None) -> Outcome:
+    """Search for causes, and put those that are found in doubt."""
+    found = search(fit, catalogue, seed=seed, progress=progress)
+    checks = run_checks(found.base.fit, seed=seed)
+    after = _checks_after(found, checks, seed)
+    found, after, unlisted = _without_mimics(found, checks, after, seed=seed, progress=progress)
+    not_named: list[FoundCause] = []
+    reasons: list[Doubt] = []
+    while doubted := _doubted(found, after):
+        not_named += [one for one in _causes(found, doubted, seed) if not one.named]
+        other = next((one for cause in doubted if (one := found.with_rival(cause, _credible)) is not None), None)
+        if other is None:
+            reasons += [one for some in doubted.values() for one in some]
+        found = found.without(list(doubted)) if other is None else other
+        after = _checks_after(found, checks, seed)
+        found, after, further = _without_mimics(found, checks, after, seed=seed, progress=progress)
+        unlisted += further
+    verdict = Verdict.UNKNOWN if unlisted or reasons else _verdict(found, checks, after)
+    causes = _in_order([*_causes(found, {}, seed), *not_named])
+    if verdict is Verdict.UNKNOWN:
+        causes = [replace(one, probability=(1 - MIMIC) * one.probability) for one in causes]
+    return Outcome(found, checks, after, verdict, tuple(causes), tuple(reasons), unlisted)
+
+
+def _checks_after(found: Search, checks: tuple[Check, ...], seed: int) -> tuple[Check, ...]:
+    """The checks of the best model; those of the base model where it has no causes."""
+    return run_checks(found.best.fit, seed=seed) if found.best.causes else checks
+
+
+def _without_mimics(
+    found: Search, before: tuple[Check, ...], after: tuple[Check, ...], *, seed: int, progress: ProgressDisplay | None
+) -> tuple[Search, tuple[Check, ...], tuple[Unlisted, ...]]:
+    """A search without the causes that a law of no particular cause explains away, its checks, and what that does."""
+    laws = laws_of(after)
+    if not found.best.causes or not laws:
+        return found, after, ()
+    left, unlisted = without_mimics(found, laws, seed=seed, progress=progress)
+    told = () if unlisted is None else (unlisted,)
+    return left, after if left is found else _checks_after(left, before, seed), told
+
+
+def _doubted(found: Search, after: Sequence[Check]) -> dict[Effect, tuple[Doubt, ...]]:
+    """The causes of the best model that are doubted, and why."""
+    reasons = {cause: tuple(doubts(found.best, cause, after)) for cause in found.best.causes}
+    return {cause: some for cause, some in reasons.items() if some}
+
+
+def _credible(trial: Trial) -> bool:
+    """Whether nobody doubts the last cause of a model by its parameters."""
+    return not any(doubts(trial, trial.causes[-1]))
+
+
+def _verdict(found: Search, before: Sequence[Check], after: Sequence[Check]) -> Verdict:
+    """What is said of a model whose causes nobody doubts, by the checks before and after."""
+    left = min((check.p_value for check in after), default=1.0) * len(after) < LEFT_LEVEL
+    if not found.best.causes:
+        return Verdict.UNKNOWN if left else Verdict.NONE
+    most = 1 - EXPLAINED
+    explained = _excess(found.best) <= most * _excess(found.base) and _failing(after) <= most * _failing(before)
+    return Verdict.UNKNOWN if left and not explained else Verdict.NAMED
+
+
+def _failing(checks: Sequence[Check]) -> int:
+    return sum(check.significant for check in checks)
+
+
+def _excess(trial: Trial) -> float:
+    """Variance of the residuals beyond that of the noise, in units of the noise."""
+    return max(float(np.mean([part.misfit.chi_square for part in trial.fit.fits])) - 1.0, 0.0)
+
+
+def _causes(found: Search, doubted: Mapping[Effect, Sequence[Doubt]], seed: int) -> list[FoundCause]:
+    """The causes of the best model, and those that could take the place of one.
+
+    What another way of a cause has for it, that cause has.
+    """
+    causes: list[FoundCause] = []
+    for number, (lesser, rivals) in enumerate(zip(found.lesser, found.rivals, strict=True)):
+        best_of = {one.causes[-1].name: one for one in reversed(rivals)}
+        trials = [found.best, lesser, *best_of.values()]
+        simplest = max(one.log_prior for one in (found.best, *best_of.values()))
+        log_prior = [one.log_prior - simplest - found.needed for one in (found.best, *best_of.values())]
+        log_prior.insert(1, 0.0)
+        shares = weights(trials, log_prior, np.random.default_rng(seed), overdispersion=found.overdispersion)
+        cause = found.best.causes[number]
+        reasons = doubted.get(cause, ())
+        told = {2 + k: rival for k, rival in enumerate(best_of.values()) if shares[2 + k] >= LEAST_SHARE}
+        why = {0: reasons} | {k: tuple(doubts(rival, rival.causes[-1])) for k, rival in told.items()}
+        believed = with_doubts(shares, why)
+        ways: dict[str, list[int]] = {cause.cause_name(): [0]}
+        for k in sorted(told, key=lambda k: -believed[k]):
+            ways.setdefault(told[k].causes[-1].cause_name(), []).append(k)
+        for first, *others in ways.values():
+            trial = told.get(first, found.best)
+            effect = trial.causes[-1] if first else cause
+            probability = float(believed[[first, *others]].sum())
+            named = not first and not reasons
+            causes.append(_cause(trial, effect, lesser, found.overdispersion, probability, named=named))
+    return causes
+
+
+def _in_order(causes: Sequence[FoundCause]) -> list[FoundCause]:
+    """Named causes first, each group by probability; one that may take the place of several stands there once."""
+    first: dict[str, FoundCause] = {}
+    for cause in sorted(causes, key=lambda one: (not one.named, -one.probability)):
+        first.setdefault(cause.effect, cause)
+    return list(first.values())
+
+
+def _cause(
+    trial: Trial,
+    effect: Effect,
+    lesser: Trial,
+    overdispersion: Float[np.ndarray, "video"],
+    probability: float,
+    *,
+    named: bool,
+) -> FoundCause:
+    values = estimates(trial.fit, effect, unexplained=trial.unexplained, overdispersion=overdispersion)
+    return FoundCause(
+        name=effect.cause_name(),
+        probability=min(max(probability, 0.0), 1.0),
+        sentence=cause_sentence(effect, values),
+        parameters=values,
+        gain=_gain(lesser, trial, overdispersion),
+        named=named,
+        way=effect.way(),
+    )
+
+
+def _gain(before: Trial, after: Trial, overdispersion: Float[np.ndarray, "video"]) -> Gain:
+    difference, error = gain(after, before, overdispersion)
+    videos = after.fit.videos
+    return Gain(
+        before=before.held_out,
+        after=after.held_out,
+        noise=float(np.median([part.clues.noise for part in after.fit.fits])),
+        elpd_difference=difference,
+        elpd_se=error,
+        by_video=dict(zip(videos, gains(after, before, overdispersion).tolist(), strict=True)),
+    )

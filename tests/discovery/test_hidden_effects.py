@@ -4,6 +4,7 @@ The whole grid is `benchmarks/discovery.py`.
 """
 
 from collections.abc import Collection, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -136,3 +137,28 @@ def test_a_cause_is_named(way: str, tmp_path: Path) -> None:
     assert finding.verdict is Verdict.NAMED
     assert finding.causes[0].name == way
     assert finding.causes[0].gain.elpd_difference > 0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("way", ["surface_tilt", "rotating_table"])
+def test_a_cause_is_named_alone_where_videos_easily_take_a_wrong_course(way: str, tmp_path: Path) -> None:
+    _, finding = finding_of(tmp_path, [way], seed=2, effect_size=3.0, setting=LARGER)
+    assert finding.verdict is Verdict.NAMED
+    assert [cause.name for cause in finding.named] == [way]
+    assert finding.named[0].probability > SURE
+
+
+@pytest.mark.slow
+def test_a_friction_that_ends_all_sliding_may_be_larger_still(tmp_path: Path) -> None:
+    truth, finding = finding_of(tmp_path, ["contact_friction"], seed=2, effect_size=3.0, setting=LARGER)
+    assert [cause.name for cause in finding.named] == ["contact_friction"]
+    found, true = finding.named[0].parameters["contact_friction"], truth.causes[0].strength
+    assert found.q025 < true < found.q975
+    assert finding.extended.beliefs["contact_friction"].prior.sd > 0.1
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [2, 4])
+def test_a_single_video_on_a_wrong_course_is_no_false_alarm(seed: int, tmp_path: Path) -> None:
+    _, finding = finding_of(tmp_path, [], seed=seed, setting=replace(LARGER, resistance=0.05))
+    assert finding.verdict is Verdict.NONE

@@ -6,6 +6,7 @@ import numpy as np
 from jaxtyping import Float
 
 from vrdp_prob.discovery.estimates import widened
+from vrdp_prob.discovery.reach import reaches
 from vrdp_prob.discovery.scores import happens_once
 from vrdp_prob.discovery.trials import Trial
 from vrdp_prob.inference.several_videos.learned import believing
@@ -27,7 +28,11 @@ def extended_model(trial: Trial, overdispersion: Float[np.ndarray, "video"]) -> 
         Factor of each video by which variances are larger than what the likelihood says.
     """
     gaussian = trial.fit.joint.gaussian
-    return _believing(_of_the_table(trial), trial, gaussian.mean, gaussian.sd, overdispersion)
+    mean, wide = gaussian.mean.copy(), widened(gaussian.sd, overdispersion, trial.unexplained)
+    of_causes = {parameter.name for cause in trial.causes for parameter in cause.parameters}
+    for place, far in reaches(trial.fit, of_causes, wide).items():
+        mean[place], wide[place] = far.moments(np.asarray)
+    return believing(_of_the_table(trial), trial.fit.joint.numbers.keys, mean, wide)
 
 
 def models_of_the_others(
@@ -46,7 +51,12 @@ def models_of_the_others(
     """
     without, with_causes = (
         {
-            video: _believing(model, trial, cavity.mean, np.sqrt(np.diag(cavity.covariance)), overdispersion)
+            video: believing(
+                model,
+                trial.fit.joint.numbers.keys,
+                cavity.mean,
+                widened(np.sqrt(np.diag(cavity.covariance)), overdispersion, trial.unexplained),
+            )
             for video, cavity in trial.cavities.items()
         }
         for trial, model in ((trial, _of_the_table(trial)) for trial in (given, extended))
@@ -61,14 +71,3 @@ def _of_the_table(trial: Trial) -> PhysicsModel:
         if happens_once(cause):
             model = model.without_effect(cause)
     return model
-
-
-def _believing(
-    model: PhysicsModel,
-    trial: Trial,
-    mean: Float[np.ndarray, "shared"],
-    sd: Float[np.ndarray, "shared"],
-    overdispersion: Float[np.ndarray, "video"],
-) -> PhysicsModel:
-    wide = widened(sd, overdispersion, trial.unexplained)
-    return believing(model, trial.fit.joint.numbers.keys, mean, wide)

@@ -8,7 +8,7 @@ from jaxtyping import Float
 from scipy.stats import chi2
 
 from vrdp_prob.discovery.finding import Estimate, UpperBound
-from vrdp_prob.discovery.reach import Reach, reach_of
+from vrdp_prob.discovery.reach import Reach, reaches
 from vrdp_prob.discovery.scores import CauseScore, Largest
 from vrdp_prob.discovery.unexplained import Unexplained
 from vrdp_prob.inference.several_videos.fitting import SharedFit
@@ -48,18 +48,15 @@ def estimates(
     shared_sd = widened(fit.joint.gaussian.sd, factors, unexplained)
     units = {parameter.name: parameter for parameter in effect.parameters}
     found: dict[str, Estimate] = {}
-    joint = fit.joint
+    joint, farther = fit.joint, reaches(fit, units, shared_sd)
     for place, key in enumerate(joint.numbers.keys):
         if key[0] in units:
             words = place_words(key[1])
             name = f"{key[0]}[{words}]" if words else key[0]
             mean, sd = float(joint.gaussian.mean[place]), float(shared_sd[place])
-            parameter, far = units[key[0]], reach_of(fit, place, sd / float(joint.gaussian.sd[place]))
-            found[name] = (
-                _estimate(parameter.transform, mean, sd, parameter.unit)
-                if far is None
-                else _reaching(parameter.transform, far, parameter.unit)
-            )
+            transform, unit = units[key[0]].transform, units[key[0]].unit
+            far = farther.get(place)
+            found[name] = _estimate(transform, mean, sd, unit) if far is None else _reaching(transform, far, unit)
     for index, video in enumerate(joint.videos):
         coordinates, point = video.likelihood.coordinates, joint.point(index)
         sd = np.sqrt(factors[index] * np.diag(np.linalg.inv(joint.precision(index))))

@@ -4,9 +4,9 @@ A friction that stops all sliding may be larger at will: from there on only its 
 nothing of that, since the top is at the edge of such a plain.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 from jaxtyping import Float
@@ -62,8 +62,8 @@ class Reach:
         return mean, float(np.sqrt(self.weights @ (values - mean) ** 2))
 
 
-def reach_of(fit: SharedFit, place: int, widening: float) -> Reach | None:
-    """How far a shared number reaches where all others stay; None where its Gaussian says it.
+def reaches(fit: SharedFit, names: Collection[str], sd: Float[np.ndarray, "shared"]) -> dict[int, Reach]:
+    """How far shared numbers reach where all others stay, by their place; without those whose Gaussian says it.
 
     Each video's own numbers follow.
 
@@ -71,15 +71,15 @@ def reach_of(fit: SharedFit, place: int, widening: float) -> Reach | None:
     ----------
     fit
         The fit.
-    place
-        Place of the number among the shared ones.
-    widening
-        Factor by which standard deviations are larger than the likelihood says.
+    names
+        Parameters that are asked for.
+    sd
+        Standard deviations of all shared numbers, with what makes them larger than the likelihood says.
     """
     joint = fit.joint
-    centre = joint.gaussian.mean
+    centre, widening = joint.gaussian.mean, sd / joint.gaussian.sd
 
-    def density(value: float) -> float:
+    def density(place: int, value: float) -> float:
         shared = centre.copy()
         shared[place] = value
 
@@ -88,9 +88,11 @@ def reach_of(fit: SharedFit, place: int, widening: float) -> Reach | None:
             return max(video.value(shared, own), video.value(shared, settle(video, shared, [own])))
 
         found = sum(in_parallel(of, range(len(joint.videos)))) + float(joint.numbers.log_prior(shared[None])[0])
-        return found / widening**2
+        return found / float(widening[place]) ** 2
 
-    return reach(density, float(centre[place]), widening * float(joint.gaussian.sd[place]))
+    places = [place for place, key in enumerate(joint.numbers.keys) if key[0] in names]
+    found = {place: reach(partial(density, place), float(centre[place]), float(sd[place])) for place in places}
+    return {place: one for place, one in found.items() if one is not None}
 
 
 def reach(density: Callable[[float], float], top: float, sd: float) -> Reach | None:

@@ -1,0 +1,56 @@
+"""Residuals of several videos as a linear function of what is unknown."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from vrdp_prob.discovery.linear import LinearFit, LinearVideo
+
+
+def _video(seed: int) -> LinearVideo:
+    generator = np.random.default_rng(seed)
+    own, shared = generator.standard_normal((40, 3)), generator.standard_normal((40, 2))
+    return LinearVideo(f"v{seed}", generator.standard_normal(40), own, shared, 35)
+
+
+def _fit(*videos: LinearVideo) -> LinearFit:
+    return LinearFit(videos, np.zeros(2), 1e-6 * np.eye(2))
+
+
+def _pulling(at_edge: bool) -> LinearVideo:
+    """A video whose derivatives promise much, by its own unknowns and by those that all share."""
+    video = _video(3)
+    residuals = video.residuals + video.own @ np.full(3, 8.0) + video.shared @ np.full(2, 30.0)
+    return replace(video, residuals=residuals, at_edge=at_edge)
+
+
+def test_a_video_at_an_edge_pulls_no_other_one() -> None:
+    first, second = _video(1), _video(2)
+    alone, pulled, spared = (
+        _fit(first, second),
+        _fit(first, second, _pulling(at_edge=False)),
+        _fit(first, second, _pulling(at_edge=True)),
+    )
+
+    def squares(fit: LinearFit) -> float:
+        return float(sum((left**2).sum() for left in fit.left[:2]))
+
+    assert squares(pulled) > 2 * squares(alone)
+    assert squares(spared) == pytest.approx(squares(alone), rel=0.1)
+
+
+def test_what_a_video_at_an_edge_leaves_is_not_what_its_derivatives_promise() -> None:
+    video = _pulling(at_edge=True)
+    assert video.promised > 100
+    np.testing.assert_array_equal(video.left, video.residuals)
+    assert not video.slope(video.left[:, None]).any()
+
+
+def test_slopes_of_all_videos_and_the_prior_balance() -> None:
+    fit = replace(_fit(_video(1), _video(2), _video(3)), prior_gradient=np.array([0.3, -0.2]), prior=np.eye(2))
+    total = sum(fit.slopes)
+    step = np.linalg.solve(fit.curvature, fit.prior_gradient + sum(v.slope(v.left[:, None])[:, 0] for v in fit.videos))
+    np.testing.assert_allclose(total + fit.prior_gradient - fit.prior @ step, 0.0, atol=1e-9)
+    for video, left, slope in zip(fit.videos, fit.left, fit.slopes, strict=True):
+        np.testing.assert_allclose(video.reduced_shared.T @ left, slope, atol=1e-9)

@@ -49,6 +49,7 @@ def tables(results: Sequence[Result]) -> str:
         "Gain in held-out videos": _gains(results),
         "Coverage of 95 % intervals": _coverage(results),
         "What failed": _failures(results),
+        "Of which code": _versions(results),
     }
     return "\n\n".join(f"### {title}\n\n{text}" for title, text in parts.items() if text)
 
@@ -193,6 +194,21 @@ def _failures(results: Sequence[Result]) -> str:
         if "exception" in result
     ]
     return "\n".join(lines)
+
+
+def _versions(results: Sequence[Result]) -> str:
+    """Commits that data sets were searched with, and what a search took."""
+    kinds: dict[tuple[str, int], list[Result]] = {}
+    for result in results:
+        kinds.setdefault((result["kind"], result["seed"] if result["ways"] else 0), []).append(result)
+    rows = []
+    for (kind, seed), mine in kinds.items():
+        seconds = sorted(result["seconds"]["cpu"] for result in mine if "seconds" in result)
+        times = f"{np.median(seconds):.0f}, {seconds[-1]:.0f}" if seconds else "-"
+        commits = Counter(result["version"] for result in mine).most_common()
+        told = ", ".join(f"{commit} ({count})" for commit, count in commits)
+        rows.append((kind, str(seed) if seed else "any", str(len(mine)), times, told))
+    return _table(("data", "seed", "sets", "processor seconds, median and most", "commits (sets)"), rows)
 
 
 def _by_ways(results: Sequence[Result]) -> Mapping[tuple[str, ...], list[Result]]:

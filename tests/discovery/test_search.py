@@ -204,7 +204,7 @@ def test_a_cause_has_its_few_lost_videos_searched_anew(
     kicks = Mock(spec=CauseScore, effect=ExternalImpulse(), sites=[Mock(video=video) for video in kicked])
     monkeypatch.setattr(refits, "lost_videos", lambda _fit: lost)
     monkeypatch.setattr(refits, "may_take_another_course", lambda _fit: True)
-    monkeypatch.setattr(refits.Refits, "left", lambda _self, _trial: Mock(scores=[kicks]))
+    monkeypatch.setattr(refits.Refits, "left", lambda _self, _trial: Mock(scores=[kicks], beside_chance=[]))
     monkeypatch.setattr(refits.Refits, "_new", lambda _self, _trial: [drag, tilt])
     found = _refits()
     first = found.with_lost_found(nothing, tilt)
@@ -213,6 +213,27 @@ def test_a_cause_has_its_few_lost_videos_searched_anew(
     assert [one.causes[0] for one in found.of(nothing)] == (
         ["drag", "tilt"] if taken == "tilt" else ["tilt searched anew", "drag"]
     )
+
+
+@pytest.mark.parametrize(
+    ("p_value", "explains", "taken"),
+    [(1e-5, True, "all searched anew"), (1e-5, False, "tilt"), (0.2, True, "tilt")],
+    ids=["something is left", "most videos are not explained", "nothing is left"],
+)
+def test_where_a_cause_leaves_something_all_videos_are_searched_anew(
+    p_value: float, taken: str, *, explains: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    nothing, tilt, anew = _refit("", 0.0), _refit("tilt", 5.0), _refit("all searched anew", 9.0)
+    tilt.fit = Mock(fits=[""] * 4)
+    tilt.with_other_courses.return_value = anew
+    left = Mock(scores=[], beside_chance=[Mock(p_value=p_value)])
+    monkeypatch.setattr(refits, "lost_videos", lambda _fit: [])
+    monkeypatch.setattr(refits, "explained", lambda _fits: explains)
+    monkeypatch.setattr(refits.Refits, "left", lambda _self, _trial: left)
+    monkeypatch.setattr(refits.Refits, "_new", lambda _self, _trial: [tilt])
+    found = _refits()
+    assert found.with_lost_found(nothing, tilt).causes == (taken,)
+    assert [one.causes[0] for one in found.of(nothing)] == [taken]
 
 
 def test_a_video_is_searched_again_only_where_the_last_search_has_found_something_or_it_has_fallen_since(

@@ -22,8 +22,8 @@ from vrdp_prob.inference.checkpoint import Checkpoint, model_facts, program_fact
 from vrdp_prob.inference.infer import check_model
 from vrdp_prob.inference.journal import journal
 from vrdp_prob.inference.parallel import linear_algebra_in_one_thread, several_processes
-from vrdp_prob.inference.several_videos.fitting import SharedFit, fit_together
-from vrdp_prob.inference.several_videos.second_look import explained, may_take_another_course
+from vrdp_prob.inference.several_videos.fitting import fit_together
+from vrdp_prob.inference.several_videos.second_look import explained
 from vrdp_prob.models.effects.effect import Effect
 from vrdp_prob.models.model_file import known_effects
 from vrdp_prob.models.physics import PhysicsModel
@@ -32,8 +32,6 @@ from vrdp_prob.progress import ProgressDisplay
 from vrdp_prob.report.wording import listed
 from vrdp_prob.scene import Tracks
 
-NEWS = 5.0
-"""Gain (nats) of other courses of events from which causes are looked for anew."""
 TELLING = 2.0
 """Overdispersion of a video that is told of."""
 
@@ -85,7 +83,7 @@ def discover(
         fit = fit_together(videos, model=physics, seed=seed, model_error=False, progress=progress)
         outcome = outcome_of(fit, looked_for, seed=seed, progress=progress)
         if outcome.verdict is Verdict.UNKNOWN and not outcome.found.best.causes:
-            better = _with_other_courses(fit, seed=seed)
+            better = fit.with_other_courses(seed=seed) if explained(fit.fits) else fit
             outcome = outcome if better is fit else outcome_of(better, looked_for, seed=seed, progress=progress)
         found, causes = outcome.found, outcome.causes
         tried = tried_causes(found, {cause.name for cause in causes}, seed=seed)
@@ -113,20 +111,6 @@ def discover(
         left_out=models_of_the_others(found.base, found.best, found.overdispersion),
         tried=tuple(tried),
     )
-
-
-def _with_other_courses(fit: SharedFit, *, seed: int) -> SharedFit:
-    """A fit that explains most videos with all of them searched anew; itself where nothing much better is found.
-
-    A single video on a wrong course of events can make checks fail.
-    """
-    if not explained(fit.fits):
-        return fit
-    found = fit
-    for first in (0, 1):
-        some = [index for index in range(first, len(fit.fits), 2) if may_take_another_course(fit.fits[index])]
-        found = found.mended(some, seed=seed, thorough=True)
-    return found if found.joint.log_density > fit.joint.log_density + NEWS else fit
 
 
 def _facts(videos: Sequence[Tracks], model: PhysicsModel, catalogue: Sequence[Effect], seed: int) -> dict[str, str]:

@@ -15,7 +15,7 @@ from vrdp_prob.discovery.trials import Trial, gain
 from vrdp_prob.inference.parallel import in_processes
 from vrdp_prob.inference.several_videos.ascent import ImpossibleStartError
 from vrdp_prob.inference.several_videos.fitting import fit_together
-from vrdp_prob.inference.several_videos.second_look import MOST, may_take_another_course
+from vrdp_prob.inference.several_videos.second_look import MOST, explained, may_take_another_course
 from vrdp_prob.models.effects.effect import Effect
 from vrdp_prob.models.effects.external_impulse import ExternalImpulse
 from vrdp_prob.progress import Advance
@@ -134,7 +134,8 @@ class Refits:
     def with_lost_found(self, trial: Trial, one: Trial) -> Trial:
         """One of the refits with its few lost videos searched anew, in the place of which it counts from then on.
 
-        What one lost video leaves calls for many causes, of which each costs more to try than the search.
+        What one lost video leaves calls for many causes, of which each costs more to try than the search. Where most
+        videos are explained and something is left still, all of them are searched.
         """
         found = one
         for _ in range(MENDINGS):
@@ -144,6 +145,8 @@ class Refits:
             found = self.searched_anew(found, videos) if few else found
             if found is before:
                 break
+        if self._leaves_something(found) and explained(found.fit.fits):
+            found = found.with_other_courses(seed=self.seed)
         if found is not one:
             self._keep(trial, [found if old is one else old for old in self.of(trial)])
         return found
@@ -170,10 +173,12 @@ class Refits:
         """Whether the best cause leaves nothing to explain, and is not a kick in each of several videos."""
         if not found or gain(found[0], trial)[0] < self.needed:
             return False
-        if _mends_several(found[0]):
-            return False
-        left = self.left(found[0]).beside_chance
-        return min((one.p_value for one in left), default=1.0) * len(left) > SHORTLIST_LEVEL
+        return not _mends_several(found[0]) and not self._leaves_something(found[0])
+
+    def _leaves_something(self, trial: Trial) -> bool:
+        """Whether a model leaves what chance explains less well than some cause may."""
+        left = self.left(trial).beside_chance
+        return any(one.p_value * len(left) <= SHORTLIST_LEVEL for one in left)
 
     def _lost(self, trial: Trial, found: Sequence[Trial]) -> list[Trial]:
         """Fits from the beginning, with causes that explain videos whose course of events nothing else explains.

@@ -232,6 +232,11 @@ class Trial:
         fit = self.fit.mended(lost, seed=seed, thorough=thorough)
         return self if fit is self.fit else replace(self, fit=fit)
 
+    def with_other_courses(self, *, seed: int) -> "Trial":
+        """The fit with all videos searched anew; itself where that finds nothing much better."""
+        fit = self.fit.with_other_courses(seed=seed)
+        return self if fit is self.fit else replace(self, fit=fit)
+
     def without(self, cause: Effect) -> "Trial":
         """The fit without one of its causes."""
         left = self._with_stated_population(self.fit.model.without_effect(cause))

@@ -45,8 +45,6 @@ AGREED = 1.0
 """Fits are grown anew until the two best agree to so many nats."""
 GOOD_COST = 1.15
 """A fit is plausible up to this factor on the cost that noise alone would make."""
-LIKE_NOISE = 1.15
-"""Residuals in units of the noise up to which no further yaws are looked for."""
 LBFGS_ITERATIONS = 30
 MAY_CATCH_UP = 15.0
 """Nats that a start may gain on the best one after the first turn of a refinement."""
@@ -171,7 +169,7 @@ def fit_map(
             likelihood,
             found,
             lambda starts: _refined(likelihood, starts, likelihood, stages),
-            lambda one: judge(likelihood, one.point, clues).ratio < LIKE_NOISE,
+            lambda one: judge(likelihood, one.point, clues).ratio < stages.like_noise,
             optimiser=stages.optimiser,
         )
         # A model error may explain what another yaw explains, too; so both are candidates under one.

@@ -38,6 +38,8 @@ class FitPlan:
     yaws
         Whether, beside alternatives, other yaws and spins are looked for of cubes whose yaw nobody measured. Under a
         model that lacks something a wrong yaw may take its place.
+    like_noise
+        Residuals in units of the noise up to which no further yaws are looked for.
     """
 
     optimiser: Optimiser = Optimiser.GAUSS_NEWTON
@@ -46,6 +48,7 @@ class FitPlan:
     alternatives: bool = True
     attempts: int = 5
     yaws: bool = True
+    like_noise: float = 1.15
 
     def ends(self, tracks: Tracks) -> list[int]:
         """Frame counts of the windows, the whole video last."""
@@ -63,3 +66,5 @@ IN_DOUBT = FitPlan(attempts=1, yaws=False)
 """For one of several videos under a model that may lack something: other videos show what, more attempts do not."""
 TURNING = FitPlan(attempts=1)
 """For one of several videos under a model that explains the others."""
+TURNING_ON = FitPlan(attempts=1, like_noise=0.0)
+"""The same for a video that others call in question although its residuals look like noise."""

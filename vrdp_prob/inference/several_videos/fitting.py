@@ -22,7 +22,7 @@ from vrdp_prob.inference.several_videos.joining import joined
 from vrdp_prob.inference.several_videos.joint_fit import JointFit, with_alternatives
 from vrdp_prob.inference.several_videos.linking import check_names, link
 from vrdp_prob.inference.several_videos.parts import carried_starts, fit_alone, link_fits
-from vrdp_prob.inference.several_videos.second_look import look_again
+from vrdp_prob.inference.several_videos.second_look import look_again, may_take_another_course
 from vrdp_prob.inference.several_videos.transfer import first_numbers
 from vrdp_prob.models.effects.effect import Effect
 from vrdp_prob.models.likelihood import Likelihood
@@ -33,6 +33,9 @@ from vrdp_prob.scene import Tracks
 
 MENDING_LOOKS = 2
 """Fits that are made anew of a video that may have lost its course of events in a joint fit."""
+
+NEWS = 5.0
+"""Gain (nats) of other courses of events that is worth a change of all that follows from a fit."""
 
 Owned = tuple[str, int | None]
 """A number of a video: its name and its owner, None for the video's."""
@@ -202,6 +205,17 @@ class SharedFit:
         if found.log_density < joint.log_density:
             return self
         return _finished(found, self.model, fits, tuple(structures), self.shared, model_error=False)
+
+    def with_other_courses(self, *, seed: int) -> "SharedFit":
+        """The fit with all videos searched anew, one half given what the other says; itself where little is gained.
+
+        A single video on a wrong course of events, whose residuals look like noise still, can call for causes.
+        """
+        found = self
+        for first in (0, 1):
+            some = [index for index in range(first, len(self.fits), 2) if may_take_another_course(self.fits[index])]
+            found = found.mended(some, seed=seed, thorough=True)
+        return found if found.joint.log_density > self.joint.log_density + NEWS else self
 
     def vanishing(self, effects: Sequence[Effect]) -> dict[str, float]:
         """Values of parameters at which nothing is left of some effects, given what this fit has found."""

@@ -12,7 +12,7 @@ from jaxtyping import Bool
 
 from vrdp_prob.inference.map_fit import MapFit, fit_map
 from vrdp_prob.inference.parallel import in_processes
-from vrdp_prob.inference.plan import IN_DOUBT, TURNING, FitPlan
+from vrdp_prob.inference.plan import IN_DOUBT, TURNING, TURNING_ON, FitPlan
 from vrdp_prob.inference.several_videos.agreement import consensus
 from vrdp_prob.inference.several_videos.parts import carried_starts, link_fits, plain_likelihood, stream
 from vrdp_prob.models.parameters import Prior, Scope
@@ -116,7 +116,8 @@ def look_again(
         return list(fits)
     excess = _excess(fits)
     goal = 0.0 if thorough else WORSE * float(np.median([one.misfit.residual_sd for one in fits]))
-    ways = [(look % 2 == 0, IN_DOUBT) for look in range(looks)] + ([(True, TURNING)] if explained(fits) else [])
+    turning = TURNING_ON if thorough else TURNING
+    ways = [(look % 2 == 0, IN_DOUBT) for look in range(looks)] + ([(True, turning)] if explained(fits) else [])
     among = range(len(fits)) if asked is None else asked
     look = _Look(model, _told(fits, model, shared, among, islands=islands), goal, seed, tuple(ways))
     doubted = [(fits[index], bool(excess[index] >= FAR_WORSE)) for index in chosen]

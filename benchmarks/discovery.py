@@ -55,7 +55,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         "--sizes", default=",".join(f"{size:g}" for size in SIZES), help="effect sizes of single causes"
     )
     parser.add_argument("--seeds", type=int, default=3, help="data sets of each cause and size")
-    parser.add_argument("--nulls", type=int, default=60, help="data sets with nothing hidden")
+    parser.add_argument("--nulls", type=int, default=60, help="data sets with nothing hidden, a third more that glide")
     parser.add_argument("--videos", type=int, default=12)
     parser.add_argument("--bodies", type=int, default=4)
     parser.add_argument("--results", type=Path, default=RESULTS, help="file of the results, which are gone on with")

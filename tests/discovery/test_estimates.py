@@ -4,11 +4,14 @@ import math
 from dataclasses import replace
 from typing import ClassVar
 
+import numpy as np
 import pytest
 
 from tests.discovery.fitted import fitted
+from vrdp_prob.discovery import estimates as module
 from vrdp_prob.discovery.estimates import cause_sentence, estimates, mass_scale_notes, surprise
 from vrdp_prob.discovery.finding import Estimate
+from vrdp_prob.discovery.reach import Reach
 from vrdp_prob.models.effects.air_drag import AirDrag
 from vrdp_prob.models.effects.body_friction import BodyFriction
 from vrdp_prob.models.effects.effect import Effect
@@ -78,3 +81,20 @@ def test_a_strength_may_surprise_but_not_a_place() -> None:
     _, fit = fitted(seed=1)
     assert surprise(fit, AirDrag()) == 1.0
     assert surprise(fit, _Placed()) < 1e-6
+
+
+@pytest.mark.parametrize(("far", "high"), [(0.9, 1.8), (0.01, 1.2)], ids=["farther", "nearer"])
+def test_how_far_a_parameter_reaches_widens_its_interval_only(
+    far: float, high: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    _, fit = fitted(seed=1)
+    plain = estimates(fit, AirDrag())["air_drag"]
+    middle = math.log(plain.q975) - 0.1
+    grid = np.linspace(middle - 3 * far, middle + 3 * far, 2001)
+    reached = Reach(grid, -(((grid - middle) / far) ** 2) / 2)
+    monkeypatch.setattr(module, "reaches", lambda fit, *_: {fit.joint.numbers.names.index("air_drag"): reached})
+    found = estimates(fit, AirDrag())["air_drag"]
+    assert found.q025 <= plain.q025
+    assert found.q975 >= plain.q975
+    assert found.sd >= plain.sd
+    assert (found.q975 > high * plain.q975) == (far > 0.1)

@@ -51,6 +51,21 @@ def test_noise_leaves_nothing_unexplained() -> None:
     assert (np.abs(found.gains) < 4).all()
 
 
+def test_what_an_edge_promises_is_no_acceleration(monkeypatch: pytest.MonkeyPatch) -> None:
+    fit = null()
+    plain = ResidualModel.of(fit)
+    first, *others = plain.videos
+    own = first.linear.own / np.linalg.norm(first.linear.own, axis=0)
+    promising = replace(
+        first.linear, residuals=first.linear.residuals + own @ np.full(own.shape[1], 10.0), at_edge=True
+    )
+    assert promising.promised > 100
+    videos = (replace(first, linear=promising), *others)
+    model = ResidualModel(replace(plain.linear, videos=tuple(one.linear for one in videos)), videos)
+    monkeypatch.setattr(module.ResidualModel, "of", lambda _: model)
+    assert unexplained(fit).accelerated == ()
+
+
 @pytest.mark.parametrize("size", [0.02, 0.1])
 def test_accelerations_at_random_are_found(size: float, monkeypatch: pytest.MonkeyPatch) -> None:
     # Shaken by hand, bodies do not rebound as they come: restitutions have to be free to make up for it.
@@ -90,7 +105,8 @@ def test_kicks_in_video_after_video_explain_no_slope(without: Trial) -> None:
 
 def test_a_cause_stands_out_and_leaves_nothing(without: Trial) -> None:
     tilt = SurfaceTilt()
-    within = Trial((tilt,), without.fit.under(without.fit.model.with_effect(tilt), model_error=False))
+    fit = without.fit.under(without.fit.model.with_effect(tilt), model_error=False)
+    within = Trial((tilt,), fit.with_other_courses(seed=0))
     assert without.unexplained.accelerated
     assert within.unexplained.accelerated == ()
     plain = sum(one.log_density for one in within.cavities.values())

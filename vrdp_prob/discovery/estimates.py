@@ -56,7 +56,8 @@ def estimates(
             mean, sd = float(joint.gaussian.mean[place]), float(shared_sd[place])
             transform, unit = units[key[0]].transform, units[key[0]].unit
             far = farther.get(place)
-            found[name] = _estimate(transform, mean, sd, unit) if far is None else _reaching(transform, far, unit)
+            gaussian = _estimate(transform, mean, sd, unit)
+            found[name] = gaussian if far is None else _reaching(transform, gaussian, far)
     for index, video in enumerate(joint.videos):
         coordinates, point = video.likelihood.coordinates, joint.point(index)
         sd = np.sqrt(factors[index] * np.diag(np.linalg.inv(joint.precision(index))))
@@ -110,11 +111,12 @@ def _estimate(transform: Transform, mean: float, sd: float, unit: str) -> Estima
     return Estimate(middle, middle * math.sqrt(math.expm1(sd**2)), math.exp(low), math.exp(high), unit)
 
 
-def _reaching(transform: Transform, far: Reach, unit: str) -> Estimate:
+def _reaching(transform: Transform, gaussian: Estimate, far: Reach) -> Estimate:
     """An estimate of what reaches farther than a Gaussian says."""
     value = np.exp if transform is Transform.LOG else np.asarray
     low, high = (float(value(far.quantile(share))) for share in ((1 - CERTAIN) / 2, (1 + CERTAIN) / 2))
-    return Estimate(*far.moments(value), low, high, unit)
+    mean, sd = far.moments(value)
+    return Estimate(mean, max(sd, gaussian.sd), min(low, gaussian.q025), max(high, gaussian.q975), gaussian.unit)
 
 
 def _between_frames(middle: float, tracks: Tracks, unit: str) -> Estimate:

@@ -95,11 +95,7 @@ class LinearVideo:
     @property
     def left(self) -> Float[np.ndarray, "residual"]:
         """The residuals when the own unknowns are at their best, the shared ones being those of the fit."""
-        return self.settled(self.residuals[:, None])[:, 0]
-
-    def settled(self, residuals: Float[np.ndarray, "residual column"]) -> Float[np.ndarray, "residual column"]:
-        """What is left of residuals when the own unknowns are at their best; at an edge they are there already."""
-        return residuals if self.at_edge else self.without_own(residuals)
+        return self.without_own(self.residuals[:, None])[:, 0]
 
     def slope(self, left: Float[np.ndarray, "residual column"]) -> Float[np.ndarray, "shared column"]:
         """Derivative of half the sum of squares of such residuals by the shared unknowns; none at an edge."""
@@ -335,10 +331,10 @@ class LinearFit:
         prior_gradient: Float[np.ndarray, "shared column"],
     ) -> tuple[Float[np.ndarray, "_ column"], ...]:
         """What all unknowns together leave of some residuals, each column by itself."""
-        settled = [video.settled(one) for video, one in zip(self.videos, residuals, strict=True)]
-        gradient = prior_gradient + sum(video.slope(one) for video, one in zip(self.videos, settled, strict=True))
+        reduced = [video.without_own(one) for video, one in zip(self.videos, residuals, strict=True)]
+        gradient = prior_gradient + sum(video.slope(one) for video, one in zip(self.videos, reduced, strict=True))
         step = self._step(gradient)
-        return tuple(one - video.reduced_shared @ step for video, one in zip(self.videos, settled, strict=True))
+        return tuple(one - video.reduced_shared @ step for video, one in zip(self.videos, reduced, strict=True))
 
     def score(self, directions: Sequence[Float[np.ndarray, "_ strength"] | None]) -> Score:
         """Score of strengths, given what each does to the data's residuals of each video (None where nothing)."""

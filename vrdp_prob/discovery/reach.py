@@ -55,6 +55,11 @@ class Reach:
         """Value of the coordinate below which so much of the probability lies."""
         return float(np.interp(probability, np.cumsum(self.weights), self.coordinate))
 
+    @property
+    def sd(self) -> float:
+        """Standard deviation of the coordinate."""
+        return self.moments(np.asarray)[1]
+
     def moments(self, function: Callable[[np.ndarray], np.ndarray]) -> tuple[float, float]:
         """Mean and standard deviation of a function of the coordinate."""
         values = function(self.coordinate)
@@ -65,7 +70,8 @@ class Reach:
 def reaches(fit: SharedFit, names: Collection[str], sd: Float[np.ndarray, "shared"]) -> dict[int, Reach]:
     """How far shared numbers reach where all others stay, by their place; without those whose Gaussian says it.
 
-    Each video's own numbers follow.
+    Each video's own numbers follow. With all others following, too, the density would fall no faster: so what is found
+    can widen what the Gaussian says, and not narrow it.
 
     Parameters
     ----------
@@ -87,8 +93,8 @@ def reaches(fit: SharedFit, names: Collection[str], sd: Float[np.ndarray, "share
             video, own = joint.videos[index], joint.gaussian.locals[index].centre
             return max(video.value(shared, own), video.value(shared, settle(video, shared, [own])))
 
-        found = sum(in_parallel(of, range(len(joint.videos)))) + float(joint.numbers.log_prior(shared[None])[0])
-        return found / float(widening[place]) ** 2
+        told = sum(in_parallel(of, range(len(joint.videos)))) / float(widening[place]) ** 2
+        return told + float(joint.numbers.log_prior(shared[None])[0])
 
     places = [place for place, key in enumerate(joint.numbers.keys) if key[0] in names]
     found = {place: reach(partial(density, place), float(centre[place]), float(sd[place])) for place in places}

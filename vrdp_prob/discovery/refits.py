@@ -146,7 +146,8 @@ class Refits:
             if found is before:
                 break
         if self._leaves_something(found) and explained(found.fit.fits):
-            found = found.with_other_courses(seed=self.seed)
+            other = found.with_other_courses(seed=self.seed)
+            found = found if other.loses_videos_of(found) else other
         if found is not one:
             self._keep(trial, [found if old is one else old for old in self.of(trial)])
         return found
@@ -163,8 +164,7 @@ class Refits:
         found = trial.mended(now, seed=self.seed + passed, thorough=True) if now else trial
         if found is not trial and (fallen := found.fallen_from(trial)):
             found = found.mended(fallen, seed=self.seed + passed)
-            if (fallen := found.fallen_from(trial)) and not set(fallen).isdisjoint(lost_videos(found.fit)):
-                found = trial
+            found = trial if found.loses_videos_of(trial) else found
         settled |= frozenset(now).difference([] if found is trial else trial.fallen_from(found))
         self._anew[trial] = self._anew[found] = (settled, passed + 1)
         return found

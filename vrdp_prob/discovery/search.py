@@ -329,7 +329,8 @@ class _Searcher:
                 again = [one for one in step.left.scores if one.effect.name in close][:MOST_RIVALS]
                 others = self.refits.made_of(without, again)
                 if len(best.causes) == 1:
-                    others += [one for one in steps[0].tried if one.causes[-1].name not in {*best.names, *close}]
+                    made = {*best.names, *(one.causes[-1].name for one in others)}
+                    others += [one for one in steps[0].tried if one.causes[-1].name not in made]
             found.append(tuple(one for one in others if not one.patches(one.causes[-1])))
         return tuple(found)
 

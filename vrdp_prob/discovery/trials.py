@@ -13,6 +13,7 @@ from vrdp_prob.discovery.held_out import Cavity, cavities
 from vrdp_prob.discovery.jitter import alike_in_neighbours
 from vrdp_prob.discovery.kicked_at_contact import kicked_at_contact
 from vrdp_prob.discovery.scores import CauseScore, happens_once
+from vrdp_prob.discovery.single_videos import LOST
 from vrdp_prob.discovery.unexplained import Unexplained, unexplained
 from vrdp_prob.inference.several_videos.ascent import ImpossibleStartError
 from vrdp_prob.inference.several_videos.fitting import Owned, SharedFit
@@ -124,8 +125,16 @@ class Trial:
 
     def fallen_from(self, base: "Trial") -> list[int]:
         """Videos that are less probable than under a model with less, the worst first: they have lost their course."""
+        fallen = self._fallen_from(base)
+        return fallen[: max(len(self.fit.fits) // MOST, 1)]
+
+    def loses_videos_of(self, other: "Trial") -> bool:
+        """Whether a video is less probable than in another fit and explained no more."""
+        return any(self.fit.fits[index].misfit.ratio > LOST for index in self._fallen_from(other))
+
+    def _fallen_from(self, base: "Trial") -> list[int]:
         gained = self.fitted_density - base.fitted_density
-        return [int(k) for k in np.argsort(gained) if gained[k] < -FELL][: max(len(gained) // MOST, 1)]
+        return [int(k) for k in np.argsort(gained) if gained[k] < -FELL]
 
     def with_cause_in_place(self, score: CauseScore, least: float) -> "Trial | None":
         """The fit with a cause in the place of the last one, from where that has brought the videos.

@@ -29,9 +29,6 @@ CONTACT_WEIGHT = 1e3
 DIFFERENCE = 1e-6
 LEAST_DRAG = 1e-4
 """Drag in 1/m below which the closed form is not used."""
-GROSS = 10.0
-"""Residual in noise sd that an observation counts with at most: one or two that are off by more, as where a body meets
-a wall in the last frames, look like gross errors."""
 LOOSE, MASS_SD, RESTITUTION_SD, OWN_FRICTION_SD, SHARED_SD = 10.0, 0.7, 0.35, 0.5, 1.0
 """Prior standard deviations of states (SI), and of the logarithms of masses, restitutions, frictions and the drag."""
 
@@ -108,7 +105,7 @@ def leftover(hidden: Sequence[Video], plain: Sequence[Video], noise: float, free
     pieces, counts = [], []
     for (residual, shared), (_, _, _, cut) in zip(reduced, problems, strict=True):
         left = (residual - shared @ step)[8 * len(cut.contacts) :][: 2 * len(cut.seen)].reshape(-1, 2)
-        squares = np.minimum((left**2).sum(axis=1), GROSS**2)
+        squares = (left**2).sum(axis=1)
         number = np.bincount(cut.seen[:, 0].astype(int), minlength=len(cut.body))
         total = np.bincount(cut.seen[:, 0].astype(int), squares, len(cut.body))
         pieces.append(np.sqrt(total / np.maximum(number, 1)))

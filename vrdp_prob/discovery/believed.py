@@ -31,7 +31,8 @@ def extended_model(trial: Trial, overdispersion: Float[np.ndarray, "video"]) -> 
     mean, wide = gaussian.mean.copy(), widened(gaussian.sd, overdispersion, trial.unexplained)
     of_causes = {parameter.name for cause in trial.causes for parameter in cause.parameters}
     for place, far in reaches(trial.fit, of_causes, wide).items():
-        mean[place], wide[place] = far.moments(np.asarray)[0], max(far.sd, wide[place])
+        mean[place], sd = far.moments(np.asarray)
+        wide[place] = max(sd, wide[place])
     return believing(_of_the_table(trial), trial.fit.joint.numbers.keys, mean, wide)
 
 

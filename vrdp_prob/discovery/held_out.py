@@ -48,7 +48,7 @@ def cavities(fit: SharedFit) -> dict[str, Cavity]:
     )
     prior = expand_prior(joint.numbers, mean)
     # Where a video is at an edge between two courses of events its gradient says nothing of what lies beyond.
-    inside = [-float(one.local_gradient @ one.local_step) / 2 < STEEP for one in expansions]
+    inside = [one.promised < STEEP for one in expansions]
     gradients = [one.reduced_gradient * ok for one, ok in zip(expansions, inside, strict=True)]
     curvatures = [one.reduced for one in expansions]
     total = prior.curvature + sum(curvatures)

@@ -313,8 +313,7 @@ class LinearFit:
     @property
     def slopes(self) -> list[Float[np.ndarray, "shared"]]:
         """Derivative of each video's negative log density by the shared unknowns when all are at their best."""
-        slopes = [video.slope(video.left[:, None]) for video in self.videos]
-        step = self._step(self.prior_gradient[:, None] + sum(slopes))
+        slopes, step = self._pulled([video.left[:, None] for video in self.videos], self.prior_gradient[:, None])
         return [(slope - curvature @ step)[:, 0] for slope, curvature in zip(slopes, self.curvatures, strict=True)]
 
     @cached_property
@@ -332,9 +331,15 @@ class LinearFit:
     ) -> tuple[Float[np.ndarray, "_ column"], ...]:
         """What all unknowns together leave of some residuals, each column by itself."""
         reduced = [video.without_own(one) for video, one in zip(self.videos, residuals, strict=True)]
-        gradient = prior_gradient + sum(video.slope(one) for video, one in zip(self.videos, reduced, strict=True))
-        step = self._step(gradient)
+        _, step = self._pulled(reduced, prior_gradient)
         return tuple(one - video.reduced_shared @ step for video, one in zip(self.videos, reduced, strict=True))
+
+    def _pulled(
+        self, reduced: Sequence[Float[np.ndarray, "_ column"]], prior_gradient: Float[np.ndarray, "shared column"]
+    ) -> tuple[list[Float[np.ndarray, "shared column"]], Float[np.ndarray, "shared column"]]:
+        """How residuals, without the own unknowns, pull at the shared ones in each video, and the step of these."""
+        slopes = [video.slope(one) for video, one in zip(self.videos, reduced, strict=True)]
+        return slopes, self._step(prior_gradient + sum(slopes))
 
     def score(self, directions: Sequence[Float[np.ndarray, "_ strength"] | None]) -> Score:
         """Score of strengths, given what each does to the data's residuals of each video (None where nothing)."""

@@ -59,8 +59,7 @@ def outcome_of(fit: SharedFit, catalogue: Sequence[Effect], *, seed: int, progre
     """Search for causes, and put those that are found in doubt."""
     found = search(fit, catalogue, seed=seed, progress=progress)
     checks = run_checks(found.base.fit, seed=seed)
-    after = _checks_after(found, checks, seed)
-    found, after, unlisted = _without_mimics(found, checks, after, seed=seed, progress=progress)
+    found, after, unlisted = _without_mimics(found, checks, seed=seed, progress=progress)
     not_named: list[FoundCause] = []
     reasons: list[Doubt] = []
     while doubted := _doubted(found, after):
@@ -69,8 +68,7 @@ def outcome_of(fit: SharedFit, catalogue: Sequence[Effect], *, seed: int, progre
         if other is None:
             reasons += [one for some in doubted.values() for one in some]
         found = found.without(list(doubted)) if other is None else other
-        after = _checks_after(found, checks, seed)
-        found, after, further = _without_mimics(found, checks, after, seed=seed, progress=progress)
+        found, after, further = _without_mimics(found, checks, seed=seed, progress=progress)
         unlisted += further
     verdict = Verdict.UNKNOWN if unlisted or reasons else _verdict(found, checks, after)
     causes = _in_order([*_causes(found, {}, seed), *not_named])
@@ -85,9 +83,10 @@ def _checks_after(found: Search, checks: tuple[Check, ...], seed: int) -> tuple[
 
 
 def _without_mimics(
-    found: Search, before: tuple[Check, ...], after: tuple[Check, ...], *, seed: int, progress: ProgressDisplay | None
+    found: Search, before: tuple[Check, ...], *, seed: int, progress: ProgressDisplay | None
 ) -> tuple[Search, tuple[Check, ...], tuple[Unlisted, ...]]:
     """A search without the causes that a law of no particular cause explains away, its checks, and what that does."""
+    after = _checks_after(found, before, seed)
     laws = laws_of(after)
     if not found.best.causes or not laws:
         return found, after, ()

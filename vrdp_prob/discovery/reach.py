@@ -55,11 +55,6 @@ class Reach:
         """Value of the coordinate below which so much of the probability lies."""
         return float(np.interp(probability, np.cumsum(self.weights), self.coordinate))
 
-    @property
-    def sd(self) -> float:
-        """Standard deviation of the coordinate."""
-        return self.moments(np.asarray)[1]
-
     def moments(self, function: Callable[[np.ndarray], np.ndarray]) -> tuple[float, float]:
         """Mean and standard deviation of a function of the coordinate."""
         values = function(self.coordinate)

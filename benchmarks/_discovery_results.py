@@ -9,7 +9,7 @@ from _resumable import Result
 from scipy.stats import binomtest
 
 from tests.discovery.causes import CATALOGUE, VARIANTS
-from vrdp_prob.discovery.search import gain_needed
+from vrdp_prob.discovery.selection.search import gain_needed
 
 SURE, LIKELY = 0.9, 0.5
 REACHED = 0.95

@@ -10,7 +10,7 @@ import torch
 from jaxtyping import Float
 
 from vrdp_prob.discovery.discover import discover
-from vrdp_prob.discovery.document import write_finding
+from vrdp_prob.discovery.page.document import write_finding
 from vrdp_prob.files import write_atomically
 from vrdp_prob.inference import default_model
 from vrdp_prob.inference.map_fit import fit_map

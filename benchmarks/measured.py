@@ -26,8 +26,8 @@ from _resumable import Result, measured
 
 from vrdp_prob.datasets import load_all
 from vrdp_prob.discovery.discover import discover
-from vrdp_prob.discovery.document import to_document, write_finding
 from vrdp_prob.discovery.finding import Finding
+from vrdp_prob.discovery.page.document import to_document, write_finding
 from vrdp_prob.inference import default_model
 from vrdp_prob.models.simulator.rollout import compile_model
 

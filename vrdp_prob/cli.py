@@ -41,9 +41,9 @@ from vrdp_prob.command_options import (
 from vrdp_prob.datasets import load, load_all, pictures, video_names
 from vrdp_prob.discovery.checking import check_video_count
 from vrdp_prob.discovery.discover import discover
-from vrdp_prob.discovery.document import to_document as finding_document
-from vrdp_prob.discovery.document import write_finding
-from vrdp_prob.discovery.summary import lines as finding_lines
+from vrdp_prob.discovery.page.document import to_document as finding_document
+from vrdp_prob.discovery.page.document import write_finding
+from vrdp_prob.discovery.page.summary import lines as finding_lines
 from vrdp_prob.errors import InputError
 from vrdp_prob.evaluation import evaluate
 from vrdp_prob.evaluation.compared_answers import with_answers

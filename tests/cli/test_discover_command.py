@@ -12,9 +12,9 @@ from tests.discovery.findings import EVERY_KIND, named, nothing, unknown
 from tests.discovery.hidden import hide
 from tests.discovery.scenes import Setting
 from vrdp_prob import InputError, PhysicsModel, cli
-from vrdp_prob.discovery import document
 from vrdp_prob.discovery.finding import Finding
-from vrdp_prob.discovery.wording import MINUS
+from vrdp_prob.discovery.page import document
+from vrdp_prob.discovery.page.wording import MINUS
 from vrdp_prob.report import schema
 from vrdp_prob.scene import Shape
 

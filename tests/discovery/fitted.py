@@ -10,9 +10,9 @@ from jaxtyping import Float
 from tests.discovery.data_set import DataSet, Wanted, draw
 from tests.discovery.measurement import Measurement
 from tests.discovery.scenes import Setting
-from vrdp_prob.discovery.residual_model import ResidualModel
-from vrdp_prob.discovery.scores import score_causes
-from vrdp_prob.discovery.trials import Trial
+from vrdp_prob.discovery.candidates.scores import score_causes
+from vrdp_prob.discovery.residuals.residual_model import ResidualModel
+from vrdp_prob.discovery.selection.trials import Trial
 from vrdp_prob.inference.several_videos.fitting import SharedFit, fit_together
 from vrdp_prob.models.effects.body_friction import BodyFriction
 from vrdp_prob.models.effects.effect import Effect

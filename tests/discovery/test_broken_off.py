@@ -10,8 +10,8 @@ from tests.discovery.hidden import hide
 from tests.discovery.scenes import Setting
 from vrdp_prob import load_all
 from vrdp_prob.discovery.discover import discover
-from vrdp_prob.discovery.document import to_document
 from vrdp_prob.discovery.finding import Finding
+from vrdp_prob.discovery.page.document import to_document
 from vrdp_prob.errors import InputError
 from vrdp_prob.inference.journal import Step
 from vrdp_prob.models.model_file import known_effects

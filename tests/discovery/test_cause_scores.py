@@ -8,11 +8,7 @@ import pytest
 from scipy.stats import chi2
 
 from tests.discovery.fitted import fitted
-from vrdp_prob.discovery.estimates import upper_bounds
-from vrdp_prob.discovery.finding import UpperBound
-from vrdp_prob.discovery.linear import Score
-from vrdp_prob.discovery.residual_model import ResidualModel
-from vrdp_prob.discovery.scores import (
+from vrdp_prob.discovery.candidates.scores import (
     CauseScore,
     Largest,
     _largest,
@@ -21,7 +17,11 @@ from vrdp_prob.discovery.scores import (
     happens_once,
     score_causes,
 )
-from vrdp_prob.discovery.wording import bound_words
+from vrdp_prob.discovery.finding import UpperBound
+from vrdp_prob.discovery.page.wording import bound_words
+from vrdp_prob.discovery.residuals.linear import Score
+from vrdp_prob.discovery.residuals.residual_model import ResidualModel
+from vrdp_prob.discovery.selection.estimates import upper_bounds
 from vrdp_prob.models.effects.clock_error import ClockError
 from vrdp_prob.models.effects.contact_friction import ContactFriction
 from vrdp_prob.models.effects.effect import Effect

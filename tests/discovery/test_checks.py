@@ -11,13 +11,13 @@ from tests.discovery.fitted import fitted
 from tests.discovery.hidden import hide
 from tests.discovery.measurement import Measurement
 from tests.discovery.scenes import Setting
-from vrdp_prob.discovery.checks import run_checks
+from vrdp_prob.discovery.checks.battery import run_checks
+from vrdp_prob.discovery.checks.flight import QUESTIONS
+from vrdp_prob.discovery.checks.measurement import GENERAL
 from vrdp_prob.discovery.finding import Check
-from vrdp_prob.discovery.free_flight import FreeFlight
-from vrdp_prob.discovery.free_flight_checks import QUESTIONS
-from vrdp_prob.discovery.free_flight_patterns import patterns, spanned
-from vrdp_prob.discovery.measurement_checks import GENERAL
-from vrdp_prob.discovery.residual_model import ResidualModel
+from vrdp_prob.discovery.residuals.free_flight import FreeFlight
+from vrdp_prob.discovery.residuals.free_flight_patterns import patterns, spanned
+from vrdp_prob.discovery.residuals.residual_model import ResidualModel
 from vrdp_prob.inference import default_model
 from vrdp_prob.inference.several_videos.fitting import fit_together
 from vrdp_prob.scene import Body, Shape, Tracks

@@ -11,12 +11,12 @@ from jaxtyping import Float
 from tests.discovery.fitted import fitted, moved
 from tests.discovery.test_checks import by_name
 from tests.discovery.videos import Video, move, recorded
-from vrdp_prob.discovery.contact_checks import DISTANCE, KICK, contact_checks
+from vrdp_prob.discovery.checks.contacts import DISTANCE, KICK, contact_checks
+from vrdp_prob.discovery.checks.flight import free_flight_checks
+from vrdp_prob.discovery.checks.measurement import DISTORTION, LOST, OUTLIERS, SINGLE, measurement_checks
 from vrdp_prob.discovery.finding import Check
-from vrdp_prob.discovery.free_flight import FreeFlight
-from vrdp_prob.discovery.free_flight_checks import free_flight_checks
-from vrdp_prob.discovery.measurement_checks import DISTORTION, LOST, OUTLIERS, SINGLE, measurement_checks
-from vrdp_prob.discovery.residual_model import ResidualModel
+from vrdp_prob.discovery.residuals.free_flight import FreeFlight
+from vrdp_prob.discovery.residuals.residual_model import ResidualModel
 from vrdp_prob.scene import Body, Shape
 
 REPLICAS = 60

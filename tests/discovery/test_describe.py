@@ -5,9 +5,9 @@ import pytest
 
 from tests.discovery.fitted import fitted
 from tests.discovery.scenes import Setting
-from vrdp_prob.discovery.checks import run_checks
+from vrdp_prob.discovery.checks.battery import run_checks
 from vrdp_prob.discovery.describe import describe
-from vrdp_prob.discovery.missing_acceleration import Separate
+from vrdp_prob.discovery.residuals.missing_acceleration import Separate
 from vrdp_prob.discovery.sparse_formula import sparse_formula
 
 PAIRS = Setting(videos=3, bodies=2, frames=60)

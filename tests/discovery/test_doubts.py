@@ -8,13 +8,13 @@ from tests.discovery.hidden import hide
 from tests.discovery.scenes import Setting
 from vrdp_prob.discovery import discover as module
 from vrdp_prob.discovery import outcome
-from vrdp_prob.discovery.body_checks import REBOUND
-from vrdp_prob.discovery.checks import run_checks
-from vrdp_prob.discovery.contact_checks import AT_WALLS, KICK, REBOUND_AT_WALLS
+from vrdp_prob.discovery.checks.battery import run_checks
+from vrdp_prob.discovery.checks.bodies import REBOUND
+from vrdp_prob.discovery.checks.contacts import AT_WALLS, KICK, REBOUND_AT_WALLS
 from vrdp_prob.discovery.describe import describe
-from vrdp_prob.discovery.doubts import OWN_CHECKS, Doubt, doubts, with_doubts
 from vrdp_prob.discovery.finding import Check, Verdict
-from vrdp_prob.discovery.trials import Trial
+from vrdp_prob.discovery.selection.doubts import OWN_CHECKS, Doubt, doubts, with_doubts
+from vrdp_prob.discovery.selection.trials import Trial
 from vrdp_prob.inference.several_videos.fitting import SharedFit
 from vrdp_prob.models.effects.effect import Effect
 from vrdp_prob.models.effects.external_impulse import ExternalImpulse

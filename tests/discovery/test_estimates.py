@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from tests.discovery.fitted import fitted
-from vrdp_prob.discovery import estimates as module
-from vrdp_prob.discovery.estimates import cause_sentence, estimates, mass_scale_notes, surprise
 from vrdp_prob.discovery.finding import Estimate
-from vrdp_prob.discovery.reach import Reach
+from vrdp_prob.discovery.selection import estimates as module
+from vrdp_prob.discovery.selection.estimates import cause_sentence, estimates, mass_scale_notes, surprise
+from vrdp_prob.discovery.selection.reach import Reach
 from vrdp_prob.models.effects.air_drag import AirDrag
 from vrdp_prob.models.effects.body_friction import BodyFriction
 from vrdp_prob.models.effects.effect import Effect

@@ -9,7 +9,7 @@ import jsonschema
 import pytest
 
 from tests.discovery.findings import BASE, EVERY_KIND, VIDEOS, at_its_limits, named, nothing, unknown, with_answers
-from vrdp_prob.discovery.document import to_document, write_finding
+from vrdp_prob.discovery.page.document import to_document, write_finding
 from vrdp_prob.models.physics import PhysicsModel
 from vrdp_prob.report import schema
 

@@ -19,10 +19,10 @@ from tests.discovery.findings import (
 )
 from tests.report.browser import Browser, find_chromium
 from tests.report.outline import Outline
-from vrdp_prob.discovery.changed_answers import answers_sentence
-from vrdp_prob.discovery.page import render
-from vrdp_prob.discovery.summary import lines, summary, verdict_sentence
-from vrdp_prob.discovery.wording import TIMES, typeset
+from vrdp_prob.discovery.page.changed_answers import answers_sentence
+from vrdp_prob.discovery.page.finding_page import render
+from vrdp_prob.discovery.page.summary import lines, summary, verdict_sentence
+from vrdp_prob.discovery.page.wording import TIMES, typeset
 
 DRAWING = """<?xml version="1.0"?>
 <!DOCTYPE svg PUBLIC "-//W3C//DTD SVG 1.1//EN" "http://www.w3.org/Graphics/SVG/1.1/DTD/svg11.dtd">

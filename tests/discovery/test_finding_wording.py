@@ -9,9 +9,9 @@ from hypothesis import strategies as st
 
 from tests.discovery.findings import TILT, VIDEOS, named
 from vrdp_prob.discovery.finding import Estimate, UpperBound
-from vrdp_prob.discovery.gain_figure import HIGHEST, video_figure
-from vrdp_prob.discovery.summary import summary
-from vrdp_prob.discovery.wording import (
+from vrdp_prob.discovery.page.gain_figure import HIGHEST, video_figure
+from vrdp_prob.discovery.page.summary import summary
+from vrdp_prob.discovery.page.wording import (
     MINUS,
     TIMES,
     UNDEFINED,

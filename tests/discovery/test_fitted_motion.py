@@ -7,8 +7,8 @@ import pytest
 import torch
 
 from tests.discovery.fitted import fitted
-from vrdp_prob.discovery.fitted_contacts import FittedContacts
-from vrdp_prob.discovery.fitted_motion import FittedMotion, Kicks
+from vrdp_prob.discovery.residuals.fitted_contacts import FittedContacts
+from vrdp_prob.discovery.residuals.fitted_motion import FittedMotion, Kicks
 from vrdp_prob.inference.several_videos.parts import plain_likelihood
 from vrdp_prob.models.effects.surface_tilt import SurfaceTilt
 from vrdp_prob.models.likelihood import Likelihood

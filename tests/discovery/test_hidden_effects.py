@@ -16,7 +16,7 @@ from tests.discovery.scenes import Setting
 from vrdp_prob import load_all
 from vrdp_prob.discovery.discover import discover
 from vrdp_prob.discovery.finding import Finding, Verdict
-from vrdp_prob.discovery.search import gain_needed
+from vrdp_prob.discovery.selection.search import gain_needed
 from vrdp_prob.models.model_file import known_effects
 from vrdp_prob.models.physics import PhysicsModel
 

@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 
 from tests.discovery.fitted import fitted
-from vrdp_prob.discovery import proposals
-from vrdp_prob.discovery.kicked_at_contact import kicked_at_contact
-from vrdp_prob.discovery.proposals import hidden_things
-from vrdp_prob.discovery.residual_model import ResidualModel
-from vrdp_prob.discovery.scores import score_causes
-from vrdp_prob.discovery.trials import Trial
+from vrdp_prob.discovery.candidates import proposals
+from vrdp_prob.discovery.candidates.kicked_at_contact import kicked_at_contact
+from vrdp_prob.discovery.candidates.proposals import hidden_things
+from vrdp_prob.discovery.candidates.scores import score_causes
+from vrdp_prob.discovery.residuals.residual_model import ResidualModel
+from vrdp_prob.discovery.selection.trials import Trial
 from vrdp_prob.models.effects.external_impulse import ExternalImpulse
 from vrdp_prob.models.effects.hidden_obstacle import HiddenObstacle
 from vrdp_prob.models.effects.wall import Wall

@@ -9,12 +9,12 @@ from scipy.optimize import minimize
 
 from tests.discovery.fitted import fitted, with_cause
 from tests.discovery.scenes import Setting
-from vrdp_prob.discovery.checks import run_checks
-from vrdp_prob.discovery.estimates import estimates
-from vrdp_prob.discovery.jitter import alike_in_neighbours, jitter
-from vrdp_prob.discovery.residual_model import ResidualModel
-from vrdp_prob.discovery.scores import score_causes
-from vrdp_prob.discovery.trials import Trial, gain
+from vrdp_prob.discovery.candidates.scores import score_causes
+from vrdp_prob.discovery.checks.battery import run_checks
+from vrdp_prob.discovery.residuals.jitter import alike_in_neighbours, jitter
+from vrdp_prob.discovery.residuals.residual_model import ResidualModel
+from vrdp_prob.discovery.selection.estimates import estimates
+from vrdp_prob.discovery.selection.trials import Trial, gain
 from vrdp_prob.models.effects.clock_error import ClockError
 from vrdp_prob.models.effects.irregular_frames import IrregularFrames
 

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from tests.discovery.fitted import fitted
-from vrdp_prob.discovery.scores import CauseScore, Site
-from vrdp_prob.discovery.trials import Trial
+from vrdp_prob.discovery.candidates.scores import CauseScore, Site
+from vrdp_prob.discovery.selection.trials import Trial
 from vrdp_prob.inference.several_videos.fitting import SharedFit
 from vrdp_prob.models.effects.external_impulse import ExternalImpulse
 from vrdp_prob.models.simulator.events import RolloutEventKind

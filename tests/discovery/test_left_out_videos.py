@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 from tests.discovery.fitted import fitted
-from vrdp_prob.discovery.forecast import SEEN_SHARE, _forecast, held_out
-from vrdp_prob.discovery.held_out import all_but_each, cavities, left_out
-from vrdp_prob.discovery.residual_model import ResidualModel
-from vrdp_prob.discovery.scores import score_causes
-from vrdp_prob.discovery.trials import Trial, gain, gains, weights
+from vrdp_prob.discovery.candidates.scores import score_causes
+from vrdp_prob.discovery.residuals.held_out import all_but_each, cavities, left_out
+from vrdp_prob.discovery.residuals.residual_model import ResidualModel
+from vrdp_prob.discovery.selection.forecast import SEEN_SHARE, _forecast, held_out
+from vrdp_prob.discovery.selection.trials import Trial, gain, gains, weights
 from vrdp_prob.inference.map_fit import MapFit
 from vrdp_prob.inference.several_videos import fitting
 from vrdp_prob.inference.several_videos.agreement import following_ones

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from vrdp_prob.discovery.linear import LinearFit, LinearVideo
+from vrdp_prob.discovery.residuals.linear import LinearFit, LinearVideo
 
 
 def _video(seed: int) -> LinearVideo:

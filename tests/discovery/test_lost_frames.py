@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from tests.discovery.fitted import fitted, with_cause
-from vrdp_prob.discovery.estimates import estimates
-from vrdp_prob.discovery.trials import Trial, gain
+from vrdp_prob.discovery.selection.estimates import estimates
+from vrdp_prob.discovery.selection.trials import Trial, gain
 from vrdp_prob.models.effects.clock_error import ClockError
 
 SIZE, SEED = 6.0, 1

@@ -5,14 +5,14 @@ import pytest
 
 from tests.discovery.fitted import SMALL, fitted
 from tests.discovery.scenes import Setting
-from vrdp_prob.discovery.body_checks import REBOUND
+from vrdp_prob.discovery.candidates.scores import score_causes
+from vrdp_prob.discovery.candidates.unlisted_law import UnlistedMotion, UnlistedRebound
+from vrdp_prob.discovery.checks.bodies import REBOUND
 from vrdp_prob.discovery.finding import Check
-from vrdp_prob.discovery.mimics import laws_of, without_mimics
-from vrdp_prob.discovery.refits import Refits
-from vrdp_prob.discovery.scores import score_causes
-from vrdp_prob.discovery.search import Search
-from vrdp_prob.discovery.trials import Trial
-from vrdp_prob.discovery.unlisted_law import UnlistedMotion, UnlistedRebound
+from vrdp_prob.discovery.selection.mimics import laws_of, without_mimics
+from vrdp_prob.discovery.selection.refits import Refits
+from vrdp_prob.discovery.selection.search import Search
+from vrdp_prob.discovery.selection.trials import Trial
 from vrdp_prob.inference import default_model
 from vrdp_prob.models.effects.effect import BodyView, Effect
 from vrdp_prob.models.effects.friction_patch import FrictionPatch

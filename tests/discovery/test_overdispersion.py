@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from tests.discovery.fitted import fitted
-from vrdp_prob.discovery.overdispersion import overdispersion
-from vrdp_prob.discovery.residual_model import ResidualModel
+from vrdp_prob.discovery.residuals.overdispersion import overdispersion
+from vrdp_prob.discovery.residuals.residual_model import ResidualModel
 from vrdp_prob.inference.several_videos.population import with_learned_population
 
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.stats import norm
 
-from vrdp_prob.discovery.reach import reach
+from vrdp_prob.discovery.selection.reach import reach
 
 
 def _plain(edge: float, sd: float) -> Callable[[float], float]:

@@ -7,15 +7,15 @@ import pytest
 
 from tests.discovery.fitted import fitted, moved
 from tests.discovery.test_describe import PAIRS
-from vrdp_prob.discovery.contact_checks import DISTANCE
-from vrdp_prob.discovery.figures import residual_figures
-from vrdp_prob.discovery.free_flight import FreeFlight
-from vrdp_prob.discovery.free_flight_checks import QUESTIONS
-from vrdp_prob.discovery.measurement_checks import DISTORTION, LOST, SINGLE, roughness
-from vrdp_prob.discovery.missing_acceleration import Windows, missing_acceleration
-from vrdp_prob.discovery.plots import Plot, side_by_side
-from vrdp_prob.discovery.residual_model import ResidualModel
-from vrdp_prob.discovery.residual_panels import PANELS, Remainder, _groups
+from vrdp_prob.discovery.checks.contacts import DISTANCE
+from vrdp_prob.discovery.checks.flight import QUESTIONS
+from vrdp_prob.discovery.checks.measurement import DISTORTION, LOST, SINGLE, roughness
+from vrdp_prob.discovery.page.figures import residual_figures
+from vrdp_prob.discovery.page.plots import Plot, side_by_side
+from vrdp_prob.discovery.page.residual_panels import PANELS, Remainder, _groups
+from vrdp_prob.discovery.residuals.free_flight import FreeFlight
+from vrdp_prob.discovery.residuals.missing_acceleration import Windows, missing_acceleration
+from vrdp_prob.discovery.residuals.residual_model import ResidualModel
 from vrdp_prob.inference.several_videos.fitting import SharedFit
 from vrdp_prob.report.axes import Axis
 

@@ -5,9 +5,9 @@ from unittest.mock import Mock, create_autospec
 import numpy as np
 import pytest
 
-from vrdp_prob.discovery import refits, search
-from vrdp_prob.discovery.scores import CauseScore
-from vrdp_prob.discovery.trials import Trial
+from vrdp_prob.discovery.candidates.scores import CauseScore
+from vrdp_prob.discovery.selection import refits, search
+from vrdp_prob.discovery.selection.trials import Trial
 from vrdp_prob.inference.several_videos.ascent import ImpossibleStartError
 from vrdp_prob.models.effects.bowl import Bowl
 from vrdp_prob.models.effects.external_impulse import ExternalImpulse

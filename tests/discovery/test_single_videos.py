@@ -1,7 +1,7 @@
 """Where a fit has lost its way, single videos tell the cause."""
 
 from tests.discovery.fitted import fitted
-from vrdp_prob.discovery.single_videos import causes_of_lost_videos, lost_videos
+from vrdp_prob.discovery.candidates.single_videos import causes_of_lost_videos, lost_videos
 from vrdp_prob.models.effects.clock_error import ClockError
 from vrdp_prob.models.effects.contact_friction import ContactFriction
 from vrdp_prob.models.effects.material_friction import MaterialFriction

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 from scipy.stats import chi2, kstest
 
-from vrdp_prob.discovery.false_discovery import controlled, significant
+from vrdp_prob.discovery.checks.false_discovery import controlled, significant
+from vrdp_prob.discovery.checks.replications import anywhere, independent_places, sum_p_value, two_sided_p_value
+from vrdp_prob.discovery.checks.scatter_regression import dependence
 from vrdp_prob.discovery.finding import Check
-from vrdp_prob.discovery.linear import Score
-from vrdp_prob.discovery.replications import anywhere, independent_places, sum_p_value, two_sided_p_value
-from vrdp_prob.discovery.scatter_regression import dependence
+from vrdp_prob.discovery.residuals.linear import Score
 from vrdp_prob.discovery.words import direction_words, number
 
 

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from tests.discovery.fitted import fitted
-from vrdp_prob.discovery import unexplained as module
-from vrdp_prob.discovery.residual_model import ResidualModel
-from vrdp_prob.discovery.scores import score_causes
-from vrdp_prob.discovery.trials import Trial, gain
-from vrdp_prob.discovery.unexplained import unexplained
+from vrdp_prob.discovery.candidates.scores import score_causes
+from vrdp_prob.discovery.residuals import unexplained as module
+from vrdp_prob.discovery.residuals.residual_model import ResidualModel
+from vrdp_prob.discovery.residuals.unexplained import unexplained
+from vrdp_prob.discovery.selection.trials import Trial, gain
 from vrdp_prob.inference.several_videos.fitting import SharedFit
 from vrdp_prob.inference.several_videos.population import with_learned_population
 from vrdp_prob.models.effects.external_impulse import ExternalImpulse

@@ -7,10 +7,11 @@ import numpy as np
 import pytest
 
 from tests.discovery.findings import TILT, WIND
-from vrdp_prob.discovery import outcome, tried
+from vrdp_prob.discovery import outcome
 from vrdp_prob.discovery.finding import Check, Verdict
-from vrdp_prob.discovery.search import Search
-from vrdp_prob.discovery.trials import Trial
+from vrdp_prob.discovery.selection import tried
+from vrdp_prob.discovery.selection.search import Search
+from vrdp_prob.discovery.selection.trials import Trial
 
 
 def _checks(failing: int, p_value: float = 1e-9) -> list[Check]:

@@ -12,11 +12,11 @@ from tests.discovery.laws import Laws
 from tests.discovery.measurement import Measurement, measure
 from tests.discovery.test_checks import by_name, noise_in_place
 from tests.discovery.videos import Video
-from vrdp_prob.discovery.contact_checks import KICK, REBOUND_AT_WALLS, RUBBING_AT_WALLS, contact_checks
+from vrdp_prob.discovery.checks.contacts import KICK, REBOUND_AT_WALLS, RUBBING_AT_WALLS, contact_checks
 from vrdp_prob.discovery.finding import Check
-from vrdp_prob.discovery.fitted_contacts import FittedContacts
-from vrdp_prob.discovery.free_flight import FreeFlight
-from vrdp_prob.discovery.residual_model import ResidualModel
+from vrdp_prob.discovery.residuals.fitted_contacts import FittedContacts
+from vrdp_prob.discovery.residuals.free_flight import FreeFlight
+from vrdp_prob.discovery.residuals.residual_model import ResidualModel
 from vrdp_prob.inference.several_videos.fitting import fit_together
 from vrdp_prob.models.physics import PhysicsModel
 from vrdp_prob.models.simulator.events import RolloutEventKind

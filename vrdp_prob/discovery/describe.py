@@ -5,13 +5,13 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from jaxtyping import Float
 
+from vrdp_prob.discovery.checks.flight import BESIDE
+from vrdp_prob.discovery.checks.measurement import GENERAL, roughness
 from vrdp_prob.discovery.finding import Check, Description
-from vrdp_prob.discovery.free_flight import FreeFlight
-from vrdp_prob.discovery.free_flight_checks import BESIDE
-from vrdp_prob.discovery.free_flight_patterns import SYMBOLS, Pattern, spanned
-from vrdp_prob.discovery.measurement_checks import GENERAL, roughness
-from vrdp_prob.discovery.missing_acceleration import Separate, Windows, missing_acceleration
-from vrdp_prob.discovery.residual_model import ResidualModel
+from vrdp_prob.discovery.residuals.free_flight import FreeFlight
+from vrdp_prob.discovery.residuals.free_flight_patterns import SYMBOLS, Pattern, spanned
+from vrdp_prob.discovery.residuals.missing_acceleration import Separate, Windows, missing_acceleration
+from vrdp_prob.discovery.residuals.residual_model import ResidualModel
 from vrdp_prob.discovery.sparse_formula import SparseFormula, sparse_formula
 from vrdp_prob.discovery.words import number
 from vrdp_prob.inference.several_videos.fitting import SharedFit

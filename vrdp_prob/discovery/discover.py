@@ -5,18 +5,18 @@ from pathlib import Path
 
 import numpy as np
 
-from vrdp_prob.discovery.believed import extended_model, models_of_the_others
 from vrdp_prob.discovery.checking import check_video_count
 from vrdp_prob.discovery.describe import describe
-from vrdp_prob.discovery.doubts import Doubt
-from vrdp_prob.discovery.estimates import mass_scale_notes, upper_bounds
-from vrdp_prob.discovery.figures import residual_figures
 from vrdp_prob.discovery.finding import Finding, FoundCause, UpperBound, Verdict
-from vrdp_prob.discovery.free_flight import NORMAL_95
-from vrdp_prob.discovery.mimics import Unlisted
 from vrdp_prob.discovery.outcome import outcome_of
-from vrdp_prob.discovery.search import Search
-from vrdp_prob.discovery.tried import tried_causes
+from vrdp_prob.discovery.page.figures import residual_figures
+from vrdp_prob.discovery.residuals.free_flight import NORMAL_95
+from vrdp_prob.discovery.selection.believed import extended_model, models_of_the_others
+from vrdp_prob.discovery.selection.doubts import Doubt
+from vrdp_prob.discovery.selection.estimates import mass_scale_notes, upper_bounds
+from vrdp_prob.discovery.selection.mimics import Unlisted
+from vrdp_prob.discovery.selection.search import Search
+from vrdp_prob.discovery.selection.tried import tried_causes
 from vrdp_prob.inference import default_model
 from vrdp_prob.inference.checkpoint import Checkpoint, model_facts, program_facts, tracks_facts
 from vrdp_prob.inference.infer import check_model

@@ -6,13 +6,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Float
 
-from vrdp_prob.discovery.checks import run_checks
-from vrdp_prob.discovery.doubts import Doubt, doubts, with_doubts
-from vrdp_prob.discovery.estimates import cause_sentence, estimates
+from vrdp_prob.discovery.checks.battery import run_checks
 from vrdp_prob.discovery.finding import Check, FoundCause, Gain, Verdict
-from vrdp_prob.discovery.mimics import Unlisted, laws_of, without_mimics
-from vrdp_prob.discovery.search import Search, search
-from vrdp_prob.discovery.trials import Trial, gain, gains, weights
+from vrdp_prob.discovery.selection.doubts import Doubt, doubts, with_doubts
+from vrdp_prob.discovery.selection.estimates import cause_sentence, estimates
+from vrdp_prob.discovery.selection.mimics import Unlisted, laws_of, without_mimics
+from vrdp_prob.discovery.selection.search import Search, search
+from vrdp_prob.discovery.selection.trials import Trial, gain, gains, weights
 from vrdp_prob.inference.several_videos.fitting import SharedFit
 from vrdp_prob.models.effects.effect import Effect
 from vrdp_prob.progress import ProgressDisplay

@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Float
 from sklearn.linear_model import OrthogonalMatchingPursuit
 
-from vrdp_prob.discovery.missing_acceleration import Separate
+from vrdp_prob.discovery.residuals.missing_acceleration import Separate
 
 MOST_TERMS = 6
 

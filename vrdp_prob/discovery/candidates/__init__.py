@@ -1,0 +1,1 @@
+"""Causes that what is left speaks for, and first guesses of them."""

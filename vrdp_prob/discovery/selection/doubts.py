@@ -1,0 +1,108 @@
+"""Reasons to doubt that what was found is the cause that it is called."""
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+
+from vrdp_prob.discovery.candidates.scores import happens_once
+from vrdp_prob.discovery.checks.bodies import REBOUND, friction_against
+from vrdp_prob.discovery.checks.contacts import DISTANCE, KICK, REBOUND_AT_WALLS, RUBBING, RUBBING_AT_WALLS
+from vrdp_prob.discovery.checks.measurement import DISTORTION, LOST, SINGLE
+from vrdp_prob.discovery.finding import Check
+from vrdp_prob.discovery.selection.estimates import surprise
+from vrdp_prob.discovery.selection.trials import Trial
+from vrdp_prob.models.effects.clock_error import ClockError
+from vrdp_prob.models.effects.contact_friction import ContactFriction
+from vrdp_prob.models.effects.contact_radius_error import ContactRadiusError
+from vrdp_prob.models.effects.effect import Effect
+from vrdp_prob.models.effects.external_impulse import ExternalImpulse
+from vrdp_prob.models.effects.irregular_frames import IrregularFrames
+from vrdp_prob.models.effects.lens_distortion import LensDistortion
+from vrdp_prob.models.effects.mass_dependent_friction import MassDependentFriction
+from vrdp_prob.models.effects.material_friction import MaterialFriction
+from vrdp_prob.models.effects.speed_dependent_restitution import SpeedDependentRestitution
+
+SURPRISING = 0.01
+"""Probability below which parameters of a cause, or what is left of what it acts on, say that it is something else."""
+OWN_CHECKS: Mapping[str, tuple[str, ...]] = {
+    SpeedDependentRestitution.name: (REBOUND, REBOUND_AT_WALLS),
+    ContactFriction.name: (RUBBING, RUBBING_AT_WALLS),
+    ContactRadiusError.name: (DISTANCE,),
+    ExternalImpulse.name: (KICK,),
+    ClockError.name: (LOST,),
+    IrregularFrames.name: (SINGLE,),
+    LensDistortion.name: (DISTORTION,),
+    MassDependentFriction.name: (friction_against("mass"),),
+    MaterialFriction.name: (friction_against("material"),),
+}
+"""By the name of a cause: the checks that ask for what it does, and for nothing else."""
+
+
+@dataclass(frozen=True)
+class Doubt:
+    """A reason to doubt that something is the cause that it is called.
+
+    Parameters
+    ----------
+    credible
+        Factor of the probability of the cause.
+    sentence
+        The reason, for a reader.
+    """
+
+    credible: float
+    sentence: str
+
+
+def doubts(trial: Trial, cause: Effect, left: Sequence[Check] = ()) -> Iterator[Doubt]:
+    """Reasons to doubt a cause of a model.
+
+    Parameters
+    ----------
+    trial
+        The model.
+    cause
+        One of its causes.
+    left
+        Checks of what the model leaves.
+    """
+    of_parameters = surprise(trial.fit, cause)
+    if of_parameters < SURPRISING:
+        yield Doubt(
+            of_parameters / SURPRISING,
+            f"The parameters of '{cause.name}' are far from what was expected of this cause: it may stand for "
+            "something that it has as its limit, and its probability counts that.",
+        )
+    own = sorted((one for one in left if one.name in OWN_CHECKS.get(cause.name, ())), key=lambda one: one.p_value)
+    by_chance = len(own) * own[0].p_value if own else 1.0
+    if by_chance < SURPRISING:
+        otherwise = ", or it happened more often than was found" if happens_once(cause) else ""
+        yield Doubt(
+            by_chance / SURPRISING,
+            f"With '{cause.name}' the check of {own[0].name} fails still, which asks for just what this cause does: "
+            f"its law is another one{otherwise}, and its probability counts that.",
+        )
+
+
+def with_doubts(
+    shares: Float[np.ndarray, "model"], reasons: Mapping[int, Sequence[Doubt]]
+) -> Float[np.ndarray, "model"]:
+    """Probabilities of models of which some are doubted.
+
+    Parameters
+    ----------
+    shares
+        Probabilities without doubts, the first that of the best model.
+    reasons
+        Why some models are doubted, by their number.
+
+    Returns
+    -------
+    What a doubted rival loses the others have; what the best model loses is that of something that was not compared, so
+    that the probabilities then add up to less than 1.
+    """
+    believed = shares * [math.prod(one.credible for one in reasons.get(k, ())) for k in range(len(shares))]
+    return believed if reasons.get(0) else believed / believed.sum()

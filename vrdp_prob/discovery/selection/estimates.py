@@ -1,0 +1,206 @@
+"""What a fit says of the parameters of a cause, in their units, and how large a cause may be that was not named."""
+
+import math
+from collections.abc import Iterable, Iterator, Mapping
+
+import numpy as np
+from jaxtyping import Float
+from scipy.stats import chi2
+
+from vrdp_prob.discovery.candidates.scores import CauseScore, Largest
+from vrdp_prob.discovery.finding import Estimate, UpperBound
+from vrdp_prob.discovery.residuals.unexplained import Unexplained
+from vrdp_prob.discovery.selection.reach import Reach, reaches
+from vrdp_prob.inference.several_videos.fitting import SharedFit
+from vrdp_prob.inference.several_videos.linking import place_words
+from vrdp_prob.models.effects.effect import Effect
+from vrdp_prob.models.parameters import Transform
+from vrdp_prob.scene import Tracks
+
+CERTAIN = 0.95
+"""Probability of the intervals."""
+MIDDLE = 1.959964
+"""Standard deviations from the middle of a normal distribution to the ends of its middle 95 %."""
+
+
+def estimates(
+    fit: SharedFit,
+    effect: Effect,
+    *,
+    unexplained: Unexplained | None = None,
+    overdispersion: Float[np.ndarray, "video"] | None = None,
+) -> dict[str, Estimate]:
+    """Parameters of an effect by name, with the material, or the body and video, that each belongs to.
+
+    Parameters
+    ----------
+    fit
+        Fit of a model with the effect.
+    effect
+        The effect.
+    unexplained
+        What the fit leaves to chance, which widens what is known; nothing where None.
+    overdispersion
+        Further factor of each video by which variances are larger than what the likelihood says, shared numbers by
+        their mean; 1 where None.
+    """
+    factors = np.ones(len(fit.videos)) if overdispersion is None else overdispersion
+    shared_sd = widened(fit.joint.gaussian.sd, factors, unexplained)
+    units = {parameter.name: parameter for parameter in effect.parameters}
+    found: dict[str, Estimate] = {}
+    joint, farther = fit.joint, reaches(fit, units, shared_sd)
+    for place, key in enumerate(joint.numbers.keys):
+        if key[0] in units:
+            words = place_words(key[1])
+            name = f"{key[0]}[{words}]" if words else key[0]
+            mean, sd = float(joint.gaussian.mean[place]), float(shared_sd[place])
+            transform, unit = units[key[0]].transform, units[key[0]].unit
+            far = farther.get(place)
+            gaussian = _estimate(transform, mean, sd, unit)
+            found[name] = gaussian if far is None else _reaching(transform, gaussian, far)
+    for index, video in enumerate(joint.videos):
+        coordinates, point = video.likelihood.coordinates, joint.point(index)
+        sd = np.sqrt(factors[index] * np.diag(np.linalg.inv(joint.precision(index))))
+        if unexplained is not None:
+            sd[list(unexplained.plain.videos[index].own_places)] *= unexplained.own_widening(index)
+        for place in video.local_places:
+            entry = coordinates.entries[place]
+            if entry.field in units:
+                body = "" if entry.owner is None else f"{video.likelihood.tracks.bodies[entry.owner].id} in "
+                found[f"{entry.field}[{body}{video.name}]"] = _estimate(
+                    entry.transform, float(point[place]), float(sd[place]), units[entry.field].unit
+                )
+        for (name, _), value in fit.structures[index].held.items():
+            if name in effect.stepwise and value is not None:
+                found[f"{name}[{video.name}]"] = _between_frames(value, video.likelihood.tracks, units[name].unit)
+    return found
+
+
+def widened(
+    sd: Float[np.ndarray, "shared"], overdispersion: Float[np.ndarray, "video"], unexplained: Unexplained | None
+) -> Float[np.ndarray, "shared"]:
+    """Standard deviations of what videos share, with what a fit leaves to chance and the overdispersion of videos."""
+    wider: np.ndarray = sd * np.sqrt(overdispersion.mean())
+    return wider if unexplained is None else wider * unexplained.shared_widening
+
+
+def mass_scale_notes(effects: Iterable[Effect], videos: Iterable[Tracks]) -> Iterator[str]:
+    """What limits estimates of parameters that show only as their ratio to the masses, where no mass is stated.
+
+    Parameters
+    ----------
+    effects
+        Effects whose parameters are told.
+    videos
+        What was seen.
+    """
+    if any(body.mass is not None for tracks in videos for body in tracks.bodies):
+        return
+    for name in (one.name for effect in effects for one in effect.parameters if one.goes_with_masses):
+        yield (
+            f"No mass is stated, and only the ratio of {name.replace('_', ' ')} to the masses shows: its value and its "
+            "interval are those for masses of the scale that was believed, and change in proportion with it."
+        )
+
+
+def _estimate(transform: Transform, mean: float, sd: float, unit: str) -> Estimate:
+    low, high = mean - MIDDLE * sd, mean + MIDDLE * sd
+    if transform is Transform.IDENTITY:
+        return Estimate(mean, sd, low, high, unit)
+    middle = math.exp(mean + sd**2 / 2)
+    return Estimate(middle, middle * math.sqrt(math.expm1(sd**2)), math.exp(low), math.exp(high), unit)
+
+
+def _reaching(transform: Transform, gaussian: Estimate, far: Reach) -> Estimate:
+    """An estimate of what reaches farther than a Gaussian says."""
+    value = np.exp if transform is Transform.LOG else np.asarray
+    low, high = (float(value(far.quantile(share))) for share in ((1 - CERTAIN) / 2, (1 + CERTAIN) / 2))
+    mean, sd = far.moments(value)
+    return Estimate(mean, max(sd, gaussian.sd), min(low, gaussian.q025), max(high, gaussian.q975), gaussian.unit)
+
+
+def _between_frames(middle: float, tracks: Tracks, unit: str) -> Estimate:
+    """A time of which only the two frames around it are known."""
+    interval = float(np.median(np.diff(tracks.times)))
+    half = CERTAIN * interval / 2
+    return Estimate(middle, interval / math.sqrt(12), middle - half, middle + half, unit)
+
+
+def surprise(fit: SharedFit, effect: Effect) -> float:
+    """Probability that the shared parameters of an effect lie so far from what was expected of them, strengths aside.
+
+    A cause that holds another one as its limit takes its place with parameters far off: a bowl whose middle is far away
+    is a slope. How strong a cause is may surprise. Source: prior-data conflict (Evans and Moshonov, Checking for
+    prior-data conflict, Bayesian Analysis 1, 2006), with the most probable values in the place of the data.
+
+    Parameters
+    ----------
+    fit
+        Fit of a model with the effect.
+    effect
+        The effect.
+    """
+    joint = fit.joint
+    strengths = {*effect.vanishes_at, *effect.vanishes_like}
+    priors = {one.name: fit.model.believed(one).prior for one in effect.parameters if one.name not in strengths}
+    found = [
+        (priors[key[0]], joint.gaussian.mean[place]) for place, key in enumerate(joint.numbers.keys) if key[0] in priors
+    ]
+    squares = sum(((float(mean) - prior.mean) / prior.sd) ** 2 for prior, mean in found)
+    return float(chi2.sf(squares, len(found))) if found else 1.0
+
+
+def cause_sentence(effect: Effect, found: Mapping[str, Estimate]) -> str:
+    """What a cause is, which way it acts where the data tell, and how strong it is."""
+    sentence = _signed_sentence(effect, found).rstrip(".")
+    shown = [name for name in found if name.split("[")[0] in {*effect.vanishes_at, *effect.vanishes_like}]
+    parts = [f"{name} = {found[name].mean:.3g} ± {found[name].sd:.2g} {_unit(found[name].unit)}" for name in shown]
+    return f"{sentence} ({'; '.join(part.strip() for part in parts)})." if parts else f"{sentence}."
+
+
+def _signed_sentence(effect: Effect, found: Mapping[str, Estimate]) -> str:
+    """The sentence for the sign of the strength, where its 95 % interval has but one."""
+    strength = next((found[name] for name in effect.vanishes_at if name in found), None)
+    if effect.signed_sentences is None or strength is None or strength.q025 <= 0 <= strength.q975:
+        return effect.sentence
+    positive, negative = effect.signed_sentences
+    return positive if strength.mean > 0 else negative
+
+
+def _unit(unit: str) -> str:
+    return "" if unit == "1" else unit
+
+
+def upper_bounds(effect: Effect, score: CauseScore | None, *, widening: float = 1.0) -> list[UpperBound]:
+    """How large the strengths of a cause may be (95 %), at the place where most could have hidden.
+
+    Parameters
+    ----------
+    effect
+        The cause.
+    score
+        What the residuals say of it; None where they say nothing, or it has no strength (a wall has none).
+    widening
+        Factor by which standard deviations are larger than the residuals say.
+    """
+    names = dict.fromkeys([*effect.vanishes_at, *effect.vanishes_like]) or [effect.parameters[0].name]
+    units = {parameter.name: parameter.unit for parameter in effect.parameters}
+    largest = {name: (score.largest if score else {}).get(name, Largest(None, 1, 0)) for name in names}
+    return [
+        UpperBound(
+            effect.cause_name(),
+            name,
+            one.widened(widening),
+            units[name],
+            _nothing(effect, name),
+            places=one.places,
+            told=one.told,
+            way=effect.way(),
+        )
+        for name, one in largest.items()
+    ]
+
+
+def _nothing(effect: Effect, strength: str) -> float | str:
+    """Where a strength does nothing: a value, or the parameter that it is then like."""
+    return effect.vanishes_like.get(strength, effect.vanishes_at.get(strength, 0.0))

@@ -1,0 +1,286 @@
+"""Refits with one more cause: which causes are tried on a model, and with what lost or hidden things beside them."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from functools import partial
+
+import numpy as np
+from jaxtyping import Float
+
+from vrdp_prob.discovery.candidates.proposals import hidden_things
+from vrdp_prob.discovery.candidates.scores import CauseScore, happens_once, score_causes
+from vrdp_prob.discovery.candidates.single_videos import causes_of_lost_videos, lost_videos
+from vrdp_prob.discovery.residuals.overdispersion import overdispersion
+from vrdp_prob.discovery.selection.trials import Trial, gain
+from vrdp_prob.inference.parallel import in_processes
+from vrdp_prob.inference.several_videos.ascent import ImpossibleStartError
+from vrdp_prob.inference.several_videos.fitting import fit_together
+from vrdp_prob.inference.several_videos.second_look import MOST, explained, may_take_another_course
+from vrdp_prob.models.effects.effect import Effect
+from vrdp_prob.models.effects.external_impulse import ExternalImpulse
+from vrdp_prob.progress import Advance
+
+SHORTLIST_LEVEL = 0.01
+"""Causes whose score chance makes as large more often are not refitted."""
+CLOSE = 0.5
+"""Share of the largest statistic (see `_shortlist`) below which a cause is refitted only if those above it leave
+something."""
+HOPEFUL = 0.2
+"""Share of the largest statistic (see `_shortlist`) below which a cause cannot be the best one, nor a rival of it."""
+TRIFLE = 0.05
+"""Share of any statistic, also of what happens once in a video, below which nothing is refitted."""
+MOST_REFITTED = 5
+"""Causes that are refitted, at most."""
+SHORT, MENDINGS = 0.5, 3
+"""Share of what was promised or brought by another that a cause must bring, and number of refits searched anew."""
+
+
+@dataclass(frozen=True)
+class Left:
+    """What a model leaves, by the causes that may be behind it.
+
+    Parameters
+    ----------
+    scores
+        Scores of all further causes, the least probable by chance first, where all that is left is noise.
+    beside_chance
+        The same beside what the model leaves to chance.
+    overdispersion
+        Of each video, by what the model leaves unexplained.
+    """
+
+    scores: tuple[CauseScore, ...]
+    beside_chance: tuple[CauseScore, ...]
+    overdispersion: Float[np.ndarray, "video"]
+
+
+@dataclass(frozen=True)
+class Refits:
+    """The refits of models with one more cause, each made the first time that it is asked for.
+
+    Parameters
+    ----------
+    catalogue
+        Causes that are looked for.
+    seed
+        Of the null distributions and of searches.
+    needed
+        Gain (nats) in the predictive density that a cause must bring.
+    advance
+        Told of each refit.
+    """
+
+    catalogue: tuple[Effect, ...]
+    seed: int
+    needed: float
+    advance: Advance
+    _left: dict[Trial, Left] = field(default_factory=dict)
+    _made: dict[Trial, list[Trial]] = field(default_factory=dict)
+    _searched: set[Trial] = field(default_factory=set)
+    _anew: dict[Trial, tuple[frozenset[int], int]] = field(default_factory=dict)
+
+    def left(self, trial: Trial) -> Left:
+        """What a model leaves."""
+        if trial not in self._left:
+            further = [effect for effect in self.catalogue if effect.name not in trial.names]
+            found = trial.unexplained
+            scores = beside = score_causes(trial.fit, found.plain, further, seed=self.seed)
+            if found.accelerated:
+                beside = score_causes(trial.fit, found.model, further, seed=self.seed)
+            self._left[trial] = Left(tuple(scores), tuple(beside), overdispersion(found.model, seed=self.seed))
+        return self._left[trial]
+
+    def of(self, trial: Trial) -> list[Trial]:
+        """Refits of a model, the best first."""
+        return self._made[trial] if trial in self._made else self._keep(trial, self._new(trial))
+
+    def made(self, trial: Trial) -> list[Trial]:
+        """Refits of a model as far as any were made, the best first."""
+        return self._made.get(trial, [])
+
+    def _keep(self, trial: Trial, found: Sequence[Trial]) -> list[Trial]:
+        """Refits of a model, the best first, as which they count from now on."""
+        self._made[trial] = sorted(found, key=merit, reverse=True)
+        return self._made[trial]
+
+    def _new(self, trial: Trial) -> list[Trial]:
+        """Refits in any order; hidden things are tried only where nothing explains the videos better than kicks do."""
+        scores = self.left(trial).scores
+        likely = _shortlist(scores)
+        close = _shortlist(scores, CLOSE)
+        found = self.made_of(trial, close)
+        if not self.settled(trial, found):
+            found += self.made_of(trial, [one for one in likely if one not in close])
+            found.sort(key=merit, reverse=True)
+        kicks = next((one for one in scores if _kicks(one) and one.sites), None)
+        if kicks is not None and (not found or found[0].causes[-1].name == kicks.effect.name):
+            found += self._hidden(trial, found, kicks)
+        return found
+
+    def with_lost(self, trial: Trial) -> list[Trial]:
+        """The refits, and where these leave something fits from the beginning, which count among them from then on.
+
+        Where nothing was refitted yet, fits from the beginning come first: scores of a fit that has lost videos call
+        for many causes, each of which costs more than the search for the one that explains such a video.
+        """
+        refitted, found = trial in self._made, self.made(trial)
+        if trial not in self._searched and not self.settled(trial, found):
+            self._searched.add(trial)
+            found = self._keep(trial, [*found, *self._lost(trial, found)])
+            if not refitted and not self.settled(trial, found):
+                found = self._keep(trial, [*found, *self._new(trial)])
+        return found
+
+    def with_lost_found(self, trial: Trial, one: Trial) -> Trial:
+        """One of the refits with its few lost videos searched anew, in the place of which it counts from then on.
+
+        What one lost video leaves calls for many causes, of which each costs more to try than the search. Where most
+        videos are explained and something is left still, all of them are searched.
+        """
+        found = one
+        for _ in range(MENDINGS):
+            kicked = [site.video for score in self.left(found).scores for site in score.sites if _kicks(score)]
+            videos = list(dict.fromkeys([*lost_videos(found.fit), *kicked]))
+            before, few = found, len(videos) <= len(one.fit.fits) // MOST
+            found = self.searched_anew(found, videos) if few else found
+            if found is before:
+                break
+        if self._leaves_something(found) and explained(found.fit.fits):
+            other = found.with_other_courses(seed=self.seed)
+            found = found if other.loses_videos_of(found) else other
+        if found is not one:
+            self._keep(trial, [found if old is one else old for old in self.of(trial)])
+        return found
+
+    def searched_anew(self, trial: Trial, videos: Sequence[int]) -> Trial:
+        """A model with some videos searched anew, as far as they may take another course.
+
+        A course for which other videos lose theirs, and do not find it again, is a wrong one; one with which others
+        are a little less probable and explained still is none. A video of which a search has found nothing better is
+        not searched again; where it has, a further search takes another seed.
+        """
+        settled, passed = self._anew.get(trial, (frozenset(), 0))
+        now = [one for one in videos if one not in settled and may_take_another_course(trial.fit.fits[one])]
+        found = trial.mended(now, seed=self.seed + passed, thorough=True) if now else trial
+        if found is not trial and (fallen := found.fallen_from(trial)):
+            found = found.mended(fallen, seed=self.seed + passed)
+            found = trial if found.loses_videos_of(trial) else found
+        settled |= frozenset(now).difference([] if found is trial else trial.fallen_from(found))
+        self._anew[trial] = self._anew[found] = (settled, passed + 1)
+        return found
+
+    def settled(self, trial: Trial, found: Sequence[Trial]) -> bool:
+        """Whether the best cause leaves nothing to explain, and is not a kick in each of several videos."""
+        if not found or gain(found[0], trial)[0] < self.needed:
+            return False
+        return not _mends_several(found[0]) and not self._leaves_something(found[0])
+
+    def _leaves_something(self, trial: Trial) -> bool:
+        """Whether a model leaves what chance explains less well than some cause may."""
+        left = self.left(trial).beside_chance
+        return any(one.p_value * len(left) <= SHORTLIST_LEVEL for one in left)
+
+    def _lost(self, trial: Trial, found: Sequence[Trial]) -> list[Trial]:
+        """Fits from the beginning, with causes that explain videos whose course of events nothing else explains.
+
+        What happens once in each of several videos explains none of them: kicks mend any course.
+        """
+        if trial.choices:
+            return []
+        left = [effect for effect in self.catalogue if effect.name not in trial.names]
+        likely = {one.effect.name for one in _shortlist(self.left(trial).scores)}
+        reached = {one.causes[-1].name: one.brought(trial) for one in reversed(found)}
+        best = next((one.fit for one in found if not _mends_several(one)), trial.fit)
+        still_lost = lost_videos(best)
+        lost = [one for one in lost_videos(trial.fit) if one in still_lost]
+        told = causes_of_lost_videos(trial.fit, lost, left, likely, self.needed, seed=self.seed)
+        again = [effect for effect, promised in told if reached.get(effect.name, 0.0) < promised]
+
+        def searched(effect: Effect) -> Trial | None:
+            model = trial.fit.extended(effect)
+            tracks = [part.clues.tracks for part in trial.fit.fits]
+            try:
+                fit = fit_together(tracks, model=model, shared=trial.fit.shared, seed=self.seed, model_error=False)
+                return trial.and_cause(effect, fit)
+            except ImpossibleStartError:  # what single videos say of the cause fits no world of all of them
+                return None
+            finally:
+                self.advance(1)
+
+        return [one for one in map(searched, again) if one is not None]
+
+    def _hidden(self, trial: Trial, found: Sequence[Trial], kicks: CauseScore) -> list[Trial]:
+        """Fits with something unseen in the place of kicks."""
+        kicked = next((one for one in found if one.causes[-1].name == kicks.effect.name), None)
+        kicked = kicked or next(iter(self.made_of(trial, [kicks])), None)
+        if kicked is None:
+            return []
+        left = [effect for effect in self.catalogue if effect.name not in trial.names]
+        starts = hidden_things(kicked.fit, left, kicks.p_value)
+        return self._all(partial(kicked.with_cause_in_place, least=trial.fit.joint.log_density), starts)
+
+    def made_of(self, trial: Trial, scores: Sequence[CauseScore]) -> list[Trial]:
+        """Fits with one cause more, the best first.
+
+        Where the score of a cause promises more than any refit has brought, and its own brought far less, that goes on
+        if it broke off on a long way; and where videos have lost their course of events on it, they are searched anew.
+        So it is with the cause whose score promises most, whatever others have brought.
+        """
+        found = self._all(trial.with_cause, scores)
+        promised = {one.effect.name: one.size / 2 for one in scores if not happens_once(one.effect)}
+        leader = max(promised, key=lambda name: promised[name], default="")
+        for _ in range(MENDINGS):
+            most = max((one.brought(trial) for one in found), default=0.0)
+            short = [
+                one
+                for one in found
+                if (told := promised.get(name := one.causes[-1].name, 0.0)) > max(one.brought(trial), 0.0)
+                and (name == leader or told > max(most, one.brought(trial) / SHORT))
+                and (not one.fit.joint.converged or one.fallen_from(trial))
+            ]
+            if not short:
+                break
+            hopeful = max(short, key=lambda one: promised[one.causes[-1].name])
+            further = hopeful.continued()
+            if fallen := further.fallen_from(trial):
+                further = further.mended(fallen, seed=self.seed)
+            if further.brought(trial) < hopeful.brought(trial) + self.needed:
+                promised.pop(hopeful.causes[-1].name)
+            else:
+                found = [further if one is hopeful else one for one in found]
+        most = max((one.brought(trial) for one in found), default=0.0)
+        close = [one for one in found if one.brought(trial) > SHORT * most > 0]
+        rest = [one for one in found if one not in close]
+        return sorted([*in_processes(Trial.continued, close), *rest], key=merit, reverse=True)
+
+    def _all(self, refit: Callable[[CauseScore], Trial | None], scores: Sequence[CauseScore]) -> list[Trial]:
+        return [one for one in in_processes(refit, scores, advance=self.advance) if one is not None]
+
+
+def merit(trial: Trial) -> float:
+    """By which models are ordered: what they predict of left-out videos, less what their causes are believed less."""
+    return float(trial.log_density.sum()) + trial.log_prior
+
+
+def _mends_several(trial: Trial) -> bool:
+    """Whether the last cause of a model happens once in each of several videos."""
+    cause = trial.causes[-1]
+    return happens_once(cause) and len(trial.acting(cause)) > 1
+
+
+def _kicks(score: CauseScore) -> bool:
+    return isinstance(score.effect, ExternalImpulse)
+
+
+def _shortlist(scores: Sequence[CauseScore], share: float = HOPEFUL) -> list[CauseScore]:
+    """Causes whose statistic is more than a share of the largest one, that of lasting causes for those that last.
+
+    What happens once mends the course of a lost video better than any law does from where the fit is; so it is no good
+    measure of laws, as long as these are no mere trifle beside it.
+    """
+    largest = max((one.size for one in scores), default=0.0)
+    likely = [one for one in scores if one.p_value < SHORTLIST_LEVEL and one.size > TRIFLE * largest]
+    likely.sort(key=lambda one: -one.size)
+    lasting = [one for one in likely if not happens_once(one.effect)]
+    compared = [(one, lasting if one in lasting else likely) for one in likely]
+    return [one for one, others in compared if one.size > share * others[0].size][:MOST_REFITTED]

@@ -1,0 +1,340 @@
+"""Forward selection of causes by how well whole videos are predicted that the model was not fitted to."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+from jaxtyping import Float
+
+from vrdp_prob.discovery.candidates.scores import happens_once
+from vrdp_prob.discovery.selection.refits import HOPEFUL, Left, Refits, merit
+from vrdp_prob.discovery.selection.trials import Trial, gain, weights, with_own_population
+from vrdp_prob.inference.several_videos.fitting import SharedFit
+from vrdp_prob.inference.several_videos.second_look import doubtful
+from vrdp_prob.models.effects.effect import Effect
+from vrdp_prob.progress import ProgressDisplay, SilentProgress
+
+MOST_RIVALS = 2
+MOST_CAUSES = 5
+MOST_SWAPS = 3
+PLAIN = 50.0
+"""Gain of a cause, in those that are needed, from which it is not put in doubt again."""
+ESTABLISHED = 0.8
+"""Probability that a cause must have beside the model without it."""
+FALSE_ALARM = 0.05
+"""Prior odds that the model lacks something; all causes of the catalogue share them alike."""
+
+
+@dataclass(frozen=True)
+class Step:
+    """One step of the search.
+
+    Parameters
+    ----------
+    left
+        What the model leaves before the step.
+    tried
+        Refits with one more cause, the best first; what patches several videos comes last, unless the best other one
+        is in doubt.
+    pair
+        A refit of `tried` and one with a further cause, which are established together; None where nothing was left to
+        look for a second cause in, or no two are.
+    """
+
+    left: Left
+    tried: tuple[Trial, ...] = ()
+    pair: tuple[Trial, Trial] | None = None
+
+
+@dataclass(frozen=True)
+class Search:
+    """How a search went.
+
+    Parameters
+    ----------
+    base
+        The model that was given.
+    best
+        The model with every cause that was found.
+    steps
+        The steps, the last of which added nothing.
+    lesser
+        For each cause of `best`: the model without it.
+    rivals
+        For each cause of `best`: models in which another cause takes its place, as far as any came close.
+    refits
+        What every model leaves, and the refits of it.
+    """
+
+    base: Trial
+    best: Trial
+    steps: tuple[Step, ...]
+    lesser: tuple[Trial, ...]
+    rivals: tuple[tuple[Trial, ...], ...]
+    refits: Refits
+
+    @property
+    def needed(self) -> float:
+        """Gain (nats) in the predictive density that a cause must bring."""
+        return self.refits.needed
+
+    @property
+    def left(self) -> Left:
+        """What the best model leaves."""
+        return self.refits.left(self.best)
+
+    @property
+    def overdispersion(self) -> Float[np.ndarray, "video"]:
+        """Factor of each video by which gains are divided."""
+        return self.left.overdispersion
+
+    def without(self, causes: Sequence[Effect]) -> "Search":
+        """The search with a best model that lacks some of its causes, and those that bring too little without these."""
+        if not causes:
+            return self
+        if len(causes) == len(self.best.causes):
+            return self._with_best(self.base)
+        best = self.best
+        for cause in causes:
+            best = best.without(cause)
+        return self._with_best(best.continued())
+
+    def with_rival(self, cause: Effect, believable: Callable[[Trial], bool]) -> "Search | None":
+        """The search with another cause in the place of one of the best model; None where none explains as much.
+
+        Parameters
+        ----------
+        cause
+            The cause whose place is taken.
+        believable
+            Whether a model with a rival in it is one to go on with.
+        """
+        number = self.best.causes.index(cause)
+        for rival in sorted(self.rivals[number], key=merit, reverse=True):
+            if gain(self.best, rival, self.overdispersion)[0] < self.needed and believable(rival):
+                found = self._with_best(rival.continued())
+                if rival.causes[-1] in found.best.causes:
+                    return found
+        return None
+
+    def _with_best(self, best: Trial) -> "Search":
+        """The search with another best model, as far as its causes are established."""
+        best, lesser = _Searcher(self.refits).established(best)
+        return replace(self, best=best if best.causes else self.base, lesser=lesser, rivals=tuple(() for _ in lesser))
+
+
+def gain_needed(causes: int) -> float:
+    """Gain (nats) in the predictive density that a cause must bring where so many are looked for."""
+    return float(np.log(max(causes, 1) / FALSE_ALARM))
+
+
+def search(
+    fit: SharedFit, catalogue: Sequence[Effect], *, seed: int, progress: ProgressDisplay | None = None
+) -> Search:
+    """Look for causes that a model lacks, one after the other.
+
+    Parameters
+    ----------
+    fit
+        Fit of the model to all videos.
+    catalogue
+        Causes that are looked for.
+    seed
+        Of the null distributions.
+    progress
+        Told how far the work is.
+    """
+    needed = gain_needed(len(catalogue))
+    with (progress or SilentProgress()).stage("Trying causes", total=None) as advance:
+        searcher = _Searcher(Refits(tuple(catalogue), seed, needed, advance))
+        chain = [Trial((), with_own_population(fit), stated=fit.model.beliefs).continued()]
+        steps = [searcher.untried(chain[0])]
+        while len(chain) <= MOST_CAUSES:
+            step = steps[-1] = searcher.tried(chain[-1])
+            base, winner = searcher.chosen(chain[-1], step)
+            found_better_course = base is not chain[-1]
+            chain[-1] = base
+            if found_better_course:
+                steps[-1] = replace(step, left=searcher.refits.left(base))
+            if winner is not None:
+                chain.append(winner)
+                steps.append(searcher.untried(winner))
+            elif not found_better_course:
+                break
+        best = searcher.unpatched(chain[-1])
+        if best is not chain[-1]:
+            chain.append(best)
+            steps.append(searcher.untried(best))
+        best, lesser, rivals = searcher.compared(chain, steps)
+    return Search(chain[0], best, tuple(steps), lesser, rivals, searcher.refits)
+
+
+@dataclass(frozen=True)
+class _Searcher:
+    """What is looked for."""
+
+    refits: Refits
+
+    @property
+    def seed(self) -> int:
+        return self.refits.seed
+
+    @property
+    def needed(self) -> float:
+        return self.refits.needed
+
+    def untried(self, trial: Trial) -> Step:
+        """A step in which nothing was tried yet."""
+        return Step(self.refits.left(trial))
+
+    def tried(self, trial: Trial) -> Step:
+        """The step with the causes tried that may be the best one."""
+        found, pair = self.refits.of(trial), None
+        first = None if self.refits.settled(trial, found) else self._provisional(trial, found)
+        if first is not None:
+            first = self.refits.with_lost_found(trial, first)
+            found = self.refits.of(trial)
+        if not self.refits.settled(trial, found):
+            if first is None:
+                found = self.refits.with_lost(trial)
+            else:
+                pair = self._pair(trial, first)
+        return Step(self.refits.left(trial), tuple(self._in_order(trial, found)), pair)
+
+    def _provisional(self, trial: Trial, found: Sequence[Trial]) -> Trial | None:
+        """The lasting cause that brings most where all else is noise, if it brings enough."""
+        lasting = [one for one in found if not happens_once(one.causes[-1])]
+        first = max(lasting, key=lambda one: one.brought(trial) + one.log_prior, default=trial)
+        return None if first.brought(trial) < self.needed else first
+
+    def _pair(self, trial: Trial, first: Trial) -> tuple[Trial, Trial] | None:
+        """A cause and a second one beside it, if both together are established.
+
+        What two causes leave when one is known may follow chance as well as what both leave: then neither stands out
+        beside chance by itself.
+        """
+        second = next(iter(self._in_order(first, self.refits.with_lost(first))), first)
+        if second is first or gain(second, trial)[0] < 2 * self.needed or gain(second, first)[0] < self.needed:
+            return None
+        divisor = self.refits.left(second).overdispersion
+        return None if self.doubted(second, trial, divisor) or self.doubted(second, first, divisor) else (first, second)
+
+    def chosen(self, trial: Trial, step: Step) -> tuple[Trial, Trial | None]:
+        """The model to go on from, and the same with the cause that a step has established; None where it has none.
+
+        Where the winner's refit has found a better course of events, which is no merit of the cause, the model with
+        that course is the one to go on from; so it is where a search finds one that the winner's kicks stood for.
+        """
+        winner = next((one for one in step.tried[:1] if gain(one, trial)[0] >= self.needed), None)
+        if winner is not None:
+            without = winner.without(winner.causes[-1])
+            if gain(without, trial)[0] > self.needed:
+                trial = without
+            if happens_once(winner.causes[-1]):
+                mended = self.refits.searched_anew(trial, winner.acting(winner.causes[-1]))
+                trial = mended if gain(mended, trial)[0] > self.needed else trial
+            if self.doubted(winner, trial, self.refits.left(winner).overdispersion):
+                winner = None
+        return trial, self.or_first_of(step.pair, winner)
+
+    def or_first_of(self, pair: tuple[Trial, Trial] | None, winner: Trial | None) -> Trial | None:
+        """The best single cause, or the first of an established pair that brings more.
+
+        Kicks explain more than either of two causes does, and less than both.
+        """
+        if pair is None or (winner is not None and gain(pair[1], winner)[0] < self.needed):
+            return winner
+        return pair[0]
+
+    def _in_order(self, trial: Trial, found: Sequence[Trial]) -> list[Trial]:
+        """Trials by merit; those that patch several videos last, unless the best other one is in doubt."""
+        patching = [one for one in found if one.patches(one.causes[-1])]
+        others = sorted((one for one in found if one not in patching), key=merit, reverse=True)
+        if others and not self.doubted(others[0], trial, np.ones(len(trial.fit.videos))):
+            return [*others, *sorted(patching, key=merit, reverse=True)]
+        return sorted(found, key=merit, reverse=True)
+
+    def doubted(self, trial: Trial, lesser: Trial, divisor: Float[np.ndarray, "video"]) -> bool:
+        """Whether a cause brings too little, or brings it in too few of the videos that could have been drawn."""
+        if gain(trial, lesser, divisor)[0] < self.needed:
+            return True
+        shares = weights([trial, lesser], [0.0, self.needed], np.random.default_rng(self.seed), overdispersion=divisor)
+        return bool(shares[0] < ESTABLISHED)
+
+    def compared(
+        self, chain: Sequence[Trial], steps: Sequence[Step]
+    ) -> tuple[Trial, tuple[Trial, ...], tuple[tuple[Trial, ...], ...]]:
+        """The best model, each of its causes left out, and others in the place of each.
+
+        A cause that was found first may fit worse than another once a further one has joined; then they are swapped.
+        """
+        best = chain[-1]
+        known = [one for one in chain[-2:-1] if one.causes == best.causes[:-1]]
+        lesser = (*self._lesser(best, best.causes[: len(best.causes) - len(known)]), *known)
+        divisor = steps[-1].left.overdispersion
+        sure = partial(_sure, divisor=divisor)
+        for _ in range(MOST_SWAPS):
+            best, lesser = self._pruned(best, lesser, divisor)
+            rivals = self._rivals(best, lesser, steps)
+            better = max((one for some in rivals for one in some), key=sure, default=best)
+            if sure(better) <= sure(best):
+                break
+            best = better
+            lesser = self._lesser(best, best.causes)
+            rivals = self._rivals(best, lesser, steps)
+        return best, lesser, rivals
+
+    def established(self, best: Trial) -> tuple[Trial, tuple[Trial, ...]]:
+        """A model without those of its causes that bring too little, and the same without each of the others."""
+        return self._pruned(best, self._lesser(best, best.causes), self.refits.left(best).overdispersion)
+
+    def _pruned(
+        self, best: Trial, lesser: tuple[Trial, ...], divisor: Float[np.ndarray, "video"]
+    ) -> tuple[Trial, tuple[Trial, ...]]:
+        while lesser and self.doubted(best, weakest := max(lesser, key=partial(_sure, divisor=divisor)), divisor):
+            best, lesser = weakest, self._lesser(weakest, weakest.causes)
+        return best, lesser
+
+    def unpatched(self, best: Trial) -> Trial:
+        """A model without those of its causes that patch several videos and explain few of them."""
+        patching = next((cause for cause in best.causes if best.patches(cause)), None)
+        return best if patching is None else self.unpatched(self._left_out(best, patching))
+
+    def _lesser(self, best: Trial, causes: Sequence[Effect]) -> tuple[Trial, ...]:
+        """A model without each of some causes."""
+        return tuple(self._left_out(best, cause) for cause in causes)
+
+    def _left_out(self, best: Trial, cause: Effect) -> Trial:
+        """A model without one of its causes, searched the longer the less the cause seems to bring."""
+        found = best.without(cause)
+        if gain(best, found)[0] < PLAIN * self.needed:
+            found = found.mended(doubtful(found.fit.fits), seed=self.seed)
+        return found.continued() if gain(best, found)[0] < PLAIN * self.needed else found
+
+    def _rivals(self, best: Trial, lesser: Sequence[Trial], steps: Sequence[Step]) -> tuple[tuple[Trial, ...], ...]:
+        """For each cause of a model: models in which another one takes its place.
+
+        A rival was tried when that cause was, and came close to it. Of a single cause all that was tried on the model
+        that was given are rivals.
+        """
+        found = []
+        for cause, without in zip(best.causes, lesser, strict=True):
+            step = next(one for one in steps if any(trial.causes[-1].name == cause.name for trial in one.tried))
+            others = [one for one in step.tried if one.causes[-1].name not in best.names]
+            if len(best.causes) > 1 or step is not steps[0]:
+                most = max(float(one.log_density.sum()) for one in step.tried)
+                least = HOPEFUL * (most - float(without.log_density.sum()))
+                close = {one.causes[-1].name for one in others if gain(one, without)[0] > least}
+                again = [one for one in step.left.scores if one.effect.name in close][:MOST_RIVALS]
+                others = self.refits.made_of(without, again)
+                if len(best.causes) == 1:
+                    made = {*best.names, *(one.causes[-1].name for one in others)}
+                    others += [one for one in steps[0].tried if one.causes[-1].name not in made]
+            found.append(tuple(one for one in others if not one.patches(one.causes[-1])))
+        return tuple(found)
+
+
+def _sure(trial: Trial, divisor: Float[np.ndarray, "video"]) -> float:
+    """How probable (nats) a model is, where gains of videos are divided."""
+    return float((trial.log_density / divisor).sum()) + trial.log_prior

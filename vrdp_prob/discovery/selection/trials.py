@@ -1,0 +1,337 @@
+"""A model that is tried on all videos: its fit, and how well it predicts each video from the others."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+import numpy as np
+from jaxtyping import Float
+
+from vrdp_prob.discovery.candidates.kicked_at_contact import kicked_at_contact
+from vrdp_prob.discovery.candidates.scores import CauseScore, happens_once
+from vrdp_prob.discovery.candidates.single_videos import LOST
+from vrdp_prob.discovery.finding import HeldOut
+from vrdp_prob.discovery.residuals.held_out import Cavity, cavities
+from vrdp_prob.discovery.residuals.jitter import alike_in_neighbours
+from vrdp_prob.discovery.residuals.unexplained import Unexplained, unexplained
+from vrdp_prob.discovery.selection.forecast import held_out
+from vrdp_prob.inference.several_videos.ascent import ImpossibleStartError
+from vrdp_prob.inference.several_videos.fitting import Owned, SharedFit
+from vrdp_prob.inference.several_videos.population import own_parameters, with_learned_population
+from vrdp_prob.inference.several_videos.second_look import MOST
+from vrdp_prob.models.effects.effect import Effect
+from vrdp_prob.models.parameters import Parameter, Scope
+from vrdp_prob.models.physics import PhysicsModel
+
+EACH_PARAMETER = 1.0
+"""Nats by which a cause is believed less for each of its parameters.
+
+A cause that holds another one as its limit (a bowl whose middle is far away is a slope) predicts as well as that one.
+"""
+FIRST_ROUNDS = 5
+"""Common steps with which it is seen whether a cause can win."""
+OTHER_SPREAD = 1.25
+"""Factor by which bodies must differ more or less under a model than was believed, for the belief to be changed..."""
+OTHER_MIDDLE = 0.25
+"""...or by which share of it their middle must be elsewhere..."""
+SPREAD_ROUNDS = 3
+"""...and how often, since what bodies differ by hangs on what is believed of it."""
+PATCHED = 0.5
+"""Share of the videos with a cause that happens once from which on, if they stray still or it comes with a contact, it
+explains none of them."""
+MOVED = 1e-3
+"""Probability that lateness of neighbouring frames is so much alike by chance, below which it is none."""
+FELL = 5.0
+"""Nats by which a video may be less probable with one more cause; beyond that it has lost its course of events."""
+
+
+@dataclass(frozen=True, eq=False)
+class Trial:
+    """A base model with some causes, fitted to all videos.
+
+    Parameters
+    ----------
+    causes
+        What it has beyond the base model, in the order in which it was found.
+    fit
+        Its fit.
+    choices
+        By the name of a cause: logarithm of the number of places among which its own were chosen, for each video.
+    stated
+        What the base model believed of parameters, by name, before anything was learned.
+    """
+
+    causes: tuple[Effect, ...]
+    fit: SharedFit
+    choices: Mapping[str, Float[np.ndarray, "video"]] = field(default_factory=dict)
+    stated: Mapping[str, Parameter] = field(default_factory=dict)
+
+    @cached_property
+    def cavities(self) -> dict[str, Cavity]:
+        """What all videos but one say, and how probable that one is then."""
+        return cavities(self.fit)
+
+    @cached_property
+    def held_out(self) -> HeldOut:
+        """How far off its predictions are, each video's from the others and its own first part."""
+        joint = self.fit.joint
+        points = [joint.point(index) for index in range(len(joint.videos))]
+        return held_out(joint.videos, points, list(self.cavities.values()))
+
+    @cached_property
+    def unexplained(self) -> Unexplained:
+        """What it leaves to chance."""
+        return unexplained(self.fit)
+
+    @property
+    def log_density(self) -> Float[np.ndarray, "video"]:
+        """Log predictive density (nats, up to constants of the tracks) of each video given the others.
+
+        What it leaves unexplained is chance as it is most probable. An effect that happens once may have happened to
+        any body of any video, and between any two frames where that is all that is known of its time, which counts
+        against it.
+        """
+        return self.fitted_density + self.unexplained.gains
+
+    @property
+    def fitted_density(self) -> Float[np.ndarray, "video"]:
+        """The same where all that it leaves unexplained is noise."""
+        density = np.array([one.log_density for one in self.cavities.values()])
+        return density - sum(self.choices.values(), np.zeros(len(density)))
+
+    def brought(self, base: "Trial") -> float:
+        """Gain (nats) over a model with less where all that both leave unexplained is noise.
+
+        A fit is judged by this: what it has lost, chance would cover.
+        """
+        return float((self.fitted_density - base.fitted_density).sum())
+
+    @property
+    def log_prior(self) -> float:
+        """Log prior (nats, up to a constant) of its causes among others: those with fewer parameters come first."""
+        return -EACH_PARAMETER * sum(len(cause.parameters) for cause in self.causes)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the causes."""
+        return tuple(cause.name for cause in self.causes)
+
+    def with_cause(self, score: CauseScore) -> "Trial | None":
+        """The fit with one more cause, from what its score says of it; None where no world can begin there."""
+        try:
+            return self._with_single_events(score) if happens_once(score.effect) else self._with_lasting(score)
+        except ImpossibleStartError:
+            return None
+
+    def fallen_from(self, base: "Trial") -> list[int]:
+        """Videos that are less probable than under a model with less, the worst first: they have lost their course."""
+        fallen = self._fallen_from(base)
+        return fallen[: max(len(self.fit.fits) // MOST, 1)]
+
+    def loses_videos_of(self, other: "Trial") -> bool:
+        """Whether a video is less probable than in another fit and explained no more."""
+        return any(self.fit.fits[index].misfit.ratio > LOST for index in self._fallen_from(other))
+
+    def _fallen_from(self, base: "Trial") -> list[int]:
+        gained = self.fitted_density - base.fitted_density
+        return [int(k) for k in np.argsort(gained) if gained[k] < -FELL]
+
+    def with_cause_in_place(self, score: CauseScore, least: float) -> "Trial | None":
+        """The fit with a cause in the place of the last one, from where that has brought the videos.
+
+        None where no world can begin there, or the log posterior does not come near to `least` at once.
+        """
+        last = self.causes[-1]
+        left = self.fit.model.without_effect(last).with_effect(score.effect, self.fit.tracks)
+        choices = {name: one for name, one in self.choices.items() if name != last.name}
+        try:
+            fit = self.fit.under(
+                left,
+                start=score.start,
+                held=self._held_without(last),
+                least=least,
+                rounds=FIRST_ROUNDS,
+                model_error=False,
+            )
+        except ImpossibleStartError:
+            return None
+        return replace(self, causes=(*self.causes[:-1], score.effect), fit=fit, choices=choices)
+
+    def _with_lasting(self, score: CauseScore) -> "Trial":
+        """The fit with an effect that acts on all videos."""
+        effect = score.effect
+        own_fields = [one.name for one in effect.parameters if one.scope is Scope.BODY]
+        bodies = [range(len(part.likelihood.tracks.bodies)) for part in self.fit.fits]
+        starts: list[dict[Owned, float]] = [
+            {(name, body): score.start[name] for name in own_fields if name in score.start for body in these}
+            for these in bodies
+        ]
+        model = self.fit.extended(effect)
+        fit = self.fit.under(model, start=score.start, own=starts, rounds=FIRST_ROUNDS, model_error=False)
+        return self.and_cause(effect, fit)
+
+    def and_cause(self, effect: Effect, fit: SharedFit) -> "Trial":
+        """The trial of a fit with one more cause, which believes what that fit says of bodies."""
+        return replace(self, causes=(*self.causes, effect), fit=with_own_population(fit))
+
+    def _with_single_events(self, score: CauseScore) -> "Trial":
+        """The fit with an effect that happens at most once in each video, where its scan has found it."""
+        effect = score.effect
+        sites = [[site for site in score.sites if site.video == k] for k in range(len(self.fit.fits))]
+        fields = [parameter.name for parameter in effect.parameters]
+        held, own = [], []
+        for part, structure, mine in zip(self.fit.fits, self.fit.structures, sites, strict=True):
+            owners = (None, *range(len(part.likelihood.tracks.bodies)))
+            values: dict[Owned, float] = {}
+            for site in mine[:1]:
+                values |= {
+                    (name, owner): effect.vanishes_at.get(name, value)
+                    for name, value in site.values.items()
+                    for owner in (site.owner, None)
+                }
+            absent = {(name, owner): None for name in fields for owner in owners if (name, owner) not in values}
+            steps = {key: value for key, value in values.items() if key[0] in effect.stepwise}
+            held.append({**structure.held, **absent, **steps})
+            own.append(values)
+        acting = np.array([min(len(mine), 1) for mine in sites])
+        times = [len(effect.search_points([one])) if effect.stepwise else 1 for one in self.fit.tracks]
+        choices = {**self.choices, effect.name: np.log(max(score.places, 1) * np.array(times)) * acting}
+        model = self.fit.extended(effect)
+        fit = self.fit.under(model, own=own, held=held, rounds=FIRST_ROUNDS, model_error=False)
+        return replace(self, causes=(*self.causes, effect), fit=fit, choices=choices)
+
+    def continued(self) -> "Trial":
+        """The fit after as many steps as it needs."""
+        if self.fit.joint.converged:
+            return self
+        return replace(self, fit=self.fit.under(self.fit.model, model_error=False))
+
+    def acting(self, cause: Effect) -> list[int]:
+        """Videos on which a cause acts that happens once."""
+        return [int(video) for video in np.flatnonzero(self.choices[cause.name])]
+
+    def patches(self, cause: Effect) -> bool:
+        """Whether a cause mends the fit of videos and explains none of them.
+
+        One kick explains a video or it does not. Where nearly every video needs one and strays with it as well, kicks
+        stand for something that acts all the time; where they come with contacts, for errors of these. Frames that are
+        late as their neighbours are stand for motion along the paths.
+        """
+        if cause.overrides("frame_jitter"):
+            return alike_in_neighbours(self.fit) < MOVED
+        if not happens_once(cause):
+            return False
+        acting = self.acting(cause)
+        at_contacts = sum(self._comes_with_contact(cause, video) for video in acting)
+        if acting and at_contacts >= PATCHED * len(acting):
+            return True
+        stray = [any(one.size for one in self.unexplained.straying[video]) for video in acting]
+        return len(acting) > 1 and sum(stray) > PATCHED * len(stray)
+
+    def _comes_with_contact(self, cause: Effect, video: int) -> bool:
+        """Whether a body meets something when a cause kicks it."""
+        part = self.fit.fits[video]
+        own = {one.name for one in cause.parameters if one.scope is Scope.BODY}
+        entries = part.likelihood.coordinates.entries
+        kicked = [entry.owner for entry in entries if entry.field in own and entry.owner is not None]
+        return kicked_at_contact(part.rollout.events, part.likelihood.tracks.times, kicked)
+
+    def mended(self, lost: Sequence[int], *, seed: int, thorough: bool = False) -> "Trial":
+        """The fit with some videos searched anew; itself where that finds nothing better."""
+        fit = self.fit.mended(lost, seed=seed, thorough=thorough)
+        return self if fit is self.fit else replace(self, fit=fit)
+
+    def with_other_courses(self, *, seed: int) -> "Trial":
+        """The fit with all videos searched anew; itself where that finds nothing much better."""
+        fit = self.fit.with_other_courses(seed=seed)
+        return self if fit is self.fit else replace(self, fit=fit)
+
+    def without(self, cause: Effect) -> "Trial":
+        """The fit without one of its causes."""
+        left = self._with_stated_population(self.fit.model.without_effect(cause))
+        choices = {name: one for name, one in self.choices.items() if name != cause.name}
+        fit = self.fit.under(left, held=self._held_without(cause), rounds=FIRST_ROUNDS, model_error=False)
+        causes = tuple(one for one in self.causes if one.name != cause.name)
+        return replace(self, causes=causes, fit=with_own_population(fit), choices=choices)
+
+    def _held_without(self, cause: Effect) -> list[dict[Owned, float | None]]:
+        """Numbers of each video that are held, but those of a cause."""
+        gone = {parameter.name for parameter in cause.parameters}
+        return [{key: one.held[key] for key in one.held if key[0] not in gone} for one in self.fit.structures]
+
+    def _with_stated_population(self, model: PhysicsModel) -> PhysicsModel:
+        """A model in which bodies may be what they may before anything is learned.
+
+        What a cause has explained, they have to explain by themselves without it, and would lose their way to it.
+        """
+        own = {one.name for one in own_parameters(model)}
+        learned = {name: one for name, one in model.beliefs.items() if name not in own}
+        return replace(model, beliefs=learned | {name: one for name, one in self.stated.items() if name in own})
+
+
+def with_own_population(fit: SharedFit) -> SharedFit:
+    """A fit that believes bodies to be in their own parameters as they are under its very model.
+
+    What a model lacks shows as differences between them, and a cause that explains these away is worth that they are
+    less. And no cause is worth that it shifts all restitutions to where they are believed to be.
+    """
+    for _ in range(SPREAD_ROUNDS):
+        model = with_learned_population(fit)
+        if not _believes_otherwise(model, fit.model):
+            break
+        fit = fit.under(model, rounds=FIRST_ROUNDS, model_error=False)
+    return fit
+
+
+def _believes_otherwise(model: PhysicsModel, before: PhysicsModel) -> bool:
+    """Whether a model believes something else of what bodies have of their own."""
+    pairs = [(model.believed(one).prior, before.believed(one).prior) for one in own_parameters(model)]
+    return any(
+        abs(np.log(now.sd / then.sd)) > np.log(OTHER_SPREAD) or abs(now.mean - then.mean) > OTHER_MIDDLE * now.sd
+        for now, then in pairs
+    )
+
+
+def gains(
+    trial: Trial, base: Trial, overdispersion: Float[np.ndarray, "video"] | None = None
+) -> Float[np.ndarray, "video"]:
+    """Gain (nats) in the predictive density of each video, divided by its overdispersion."""
+    difference = trial.log_density - base.log_density
+    return difference if overdispersion is None else difference / overdispersion
+
+
+def gain(trial: Trial, base: Trial, overdispersion: Float[np.ndarray, "video"] | None = None) -> tuple[float, float]:
+    """Gain (nats) in the predictive density of all videos, and its standard error over videos.
+
+    Parameters
+    ----------
+    trial, base
+        The models.
+    overdispersion
+        Of each video; 1 where None.
+    """
+    difference = gains(trial, base, overdispersion)
+    return float(difference.sum()), float(np.sqrt(len(difference)) * difference.std(ddof=1))
+
+
+def weights(
+    trials: Sequence[Trial],
+    log_prior: Sequence[float],
+    generator: np.random.Generator,
+    *,
+    overdispersion: Float[np.ndarray, "video"] | None = None,
+    replications: int = 1000,
+) -> Float[np.ndarray, "trial"]:
+    """Probabilities of models by their predictive densities, with the videos drawn anew.
+
+    Source: Yao, Vehtari, Simpson and Gelman, Using stacking to average Bayesian predictive distributions, Bayesian
+    Analysis 13 (2018), pseudo-BMA+.
+    """
+    densities = np.array([trial.log_density for trial in trials])
+    if overdispersion is not None:
+        densities = densities / overdispersion
+    shares = generator.dirichlet(np.ones(densities.shape[1]), size=replications) * densities.shape[1]
+    totals = shares @ densities.T + np.asarray(log_prior)
+    totals -= totals.max(axis=1, keepdims=True)
+    found: np.ndarray = (np.exp(totals) / np.exp(totals).sum(axis=1, keepdims=True)).mean(axis=0)
+    return found

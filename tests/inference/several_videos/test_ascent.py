@@ -50,18 +50,24 @@ def expand(video: LinkedVideo, shared: np.ndarray, local: np.ndarray, *, central
     return Expansion(gradient[:1], gradient[1:], derivative[:, :1], derivative[:, 1:])
 
 
-def climbed(monkeypatch: pytest.MonkeyPatch) -> ascent.JointFit:
-    monkeypatch.setattr(ascent, "expand", expand)
+def grazing() -> tuple[SharedNumbers, Grazing]:
     entries = (Coordinate("shared", None, Transform.IDENTITY, BELIEVED),)
     own = tuple(Coordinate(name, 0, Transform.IDENTITY, Prior(0.0, 1.0)) for name in ("first", "second"))
     likelihood = Likelihood(sliding(0), PhysicsModel.base(), Coordinates(entries + own, {}))
     place = np.zeros(1, dtype=np.int64)
-    video = Grazing(likelihood, place, place, np.zeros(1))
-    numbers = SharedNumbers((("shared", ()),), entries, None)
+    return SharedNumbers((("shared", ()),), entries, None), Grazing(likelihood, place, place, np.zeros(1))
+
+
+def climbed(monkeypatch: pytest.MonkeyPatch) -> ascent.JointFit:
+    monkeypatch.setattr(ascent, "expand", expand)
+    numbers, video = grazing()
     return ascent.climb(numbers, [video], np.zeros(1), [np.array([-0.52, -0.48])])
 
 
-def test_a_ridge_is_followed_along_an_edge(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("both_sides", [True, False])
+def test_a_ridge_is_followed_along_an_edge(monkeypatch: pytest.MonkeyPatch, *, both_sides: bool) -> None:
+    if not both_sides:
+        monkeypatch.setattr(ascent, "_best_of_cloud", lambda video, shared, centre, root, known: known)
     found = climbed(monkeypatch)
     assert found.gaussian.mean[0] == pytest.approx(BEST, abs=0.2)
     most = -((BEST - 2) ** 2) / (2 * 0.3**2) - (BEST + 1) ** 2 / 4
@@ -69,9 +75,12 @@ def test_a_ridge_is_followed_along_an_edge(monkeypatch: pytest.MonkeyPatch) -> N
     assert not found.converged  # at an edge the density is no Gaussian
 
 
-def test_without_looking_on_both_sides_the_climb_ends_there(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(ascent, "_best_of_cloud", lambda video, shared, centre, root, known: known)
-    assert climbed(monkeypatch).gaussian.mean[0] < 0.5
+def test_a_cloud_finds_the_other_side_of_an_edge() -> None:
+    _, video = grazing()
+    shared, beyond = np.array([1.0]), np.array([-0.9, 0.05])  # they would have to meet, and just do not
+    found = ascent._best_of_cloud(video, shared, beyond, np.eye(2), beyond)
+    assert video.value(shared, beyond) < -1000
+    assert video.value(shared, found) > -3
 
 
 def test_the_same_cloud_is_drawn_each_time(monkeypatch: pytest.MonkeyPatch) -> None:

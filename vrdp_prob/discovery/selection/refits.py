@@ -110,7 +110,7 @@ class Refits:
         close = _shortlist(scores, CLOSE)
         found = self.made_of(trial, close)
         if not self.settled(trial, found):
-            found += self.made_of(trial, [one for one in likely if one not in close])
+            found += self.made_of(trial, [one for one in likely if one not in close], beside=found)
             found.sort(key=merit, reverse=True)
         kicks = next((one for one in scores if _kicks(one) and one.sites), None)
         if kicks is not None and (not found or found[0].causes[-1].name == kicks.effect.name):
@@ -219,18 +219,18 @@ class Refits:
         starts = hidden_things(kicked.fit, left, kicks.p_value)
         return self._all(partial(kicked.with_cause_in_place, least=trial.fit.joint.log_density), starts)
 
-    def made_of(self, trial: Trial, scores: Sequence[CauseScore]) -> list[Trial]:
-        """Fits with one cause more, the best first.
+    def made_of(self, trial: Trial, scores: Sequence[CauseScore], *, beside: Sequence[Trial] = ()) -> list[Trial]:
+        """Fits with one cause more, the best first; what others were made before stand `beside`.
 
         Where the score of a cause promises more than any refit has brought, and its own brought far less, that goes on
         if it broke off on a long way; and where videos have lost their course of events on it, they are searched anew.
-        So it is with the cause whose score promises most, whatever others have brought.
+        So it is with the cause whose score promises most of all, whatever others have brought.
         """
         found = self._all(trial.with_cause, scores)
         promised = {one.effect.name: one.size / 2 for one in scores if not happens_once(one.effect)}
-        leader = max(promised, key=lambda name: promised[name], default="")
+        leader = "" if beside else max(promised, key=lambda name: promised[name], default="")
         for _ in range(MENDINGS):
-            most = max((one.brought(trial) for one in found), default=0.0)
+            most = max((one.brought(trial) for one in (*beside, *found)), default=0.0)
             short = [
                 one
                 for one in found
@@ -248,7 +248,7 @@ class Refits:
                 promised.pop(hopeful.causes[-1].name)
             else:
                 found = [further if one is hopeful else one for one in found]
-        most = max((one.brought(trial) for one in found), default=0.0)
+        most = max((one.brought(trial) for one in (*beside, *found)), default=0.0)
         close = [one for one in found if one.brought(trial) > SHORT * most > 0]
         rest = [one for one in found if one not in close]
         return sorted([*in_processes(Trial.continued, close), *rest], key=merit, reverse=True)

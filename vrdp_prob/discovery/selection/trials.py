@@ -15,7 +15,7 @@ from vrdp_prob.discovery.residuals.held_out import Cavity, cavities
 from vrdp_prob.discovery.residuals.jitter import alike_in_neighbours
 from vrdp_prob.discovery.residuals.unexplained import Unexplained, unexplained
 from vrdp_prob.discovery.selection.forecast import held_out
-from vrdp_prob.inference.several_videos.ascent import ImpossibleStartError
+from vrdp_prob.inference.several_videos.ascent import Effort, ImpossibleStartError
 from vrdp_prob.inference.several_videos.fitting import Owned, SharedFit
 from vrdp_prob.inference.several_videos.population import own_parameters, with_learned_population
 from vrdp_prob.inference.several_videos.second_look import MOST
@@ -28,8 +28,8 @@ EACH_PARAMETER = 1.0
 
 A cause that holds another one as its limit (a bowl whose middle is far away is a slope) predicts as well as that one.
 """
-FIRST_ROUNDS = 5
-"""Common steps with which it is seen whether a cause can win."""
+FIRST = Effort(rounds=5, enough=2.0)
+"""With what effort it is seen whether a cause can win."""
 OTHER_SPREAD = 1.25
 """Factor by which bodies must differ more or less under a model than was believed, for the belief to be changed..."""
 OTHER_MIDDLE = 0.25
@@ -150,7 +150,7 @@ class Trial:
                 start=score.start,
                 held=self._held_without(last),
                 least=least,
-                rounds=FIRST_ROUNDS,
+                effort=FIRST,
                 model_error=False,
             )
         except ImpossibleStartError:
@@ -167,7 +167,7 @@ class Trial:
             for these in bodies
         ]
         model = self.fit.extended(effect)
-        fit = self.fit.under(model, start=score.start, own=starts, rounds=FIRST_ROUNDS, model_error=False)
+        fit = self.fit.under(model, start=score.start, own=starts, effort=FIRST, model_error=False)
         return self.and_cause(effect, fit)
 
     def and_cause(self, effect: Effect, fit: SharedFit) -> "Trial":
@@ -197,7 +197,7 @@ class Trial:
         times = [len(effect.search_points([one])) if effect.stepwise else 1 for one in self.fit.tracks]
         choices = {**self.choices, effect.name: np.log(max(score.places, 1) * np.array(times)) * acting}
         model = self.fit.extended(effect)
-        fit = self.fit.under(model, own=own, held=held, rounds=FIRST_ROUNDS, model_error=False)
+        fit = self.fit.under(model, own=own, held=held, effort=FIRST, model_error=False)
         return replace(self, causes=(*self.causes, effect), fit=fit, choices=choices)
 
     def continued(self) -> "Trial":
@@ -250,7 +250,7 @@ class Trial:
         """The fit without one of its causes."""
         left = self._with_stated_population(self.fit.model.without_effect(cause))
         choices = {name: one for name, one in self.choices.items() if name != cause.name}
-        fit = self.fit.under(left, held=self._held_without(cause), rounds=FIRST_ROUNDS, model_error=False)
+        fit = self.fit.under(left, held=self._held_without(cause), effort=FIRST, model_error=False)
         causes = tuple(one for one in self.causes if one.name != cause.name)
         return replace(self, causes=causes, fit=with_own_population(fit), choices=choices)
 
@@ -279,7 +279,7 @@ def with_own_population(fit: SharedFit) -> SharedFit:
         model = with_learned_population(fit)
         if not _believes_otherwise(model, fit.model):
             break
-        fit = fit.under(model, rounds=FIRST_ROUNDS, model_error=False)
+        fit = fit.under(model, effort=FIRST, model_error=False)
     return fit
 
 

@@ -27,12 +27,14 @@ OWN_SHARES = np.array([1.0, 0.3, 0.1])
 """Shares of its own Newton step among which each video chooses beforehand."""
 STEPS = 30
 """Steps in which a video follows a common step; where they are not enough, that was too long."""
-ROUNDS = 15
 TOLERANCE = 0.2
-"""Gain (nats) of a step, expected or real, below which the search ends..."""
+"""Gain (nats) of a step, expected or real, below which a search ends..."""
 EXPECTED = 1.0
 """...and has converged, if no more than so much was expected; where a common step brought nothing, none is tried until
 the videos by themselves have gained as much."""
+HOPELESS = 2.0
+"""How many times what a common step is expected to bring one video may lose by it; if more, others are not looked
+at."""
 STEEP = 5.0
 """Gain (nats) that its own step promises a video which has just looked for its best own numbers, from which on it is
 taken to be at an edge: where two orders of events meet, or a contact just happens."""
@@ -42,6 +44,26 @@ CLOUD, SPREADS = 64, (0.1, 0.3)
 """Own numbers that are tried on either side of an edge, for each of these shares of their standard deviations..."""
 FINISHED = 3
 """...and how many of them, the best ones, go on from there."""
+
+
+@dataclass(frozen=True)
+class Effort:
+    """How long a search goes on.
+
+    Parameters
+    ----------
+    rounds
+        Common steps, at most.
+    enough
+        Gain (nats) of a step below which no further one is made.
+    """
+
+    rounds: int = 15
+    enough: float = TOLERANCE
+
+
+WHOLE = Effort()
+"""To the top."""
 
 
 class ImpossibleStartError(Exception):
@@ -116,7 +138,7 @@ def climb(
     *,
     towards: Float[np.ndarray, "shared"] | None = None,
     least: float | None = None,
-    rounds: int = ROUNDS,
+    effort: Effort = WHOLE,
 ) -> JointFit:
     """Climb the joint log posterior.
 
@@ -130,8 +152,8 @@ def climb(
         Shared numbers to which the first step goes, as far as it goes up.
     least
         Log posterior that the videos must reach by their own numbers alone, for the climb to be worth its while.
-    rounds
-        Common steps, at most.
+    effort
+        How long the climb goes on.
 
     Raises
     ------
@@ -150,7 +172,7 @@ def climb(
         state = _improved(numbers, _Ridges(videos), settled, towards - shared)
         slopes = _expanded(numbers, videos, state)
     refused = -np.inf
-    for _ in range(rounds):
+    for _ in range(effort.rounds):
         inside = _inside(slopes)
         smooth = _of(slopes, inside) if inside.any() else slopes
         expected = smooth.expected_gain
@@ -160,17 +182,18 @@ def climb(
         trial, ridges = _settled(videos, state, slopes.videos), _Ridges(videos)
         if _gained(trial, state, ~inside) < EXPECTED and trial.total(numbers) > refused + EXPECTED:
             own = trial
-            trial = _improved(numbers, ridges, own, smooth.shared_step)
+            trial = _improved(numbers, ridges, own, smooth.shared_step, expected)
             if trial is own:
                 refused = own.total(numbers)
         if trial.total(numbers) - state.total(numbers) < TOLERANCE:
             own = _across_edges(videos, trial, slopes.videos)
-            trial, refused = _improved(numbers, ridges, own, smooth.shared_step, around=slopes.videos), -np.inf
+            trial = _improved(numbers, ridges, own, smooth.shared_step, expected, around=slopes.videos)
+            refused = -np.inf
         gain = trial.total(numbers) - state.total(numbers)
         if gain > 0:
             state = trial
             slopes = _expanded(numbers, videos, state)
-        if gain < TOLERANCE:
+        if gain < effort.enough:
             converged = expected < EXPECTED
             break
     gaussian = slopes.gaussian(state.shared, state.locals, numbers.logarithms)
@@ -207,16 +230,26 @@ def _improved(
     ridges: _Ridges,
     state: _State,
     step: Float[np.ndarray, "shared"],
+    expected: float = np.inf,
     *,
     around: Sequence[Expansion] | None = None,
 ) -> _State:
-    """The first share of a common step that brings something; where none does, the state itself."""
-    before = state.total(numbers)
+    """The first share of a common step that brings something; where none does, the state itself.
+
+    What one video loses with a share by far more than is `expected` of the step is looked at first with the next one.
+    """
+    before, most = state.total(numbers), HOPELESS * expected
+    hindering: list[int] = []
     for share in SHARES:
         target = state.shared + share * step
-        trial = _with_best_noise(numbers, ridges.videos, _followed(ridges, state, target, around))
+        followed = _followed(ridges, state, target, around, first=hindering, most=most)
+        if followed is None:
+            continue
+        trial = _with_best_noise(numbers, ridges.videos, followed)
         if trial.total(numbers) > before:
             return trial
+        lost = np.array(state.values) - np.array(followed.values)
+        hindering = np.flatnonzero(lost > most).tolist()
     return state
 
 
@@ -225,8 +258,11 @@ def _followed(
     state: _State,
     target: Float[np.ndarray, "shared"],
     around: Sequence[Expansion] | None,
-) -> _State:
-    """The state at other shared numbers, every video on its ridge.
+    *,
+    first: Sequence[int],
+    most: float,
+) -> _State | None:
+    """The state at other shared numbers, every video on its ridge; None where those that come first lose too much.
 
     A video whose best own numbers are at an edge, where a contact just happens, leaves its ridge with the first step;
     where the expansions `around` the state are given, the ridge is looked for on both sides of where they say it is.
@@ -240,7 +276,12 @@ def _followed(
         expected = own + around[index].slope @ (target - state.shared)
         return _best_of_cloud(video, target, expected, around[index].local_root, found)
 
-    return _State.at(ridges.videos, target, in_parallel(found, range(len(ridges.videos))))
+    locals_ = dict(zip(first, in_parallel(found, first), strict=True))
+    if any(state.values[index] - ridges.videos[index].value(target, own) > most for index, own in locals_.items()):
+        return None
+    rest = [index for index in range(len(ridges.videos)) if index not in locals_]
+    locals_ |= zip(rest, in_parallel(found, rest), strict=True)
+    return _State.at(ridges.videos, target, [locals_[index] for index in range(len(ridges.videos))])
 
 
 def _across_edges(videos: Sequence[LinkedVideo], state: _State, expansions: Sequence[Expansion]) -> _State:

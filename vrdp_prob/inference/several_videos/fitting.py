@@ -17,7 +17,7 @@ from vrdp_prob.inference.model_error_fit import TURNS, next_model_error
 from vrdp_prob.inference.parallel import in_processes
 from vrdp_prob.inference.plan import IN_DOUBT, FitPlan
 from vrdp_prob.inference.several_videos.agreement import following_ones
-from vrdp_prob.inference.several_videos.ascent import ROUNDS, ImpossibleStartError, NoCommonWorldError, climb
+from vrdp_prob.inference.several_videos.ascent import WHOLE, Effort, ImpossibleStartError, NoCommonWorldError, climb
 from vrdp_prob.inference.several_videos.joining import joined
 from vrdp_prob.inference.several_videos.joint_fit import JointFit, with_alternatives
 from vrdp_prob.inference.several_videos.linking import check_names, link
@@ -101,7 +101,7 @@ class SharedFit:
         own: Sequence[Mapping[Owned, float]] | None = None,
         held: Sequence[Mapping[Owned, float | None]] | None = None,
         least: float | None = None,
-        rounds: int = ROUNDS,
+        effort: Effort = WHOLE,
         model_error: bool = True,
     ) -> "SharedFit":
         """The fit of another model, from the values of this one; much faster than a new one.
@@ -120,8 +120,8 @@ class SharedFit:
             for its default); those that do now where None.
         least
             Log posterior that must be reached at the start, where the videos' own numbers alone have followed.
-        rounds
-            Common steps of all videos, at most.
+        effort
+            How long the common climb of all videos goes on.
         model_error
             Whether what the model leaves unexplained is looked for.
 
@@ -146,7 +146,7 @@ class SharedFit:
                 entry = entries[place]
                 if (entry.field, entry.owner) in values:
                     mine[number] = entry.transform.to_coordinate(values[entry.field, entry.owner])
-        found = climb(numbers, videos, shared, locals_, towards=towards, least=least, rounds=rounds)
+        found = climb(numbers, videos, shared, locals_, towards=towards, least=least, effort=effort)
         return _finished(found, model, self.fits, structures, self.shared, model_error=model_error)
 
     def mended(self, lost: Sequence[int], *, seed: int, thorough: bool = False) -> "SharedFit":

@@ -8,6 +8,7 @@ of nonlinear least squares, Physical Review E 83 (2011), 036701; Allgower and Ge
 (1990).
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -23,6 +24,8 @@ STRIDES = (1.0, 0.6, 0.3, 0.15, 0.07, 0.03, 0.015, 0.006, 0.002)
 """Shares of the way that one batch of worlds tries."""
 MOST_STEPS = 100
 """Steps after which a video stays where it is."""
+PATIENCE, LEAST = 6, 0.1
+"""A video stays where it is, too, if so many strides in a row take less than this share of the way that was left."""
 ENOUGH = 0.03
 """Gain (nats) of the last step, after which no further one is made."""
 SLACK = 20.0
@@ -75,6 +78,7 @@ def follow(
     """
     places = np.setdiff1d(video.local_places, np.flatnonzero(video.likelihood.coordinates.mask(NOISE_FIELDS)))
     point, end = video.points(shared, local), video.points(target, local)
+    strides: list[float] = []
     for _ in range(steps):
         missing = end - point
         missing[video.local_places] = 0.0
@@ -88,11 +92,18 @@ def follow(
             point = found
         if arrived and not cost - reached > ENOUGH:
             return Followed(video.split(point)[1], min(cost, reached), arrived=True)
-        if not arrived and not stride and not cost - reached > ENOUGH:
+        strides += [stride] if stride else []
+        if not arrived and (_stuck(strides) or (not stride and not cost - reached > ENOUGH)):
             break
     end[video.local_places] = point[video.local_places]
     moved = robust_cost(video.data.residuals(end[None]), None)
     return Followed(video.split(end)[1], float(moved[0]), arrived=False)
+
+
+def _stuck(strides: Sequence[float]) -> bool:
+    """Whether the last strides on a way took hardly anything of what was left of it."""
+    last = np.array(strides[-PATIENCE:])
+    return len(last) == PATIENCE and 1 - float(np.prod(1 - last)) < LEAST
 
 
 @dataclass(frozen=True)
@@ -148,28 +159,33 @@ class _Tangent:
         """Longest stride along a way, with the own numbers following, that does not cost more than it promises.
 
         Gives the stride, where it ends, and the cost there; where no stride will do, the best of the steps that the own
-        numbers take alone.
+        numbers take alone. What the own numbers have to mend may be an edge away from where they are, so that the way
+        is also gone without mending anything.
         """
-        mend = self._taken_up(self.residuals)
-        way = missing + self._taken_up(self.derivative @ missing) + mend
+        along, mend = missing + self._taken_up(self.derivative @ missing), self._taken_up(self.residuals)
+        way = along + mend
         strides = np.array(STRIDES)[:, None]
-        bent = self._bend(way)
-        trials = [self.point + strides * way, self.point + strides * way + strides**2 * bent / 2]
+        trials = [self.point + strides * way, self.point + strides * way + strides**2 * self._bend(way) / 2]
         if missing.any():
-            trials += [self.point + strides * mend]
+            trials += [self.point + strides * along, self.point + strides * mend]
         costs = robust_cost(self.video.data.residuals(np.concatenate(trials)), None).reshape(len(trials), -1)
         if not missing.any():
             return self._lowest(np.array(trials), costs)
-        line = self.residuals[:, None] + self.derivative @ (way[:, None] * strides.T)
-        promised = (line**2).sum(axis=0) / 2
-        allowed = promised + SLACK + SHARE * np.abs(promised - self.cost)
-        better = costs[:2].argmin(axis=0)
-        reached = costs[:2].min(axis=0)
-        fine = np.flatnonzero(reached <= allowed)
+        allowed = [self._allowed(one) for one in (way, way, along)]
+        reached = np.where(costs[:3] <= allowed, costs[:3], np.inf)
+        fine = np.flatnonzero(np.isfinite(reached).any(axis=0))
         if not len(fine):
-            return self._lowest(trials[2][None], costs[2:])
+            return self._lowest(trials[3][None], costs[3:])
         first = int(fine[0])
-        return STRIDES[first], trials[better[first]][first], float(reached[first])
+        better = int(reached[:, first].argmin())
+        return STRIDES[first], trials[better][first], float(reached[better, first])
+
+    def _allowed(self, way: Float[np.ndarray, "dimension"]) -> Float[np.ndarray, "stride"]:
+        """What each stride along a way may cost."""
+        line = self.residuals[:, None] + self.derivative @ (way[:, None] * np.array(STRIDES))
+        promised = (line**2).sum(axis=0) / 2
+        allowed: np.ndarray = promised + SLACK + SHARE * np.abs(promised - self.cost)
+        return allowed
 
     @staticmethod
     def _lowest(

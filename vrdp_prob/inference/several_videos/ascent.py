@@ -33,8 +33,8 @@ EXPECTED = 1.0
 """...and has converged, if no more than so much was expected; where a common step brought nothing, none is tried until
 the videos by themselves have gained as much."""
 HOPELESS = 2.0
-"""How many times what a common step is expected to bring one video may lose by it; if more, others are not looked
-at."""
+"""How many times what a common step is expected to bring, or `STEEP`, one video may lose by it; if more, others are not
+looked at."""
 STEEP = 5.0
 """Gain (nats) that its own step promises a video which has just looked for its best own numbers, from which on it is
 taken to be at an edge: where two orders of events meet, or a contact just happens."""
@@ -238,7 +238,7 @@ def _improved(
 
     What one video loses with a share by far more than is `expected` of the step is looked at first with the next one.
     """
-    before, most = state.total(numbers), HOPELESS * expected
+    before, most = state.total(numbers), HOPELESS * max(expected, STEEP)
     hindering: list[int] = []
     for share in SHARES:
         target = state.shared + share * step

@@ -185,7 +185,7 @@ def climb(
             trial = _improved(numbers, ridges, own, smooth.shared_step, expected)
             if trial is own:
                 refused = own.total(numbers)
-        if trial.total(numbers) - state.total(numbers) < TOLERANCE:
+        if trial.total(numbers) - state.total(numbers) < effort.enough:
             own = _across_edges(videos, trial, slopes.videos)
             trial = _improved(numbers, ridges, own, smooth.shared_step, expected, around=slopes.videos)
             refused = -np.inf

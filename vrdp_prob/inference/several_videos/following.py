@@ -24,8 +24,8 @@ STRIDES = (1.0, 0.6, 0.3, 0.15, 0.07, 0.03, 0.015, 0.006, 0.002)
 """Shares of the way that one batch of worlds tries."""
 MOST_STEPS = 100
 """Steps after which a video stays where it is."""
-PATIENCE, LEAST = 6, 0.1
-"""A video stays where it is, too, if so many strides in a row take less than this share of the way that was left."""
+PATIENCE, HALF = 6, 0.5
+"""A video stays where it is, too, if the pace of so many strides would leave more than this share of the way."""
 ENOUGH = 0.03
 """Gain (nats) of the last step, after which no further one is made."""
 SLACK = 20.0
@@ -79,7 +79,7 @@ def follow(
     places = np.setdiff1d(video.local_places, np.flatnonzero(video.likelihood.coordinates.mask(NOISE_FIELDS)))
     point, end = video.points(shared, local), video.points(target, local)
     strides: list[float] = []
-    for _ in range(steps):
+    for left in reversed(range(steps)):
         missing = end - point
         missing[video.local_places] = 0.0
         arrived = not missing.any()
@@ -93,17 +93,17 @@ def follow(
         if arrived and not cost - reached > ENOUGH:
             return Followed(video.split(point)[1], min(cost, reached), arrived=True)
         strides += [stride] if stride else []
-        if not arrived and (_stuck(strides) or (not stride and not cost - reached > ENOUGH)):
+        if not arrived and (_too_slow(strides, left) or (not stride and not cost - reached > ENOUGH)):
             break
     end[video.local_places] = point[video.local_places]
     moved = robust_cost(video.data.residuals(end[None]), None)
     return Followed(video.split(end)[1], float(moved[0]), arrived=False)
 
 
-def _stuck(strides: Sequence[float]) -> bool:
-    """Whether the last strides on a way took hardly anything of what was left of it."""
+def _too_slow(strides: Sequence[float], left: int) -> bool:
+    """Whether the pace of the last strides, each a share of what was left of a way, is too slow for the steps left."""
     last = np.array(strides[-PATIENCE:])
-    return len(last) == PATIENCE and 1 - float(np.prod(1 - last)) < LEAST
+    return len(last) == PATIENCE and float(np.prod(1 - last)) ** (left / PATIENCE) > HALF
 
 
 @dataclass(frozen=True)

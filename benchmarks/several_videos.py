@@ -140,10 +140,12 @@ def judged(rows: Sequence[Row]) -> list[Check]:
         few, many = min(collisions), max(collisions)
         ratio = collisions[few] / collisions[many] / (many / few) ** 0.5
         checks.append(check(f"narrowing from {few} to {many} videos over the root of their ratio", ratio, 0.7))
-    total = max(sum(row.covered[1] for row in by_weight), 1)
-    share = sum(row.covered[0] for row in by_weight) / total
-    slack = 2 * (LEVEL * (1 - LEVEL) / total) ** 0.5
-    checks.append(check(f"share of {total} intervals of 90 % that cover", share, LEVEL - slack))
+    for sampler in dict.fromkeys(row.sampler for row in rows):
+        covered = [row.covered for row in rows if row.sampler == sampler]
+        total = sum(sets for _, sets in covered)
+        slack = 2 * (LEVEL * (1 - LEVEL) / total) ** 0.5
+        share = sum(inside for inside, _ in covered) / total
+        checks.append(check(f"{sampler}: share of {total} intervals of 90 % that cover", share, LEVEL - slack))
     for row in rows:
         title = f"{row.videos} videos of {row.kind}, {row.sampler}"
         room = None if row.memory is None else LARGEST_MEMORY - row.memory

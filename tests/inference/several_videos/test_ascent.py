@@ -75,6 +75,23 @@ def test_a_ridge_is_followed_along_an_edge(monkeypatch: pytest.MonkeyPatch, *, b
     assert not found.converged  # at an edge the density is no Gaussian
 
 
+@pytest.mark.parametrize("hindered", [True, False])
+def test_others_do_not_follow_a_step_that_one_video_hinders(monkeypatch: pytest.MonkeyPatch, *, hindered: bool) -> None:
+    numbers, video = grazing()
+    videos, followed = [video, video], []
+
+    def end(_: ascent._Ridges, index: int, shared: np.ndarray, own: np.ndarray, target: np.ndarray) -> np.ndarray:
+        followed.append((index, float(target[0])))
+        return np.array([3.0, 0.0]) if hindered and index else own  # where bodies that met do not
+
+    monkeypatch.setattr(ascent._Ridges, "end", end)
+    state = ascent._State.at(videos, np.zeros(1), [np.array([-3.0, -0.4])] * 2)
+    found = ascent._improved(numbers, ascent._Ridges(videos), state, np.array([2.0]), 1.0)
+    assert (found is state) == hindered
+    assert [share for index, share in followed if index == 0] == [2.0]
+    assert len([share for index, share in followed if index == 1]) == (len(ascent.SHARES) if hindered else 1)
+
+
 def test_a_cloud_finds_the_other_side_of_an_edge() -> None:
     _, video = grazing()
     shared, beyond = np.array([1.0]), np.array([-0.9, 0.05])  # they would have to meet, and just do not

@@ -12,7 +12,7 @@ from tests.inference.several_videos.videos import colliding, sliding
 from vrdp_prob.inference.infer import default_model
 from vrdp_prob.inference.map_fit import fit_map
 from vrdp_prob.inference.several_videos.fitting import fit_together
-from vrdp_prob.inference.several_videos.following import follow
+from vrdp_prob.inference.several_videos.following import _too_slow, follow
 from vrdp_prob.inference.several_videos.linking import LinkedVideo
 from vrdp_prob.inference.several_videos.parts import stream
 from vrdp_prob.inference.several_videos.second_look import doubtful, look_again
@@ -42,6 +42,14 @@ class Valley(LinkedVideo):
         return np.stack([sharp, second - shared, 0.1 * first, beyond], axis=1)
 
 
+class Cliff(Valley):
+    """One own number follows the shared one, the other would rather be beyond the edge behind which all is worse."""
+
+    def _residuals(self, points: np.ndarray) -> np.ndarray:
+        shared, first, second = points.T
+        return np.stack([SHARPNESS * (second - shared), first - 2.0, 30.0 * (first > self.edge)], axis=1)
+
+
 def valley(edge: float = np.inf) -> Valley:
     entries = tuple(Coordinate(name, None, Transform.IDENTITY, Prior(0.0, 1.0)) for name in ("shared", "a", "b"))
     one = np.zeros(1, dtype=np.int64)
@@ -64,6 +72,22 @@ def test_they_stop_before_an_edge_behind_which_all_is_worse() -> None:
     found = follow(valley(edge=0.5), np.zeros(1), np.zeros(2), np.array([0.1]))
     assert found.arrived
     assert found.local[0] < 0.5
+
+
+def test_a_way_is_gone_without_mending_where_mending_leads_over_an_edge() -> None:
+    video = Cliff(**vars(valley(edge=0.0)))
+    found = follow(video, np.zeros(1), np.array([-1e-3, 0.0]), np.array([1.0]))
+    assert found.arrived
+    first, second = found.local
+    assert first < 0.0
+    assert second == pytest.approx(1.0, abs=1e-6)
+
+
+def test_a_way_is_given_up_by_its_pace_and_the_steps_that_are_left() -> None:
+    assert _too_slow([0.015] * 6, 24)
+    assert not _too_slow([0.015] * 6, 94)
+    assert not _too_slow([0.03, 0.6, 0.3, 0.03, 0.03, 0.03], 24)
+    assert not _too_slow([0.001] * 5, 24)
 
 
 def test_a_video_that_is_worse_than_the_others_is_fitted_anew() -> None:

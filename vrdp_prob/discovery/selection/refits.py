@@ -220,17 +220,25 @@ class Refits:
         return self._all(partial(kicked.with_cause_in_place, least=trial.fit.joint.log_density), starts)
 
     def made_of(self, trial: Trial, scores: Sequence[CauseScore], *, beside: Sequence[Trial] = ()) -> list[Trial]:
-        """Fits with one cause more, the best first; what others were made before stand `beside`.
+        """Fits with one cause more, the best first; those that were made before stand `beside`.
 
         Where the score of a cause promises more than any refit has brought, and its own brought far less, that goes on
         if it broke off on a long way; and where videos have lost their course of events on it, they are searched anew.
-        So it is with the cause whose score promises most of all, whatever others have brought.
+        So it is with the cause whose score promises most of all, whatever others have brought. What happens once mends
+        any course, and is no measure of causes that last.
         """
         found = self._all(trial.with_cause, scores)
         promised = {one.effect.name: one.size / 2 for one in scores if not happens_once(one.effect)}
-        leader = "" if beside else max(promised, key=lambda name: promised[name], default="")
+        before = [one.brought(trial) for one in beside if not happens_once(one.causes[-1])]
+        leader = "" if before else max(promised, key=lambda name: promised[name], default="")
+
+        def brought_most() -> float:
+            """What the best cause that lasts has brought."""
+            lasting = [one.brought(trial) for one in found if not happens_once(one.causes[-1])]
+            return max((*before, *lasting), default=0.0)
+
         for _ in range(MENDINGS):
-            most = max((one.brought(trial) for one in (*beside, *found)), default=0.0)
+            most = brought_most()
             short = [
                 one
                 for one in found
@@ -244,11 +252,12 @@ class Refits:
             further = hopeful.continued()
             if fallen := further.fallen_from(trial):
                 further = further.mended(fallen, seed=self.seed)
-            if further.brought(trial) < hopeful.brought(trial) + self.needed:
+            gained = further.brought(trial) - hopeful.brought(trial)
+            if gained < self.needed:
                 promised.pop(hopeful.causes[-1].name)
-            else:
+            if gained > 0:
                 found = [further if one is hopeful else one for one in found]
-        most = max((one.brought(trial) for one in (*beside, *found)), default=0.0)
+        most = brought_most()
         close = [one for one in found if one.brought(trial) > SHORT * most > 0]
         rest = [one for one in found if one not in close]
         return sorted([*in_processes(Trial.continued, close), *rest], key=merit, reverse=True)

@@ -276,13 +276,13 @@ class _Searcher:
         sure = partial(_sure, divisor=divisor)
         for _ in range(MOST_SWAPS):
             best, lesser = self._pruned(best, lesser, divisor)
-            rivals = self._rivals(best, lesser, steps)
+            rivals = self._rivals(best, lesser, chain, steps)
             better = max((one for some in rivals for one in some), key=sure, default=best)
             if sure(better) <= sure(best):
                 break
-            best = better
-            lesser = self._lesser(best, best.causes)
-            rivals = self._rivals(best, lesser, steps)
+            best, lesser = better, self._lesser(better, better.causes)
+        else:
+            rivals = self._rivals(best, lesser, chain, steps)
         return best, lesser, rivals
 
     def established(self, best: Trial) -> tuple[Trial, tuple[Trial, ...]]:
@@ -312,7 +312,9 @@ class _Searcher:
             found = found.mended(doubtful(found.fit.fits), seed=self.seed)
         return found.continued() if gain(best, found)[0] < PLAIN * self.needed else found
 
-    def _rivals(self, best: Trial, lesser: Sequence[Trial], steps: Sequence[Step]) -> tuple[tuple[Trial, ...], ...]:
+    def _rivals(
+        self, best: Trial, lesser: Sequence[Trial], chain: Sequence[Trial], steps: Sequence[Step]
+    ) -> tuple[tuple[Trial, ...], ...]:
         """For each cause of a model: models in which another one takes its place.
 
         A rival was tried when that cause was, and came close to it. Of a single cause all that was tried on the model
@@ -320,12 +322,19 @@ class _Searcher:
         """
         found = []
         for cause, without in zip(best.causes, lesser, strict=True):
-            step = next(one for one in steps if any(trial.causes[-1].name == cause.name for trial in one.tried))
+            base, step = next(
+                (base, one)
+                for base, one in zip(chain, steps, strict=True)
+                if any(trial.causes[-1].name == cause.name for trial in one.tried)
+            )
             others = [one for one in step.tried if one.causes[-1].name not in best.names]
             if len(best.causes) > 1 or step is not steps[0]:
-                most = max(float(one.log_density.sum()) for one in step.tried)
-                least = HOPEFUL * (most - float(without.log_density.sum()))
-                close = {one.causes[-1].name for one in others if gain(one, without)[0] > least}
+                least = HOPEFUL * max(gain(one, base)[0] for one in step.tried)
+                close = {
+                    one.causes[-1].name
+                    for one in others
+                    if gain(one, base)[0] > least and not one.patches(one.causes[-1])
+                }
                 again = [one for one in step.left.scores if one.effect.name in close][:MOST_RIVALS]
                 others = self.refits.made_of(without, again)
                 if len(best.causes) == 1:

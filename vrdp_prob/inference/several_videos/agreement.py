@@ -9,8 +9,7 @@ from jaxtyping import Float
 from vrdp_prob.inference.parallel import in_parallel
 from vrdp_prob.inference.samples import Gaussian
 from vrdp_prob.inference.several_videos.arrow import Expansion, Expansions
-from vrdp_prob.inference.several_videos.following import follow
-from vrdp_prob.inference.several_videos.joint_fit import expand, expand_prior, settle
+from vrdp_prob.inference.several_videos.joint_fit import expand, expand_prior, follow_or_settle
 from vrdp_prob.inference.several_videos.linking import LinkedVideo, SharedNumbers
 from vrdp_prob.inference.yaw_search import tells_yaws_by_contacts
 from vrdp_prob.models.parameters import ANGULAR_DRAG
@@ -63,8 +62,7 @@ def following_ones(
         video, found = videos[index], []
         for point in starts[index]:
             own = video.split(point)[1]
-            one = follow(video, _shared_part(numbers, video, point), own, agreed)
-            found.append(one.local if one.arrived else settle(video, agreed, [own, one.local]))
+            found.append(follow_or_settle(video, _shared_part(numbers, video, point), own, agreed))
         values = video.log_density(np.tile(agreed, (len(found), 1)), np.array(found))
         return found[int(np.argmax(values))]
 

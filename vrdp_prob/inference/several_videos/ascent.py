@@ -17,8 +17,7 @@ from vrdp_prob.errors import InputError
 from vrdp_prob.inference.noise_fit import NOISE_FIELDS, best_noise
 from vrdp_prob.inference.parallel import in_parallel
 from vrdp_prob.inference.several_videos.arrow import Expansion, Expansions
-from vrdp_prob.inference.several_videos.following import follow
-from vrdp_prob.inference.several_videos.joint_fit import JointFit, expand, expand_prior, settle
+from vrdp_prob.inference.several_videos.joint_fit import JointFit, expand, expand_prior, follow_or_settle, settle
 from vrdp_prob.inference.several_videos.linking import LinkedVideo, SharedNumbers
 
 SHARES = (1.0, 0.3, 0.1, 0.02)
@@ -32,6 +31,8 @@ TOLERANCE = 0.2
 EXPECTED = 1.0
 """...and has converged, if no more than so much was expected; where a common step brought nothing, none is tried until
 the videos by themselves have gained as much."""
+HALF = 0.5
+"""Share of what is expected of a common step below which a trial looks on both sides of edges before it ends."""
 HOPELESS = 2.0
 """How many times what a common step is expected to bring, or `STEEP`, one video may lose by it; if more, others are not
 looked at."""
@@ -124,9 +125,7 @@ class _Ridges:
         """Best own numbers of a video at other shared numbers."""
         way = (index, shared.tobytes(), own.tobytes(), target.tobytes())
         if way not in self.ends:
-            video = self.videos[index]
-            one = follow(video, shared, own, target, steps=STEPS)
-            self.ends[way] = one.local if one.arrived else settle(video, target, [own, one.local])
+            self.ends[way] = follow_or_settle(self.videos[index], shared, own, target, steps=STEPS)
         return self.ends[way]
 
 
@@ -174,7 +173,7 @@ def climb(
     refused = -np.inf
     for _ in range(effort.rounds):
         inside = _inside(slopes)
-        smooth = _of(slopes, inside) if inside.any() else slopes
+        smooth = _smooth(slopes)
         expected = smooth.expected_gain
         converged = expected < TOLERANCE
         if converged:
@@ -185,7 +184,8 @@ def climb(
             trial = _improved(numbers, ridges, own, smooth.shared_step, expected)
             if trial is own:
                 refused = own.total(numbers)
-        if trial.total(numbers) - state.total(numbers) < effort.enough:
+        brought = trial.total(numbers) - state.total(numbers)
+        if brought < max(TOLERANCE, min(effort.enough, HALF * expected)):
             own = _across_edges(videos, trial, slopes.videos)
             trial = _improved(numbers, ridges, own, smooth.shared_step, expected, around=slopes.videos)
             refused = -np.inf
@@ -194,7 +194,7 @@ def climb(
             state = trial
             slopes = _expanded(numbers, videos, state)
         if gain < effort.enough:
-            converged = expected < EXPECTED
+            converged = _smooth(slopes).expected_gain < EXPECTED
             break
     gaussian = slopes.gaussian(state.shared, state.locals, numbers.logarithms)
     return JointFit(numbers, tuple(videos), gaussian, state.total(numbers), converged)
@@ -206,6 +206,12 @@ def _inside(slopes: Expansions) -> Bool[np.ndarray, "video"]:
     Others are at an edge, and what they say there of the shared numbers is not to be believed.
     """
     return np.array([one.promised < STEEP for one in slopes.videos], dtype=bool)
+
+
+def _smooth(slopes: Expansions) -> Expansions:
+    """The expansion of the videos that are inside; of all where none is."""
+    inside = _inside(slopes)
+    return _of(slopes, inside) if inside.any() else slopes
 
 
 def _gained(trial: _State, state: _State, chosen: Bool[np.ndarray, "video"]) -> float:
@@ -248,7 +254,7 @@ def _improved(
         trial = _with_best_noise(numbers, ridges.videos, followed)
         if trial.total(numbers) > before:
             return trial
-        lost = np.array(state.values) - np.array(followed.values)
+        lost = np.array(state.values) - np.array(trial.values)
         hindering = np.flatnonzero(lost > most).tolist()
     return state
 

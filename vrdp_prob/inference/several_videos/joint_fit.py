@@ -21,6 +21,7 @@ from vrdp_prob.inference.several_videos.arrow import (
     LocalGaussian,
     SharedExpansion,
 )
+from vrdp_prob.inference.several_videos.following import MOST_STEPS, SLACK, follow
 from vrdp_prob.inference.several_videos.linking import LinkedVideo, SharedNumbers
 from vrdp_prob.models.coordinates import Coordinates
 
@@ -183,6 +184,24 @@ def settle(
         )
         found.append(video.split(minimum.point)[1])
     return found[int(np.argmax(video.log_density(np.tile(shared, (len(found), 1)), np.array(found))))]
+
+
+def follow_or_settle(
+    video: LinkedVideo,
+    shared: Float[np.ndarray, "shared"],
+    local: Float[np.ndarray, "local"],
+    target: Float[np.ndarray, "shared"],
+    *,
+    steps: int = MOST_STEPS,
+) -> Float[np.ndarray, "local"]:
+    """Best own numbers of a video at a target, from those at other shared numbers; parameters as those of `follow`.
+
+    Where it does not arrive along its ridge, or arrives far below, it begins at the target, from both ends of the way.
+    """
+    one = follow(video, shared, local, target, steps=steps)
+    if one.arrived and video.value(target, one.local) > video.value(shared, local) - SLACK:
+        return one.local
+    return settle(video, target, [local, one.local])
 
 
 def with_alternatives(fit: JointFit, starts: Sequence[Float[np.ndarray, "_ _"]]) -> JointFit:

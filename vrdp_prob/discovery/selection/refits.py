@@ -213,10 +213,20 @@ class Refits:
         """Fits with something unseen in the place of kicks."""
         kicked = next((one for one in found if one.causes[-1].name == kicks.effect.name), None)
         kicked = kicked or next(iter(self.made_of(trial, [kicks])), None)
-        if kicked is None:
-            return []
-        left = [effect for effect in self.catalogue if effect.name not in trial.names]
-        starts = hidden_things(kicked.fit, left, kicks.p_value)
+        return [] if kicked is None else self.hidden_instead(kicked, trial, kicks.p_value)
+
+    def hidden_instead(self, kicked: Trial, trial: Trial, p_value: float = 0.0) -> list[Trial]:
+        """Fits with something unseen in the place of the kicks that a model ends with.
+
+        Parameters
+        ----------
+        kicked, trial
+            The model with kicks, and without.
+        p_value
+            Of the kicks.
+        """
+        left = [effect for effect in self.catalogue if effect.name not in kicked.names]
+        starts = hidden_things(kicked.fit, left, p_value)
         return self._all(partial(kicked.with_cause_in_place, least=trial.fit.joint.log_density), starts)
 
     def made_of(self, trial: Trial, scores: Sequence[CauseScore], *, beside: Sequence[Trial] = ()) -> list[Trial]:

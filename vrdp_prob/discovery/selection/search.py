@@ -10,9 +10,11 @@ from jaxtyping import Float
 from vrdp_prob.discovery.candidates.scores import happens_once
 from vrdp_prob.discovery.selection.refits import HOPEFUL, Left, Refits, merit
 from vrdp_prob.discovery.selection.trials import Trial, gain, weights, with_own_population
+from vrdp_prob.inference.parallel import in_processes
 from vrdp_prob.inference.several_videos.fitting import SharedFit
 from vrdp_prob.inference.several_videos.second_look import doubtful
 from vrdp_prob.models.effects.effect import Effect
+from vrdp_prob.models.effects.external_impulse import ExternalImpulse
 from vrdp_prob.progress import ProgressDisplay, SilentProgress
 
 MOST_RIVALS = 2
@@ -317,8 +319,8 @@ class _Searcher:
     ) -> tuple[tuple[Trial, ...], ...]:
         """For each cause of a model: models in which another one takes its place.
 
-        A rival was tried when that cause was, and came close to it. Of a single cause all that was tried on the model
-        that was given are rivals.
+        A rival was tried when that cause was, and came close to it; what happened once may as well have been something
+        unseen that a body met. Of a single cause all that was tried on the model that was given are rivals.
         """
         found = []
         for cause, without in zip(best.causes, lesser, strict=True):
@@ -337,6 +339,8 @@ class _Searcher:
                 }
                 again = [one for one in step.left.scores if one.effect.name in close][:MOST_RIVALS]
                 others = self.refits.made_of(without, again)
+                if cause is best.causes[-1] and isinstance(cause, ExternalImpulse):
+                    others += in_processes(Trial.continued, self.refits.hidden_instead(best, without))
                 if len(best.causes) == 1:
                     made = {*best.names, *(one.causes[-1].name for one in others)}
                     others += [one for one in steps[0].tried if one.causes[-1].name not in made]

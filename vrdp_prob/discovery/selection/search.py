@@ -340,7 +340,8 @@ class _Searcher:
                 again = [one for one in step.left.scores if one.effect.name in close][:MOST_RIVALS]
                 others = self.refits.made_of(without, again)
                 if cause is best.causes[-1] and isinstance(cause, ExternalImpulse):
-                    others += in_processes(Trial.continued, self.refits.hidden_instead(best, without))
+                    hidden = in_processes(Trial.continued, self.refits.hidden_instead(best, without))
+                    others += sorted(hidden, key=merit, reverse=True)
                 if len(best.causes) == 1:
                     made = {*best.names, *(one.causes[-1].name for one in others)}
                     others += [one for one in steps[0].tried if one.causes[-1].name not in made]

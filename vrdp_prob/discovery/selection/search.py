@@ -339,12 +339,13 @@ class _Searcher:
                 }
                 again = [one for one in step.left.scores if one.effect.name in close][:MOST_RIVALS]
                 others = self.refits.made_of(without, again)
-                if cause is best.causes[-1] and isinstance(cause, ExternalImpulse):
-                    hidden = in_processes(Trial.continued, self.refits.hidden_instead(best, without))
-                    others += sorted(hidden, key=merit, reverse=True)
                 if len(best.causes) == 1:
                     made = {*best.names, *(one.causes[-1].name for one in others)}
                     others += [one for one in steps[0].tried if one.causes[-1].name not in made]
+            if cause is best.causes[-1] and isinstance(cause, ExternalImpulse):
+                made = {one.causes[-1].name for one in others}
+                hidden = in_processes(Trial.continued, self.refits.hidden_instead(best, without))
+                others += [one for one in sorted(hidden, key=merit, reverse=True) if one.causes[-1].name not in made]
             found.append(tuple(one for one in others if not one.patches(one.causes[-1])))
         return tuple(found)
 

@@ -18,7 +18,8 @@ Sampler = Annotated[
     str,
     typer.Option(
         metavar="|".join(OPTIONS["sampler"]),
-        help="How the posterior is drawn; laplace takes seconds, and emcee goes on where it cannot be trusted.",
+        help="How the posterior is drawn; laplace takes seconds, and emcee goes on where it cannot be trusted (not in "
+        "evaluate and learn-word).",
     ),
 ]
 Noise = Annotated[

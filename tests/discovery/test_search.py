@@ -78,7 +78,7 @@ def test_the_first_of_two_is_what_lasts_and_brings_most_where_all_else_is_noise(
     nothing, tilt, drag, kicks = (_refit(*one) for one in (("", 0.0), ("tilt", -1.0), ("drag", 0.5), ("kicks", 0.2)))
     for one, brought in ((nothing, 0.0), (tilt, 60.0), (drag, 20.0), (kicks, 90.0)):
         one.brought.return_value = brought
-    monkeypatch.setattr(search, "happens_once", lambda cause: cause == "kicks")
+    monkeypatch.setattr(refits, "happens_once", lambda cause: cause == "kicks")
     found = _searcher(needed=least)._provisional(nothing, [drag, kicks, tilt])
     assert found is (tilt if name else None)
 

@@ -1,6 +1,6 @@
 """Refits with one more cause: which causes are tried on a model, and with what lost or hidden things beside them."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 
@@ -215,7 +215,9 @@ class Refits:
         kicked = kicked or next(iter(self.made_of(trial, [kicks])), None)
         return [] if kicked is None else self.hidden_instead(kicked, trial, kicks.p_value)
 
-    def hidden_instead(self, kicked: Trial, trial: Trial, p_value: float = 0.0) -> list[Trial]:
+    def hidden_instead(
+        self, kicked: Trial, trial: Trial, p_value: float = 0.0, *, known: Collection[str] = ()
+    ) -> list[Trial]:
         """Fits with something unseen in the place of the kicks that a model ends with.
 
         Parameters
@@ -224,8 +226,10 @@ class Refits:
             The model with kicks, and without.
         p_value
             Of the kicks.
+        known
+            Names of causes whose fits are there already.
         """
-        left = [effect for effect in self.catalogue if effect.name not in kicked.names]
+        left = [effect for effect in self.catalogue if effect.name not in {*kicked.names, *known}]
         starts = hidden_things(kicked.fit, left, p_value)
         return self._all(partial(kicked.with_cause_in_place, least=trial.fit.joint.log_density), starts)
 
@@ -239,13 +243,10 @@ class Refits:
         """
         found = self._all(trial.with_cause, scores)
         promised = {one.effect.name: one.size / 2 for one in scores if not happens_once(one.effect)}
-        before = [one.brought(trial) for one in beside if not happens_once(one.causes[-1])]
-        leader = "" if before else max(promised, key=lambda name: promised[name], default="")
+        leader = "" if lasting(beside) else max(promised, key=lambda name: promised[name], default="")
 
         def brought_most() -> float:
-            """What the best cause that lasts has brought."""
-            lasting = [one.brought(trial) for one in found if not happens_once(one.causes[-1])]
-            return max((*before, *lasting), default=0.0)
+            return max((one.brought(trial) for one in lasting([*beside, *found])), default=0.0)
 
         for _ in range(MENDINGS):
             most = brought_most()
@@ -279,6 +280,11 @@ class Refits:
 def merit(trial: Trial) -> float:
     """By which models are ordered: what they predict of left-out videos, less what their causes are believed less."""
     return float(trial.log_density.sum()) + trial.log_prior
+
+
+def lasting(trials: Sequence[Trial]) -> list[Trial]:
+    """Those whose last cause acts all the time."""
+    return [one for one in trials if not happens_once(one.causes[-1])]
 
 
 def _mends_several(trial: Trial) -> bool:

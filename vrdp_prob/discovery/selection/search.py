@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Float
 
 from vrdp_prob.discovery.candidates.scores import happens_once
-from vrdp_prob.discovery.selection.refits import HOPEFUL, Left, Refits, merit
+from vrdp_prob.discovery.selection.refits import HOPEFUL, Left, Refits, lasting, merit
 from vrdp_prob.discovery.selection.trials import Trial, gain, weights, with_own_population
 from vrdp_prob.inference.parallel import in_processes
 from vrdp_prob.inference.several_videos.fitting import SharedFit
@@ -206,8 +206,7 @@ class _Searcher:
 
     def _provisional(self, trial: Trial, found: Sequence[Trial]) -> Trial | None:
         """The lasting cause that brings most where all else is noise, if it brings enough."""
-        lasting = [one for one in found if not happens_once(one.causes[-1])]
-        first = max(lasting, key=lambda one: one.brought(trial) + one.log_prior, default=trial)
+        first = max(lasting(found), key=lambda one: one.brought(trial) + one.log_prior, default=trial)
         return None if first.brought(trial) < self.needed else first
 
     def _pair(self, trial: Trial, first: Trial) -> tuple[Trial, Trial] | None:
@@ -344,8 +343,8 @@ class _Searcher:
                     others += [one for one in steps[0].tried if one.causes[-1].name not in made]
             if cause is best.causes[-1] and isinstance(cause, ExternalImpulse):
                 made = {one.causes[-1].name for one in others}
-                hidden = in_processes(Trial.continued, self.refits.hidden_instead(best, without))
-                others += [one for one in sorted(hidden, key=merit, reverse=True) if one.causes[-1].name not in made]
+                hidden = in_processes(Trial.continued, self.refits.hidden_instead(best, without, known=made))
+                others += sorted(hidden, key=merit, reverse=True)
             found.append(tuple(one for one in others if not one.patches(one.causes[-1])))
         return tuple(found)
 

@@ -210,18 +210,13 @@ def _inside(slopes: Expansions) -> Bool[np.ndarray, "video"]:
 
 def _smooth(slopes: Expansions) -> Expansions:
     """The expansion of the videos that are inside; of all where none is."""
-    inside = _inside(slopes)
-    return _of(slopes, inside) if inside.any() else slopes
+    inside = tuple(one for one, used in zip(slopes.videos, _inside(slopes), strict=True) if used)
+    return Expansions(slopes.prior, inside) if inside else slopes
 
 
 def _gained(trial: _State, state: _State, chosen: Bool[np.ndarray, "video"]) -> float:
     """What some of the videos have gained; as long as those at an edge gain much they would follow no common step."""
     return float((np.array(trial.values) - np.array(state.values))[chosen].sum())
-
-
-def _of(slopes: Expansions, chosen: Bool[np.ndarray, "video"]) -> Expansions:
-    """The expansion of some of the videos."""
-    return Expansions(slopes.prior, tuple(one for one, used in zip(slopes.videos, chosen, strict=True) if used))
 
 
 def _expanded(numbers: SharedNumbers, videos: Sequence[LinkedVideo], state: _State) -> Expansions:

@@ -14,7 +14,6 @@ import argparse
 import json
 import os
 import sys
-import time
 from collections.abc import Iterator, Sequence
 from itertools import count, islice
 from pathlib import Path
@@ -24,6 +23,7 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 import torch
 from _calibration_page import checks, figures, page, tables
+from _clock import processor_seconds
 from _resumable import Result, measured, read
 
 from tests.inference.prior_scenes import PriorScene, prior_scene
@@ -92,13 +92,13 @@ def one(task: tuple[str, int]) -> Result:
     torch.set_num_threads(1)
     scene = prior_scene(seed)
     assert scene is not None
-    begin = time.process_time()
+    begin = processor_seconds()
     try:
         name, hand_on = ("laplace", False) if sampler == ALONE else (sampler, True)
         posterior = infer(scene.tracks, sampler=name, seed=seed, draws=DRAWS, hand_on=hand_on)
     except InputError as error:
         return {**facts(scene), "sampler": sampler, "refused": str(error)}
-    return {**facts(scene), "sampler": sampler, **outcome(scene, posterior), "seconds": time.process_time() - begin}
+    return {**facts(scene), "sampler": sampler, **outcome(scene, posterior), "seconds": processor_seconds() - begin}
 
 
 def facts(scene: PriorScene) -> Result:

@@ -1,11 +1,11 @@
 """Mass ratios of real discs from one collision each, against their weighed masses.
 
-    python benchmarks/pucks.py [--json FILE] [--docs DIR] [--sampler emcee] [--videos A:B]
+    python benchmarks/pucks.py [--json FILE] [--docs DIR] [--sampler emcee] [--videos A:B] [--model FILE.toml]
 
 Videos are those of ../shared/data/puck_mass_pairs_2d: two discs of known mass collide on an air table, filmed by motion
 capture with a noise of about 15 micrometres. The masses and moments of inertia are withheld from the inference. The
-physics is the default model, with frictionless contacts; what it lacks (air currents, a table that is not level,
-contact friction) is left to the model error. Without the data nothing is measured.
+physics is the default model, with frictionless contacts, or the one of a file; what it lacks (air currents, a table
+that is not level, contact friction) is left to the model error. Without the data nothing is measured.
 """
 
 import argparse
@@ -15,6 +15,7 @@ import time
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -22,6 +23,7 @@ import torch
 
 from vrdp_prob.datasets import load_all
 from vrdp_prob.inference import default_model, infer
+from vrdp_prob.models.physics import PhysicsModel
 from vrdp_prob.models.simulator.rollout import compile_model
 from vrdp_prob.scene import Tracks
 
@@ -56,15 +58,17 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--docs", type=Path, help="folder of the documentation; its pucks.md gets the table")
     parser.add_argument("--sampler", default="emcee")
     parser.add_argument("--videos", default=":", help="videos to take, for example 0:5")
+    parser.add_argument("--model", type=Path, help="physics, a TOML file; the default model otherwise")
     options = parser.parse_args(arguments)
     torch.set_num_threads(1)
     results: list[Result] = []
     if DATA.is_dir():
-        compile_model(default_model())
+        model = default_model() if options.model is None else PhysicsModel.read(options.model)
+        compile_model(model)
         begin, end = (int(part) if part else None for part in options.videos.split(":"))
         videos = load_all(DATA)[begin:end]
         with ThreadPoolExecutor(max_workers=2) as workers:
-            for result in workers.map(lambda tracks: measured(tracks, options.sampler), videos):
+            for result in workers.map(partial(measured, sampler=options.sampler, model=model), videos):
                 results.append(result)
                 print(line(result), flush=True)
         print(*summary(results), sep="\n")
@@ -77,12 +81,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return 0
 
 
-def measured(tracks: Tracks, sampler: str) -> Result:
+def measured(tracks: Tracks, *, sampler: str, model: PhysicsModel) -> Result:
     """Infer the mass ratio of a video whose masses are withheld."""
     masses = [body.mass for body in tracks.bodies]
     bodies = tuple(replace(body, mass=None, inertia=None) for body in tracks.bodies)
     begin = time.perf_counter()
-    posterior = infer(Tracks(tracks.video, bodies, tracks.data, tracks.walls), sampler=sampler)
+    posterior = infer(Tracks(tracks.video, bodies, tracks.data, tracks.walls), model=model, sampler=sampler)
     seconds = time.perf_counter() - begin
     draws = posterior.data["posterior"].to_dataset()["mass"].values.reshape(-1, 2)
     log_ratio = np.log(draws[:, 0] / draws[:, 1])

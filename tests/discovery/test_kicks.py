@@ -20,17 +20,30 @@ def first_contact(fit: SharedFit) -> tuple[int, int, float]:
     pytest.fail("no bodies meet")
 
 
-@pytest.mark.parametrize(("frames_after", "patches"), [(1.0, True), (8.0, False)])
-def test_a_kick_is_a_cause_only_apart_from_contacts(frames_after: float, patches: bool) -> None:
+def kicked(fit: SharedFit, video: int, body: int, kick: dict[str, float]) -> Trial:
+    """The fit with a kick of a body."""
+    site = Site(video, body, kick, 30.0, 1e-6)
+    trial = Trial((), fit).with_cause(CauseScore(ExternalImpulse(), {}, (site,), 30.0, 2, 1e-6, {}, 9))
+    assert trial is not None
+    assert trial.acting(ExternalImpulse()) == [video]
+    return trial
+
+
+def test_a_kick_that_comes_with_a_contact_is_no_cause() -> None:
     _, fit = fitted(None, seed=1)
     video, body, time = first_contact(fit)
     times = fit.fits[video].likelihood.tracks.times
-    later = fit.fits[video].rollout.events.of_kind(RolloutEventKind.COLLISION).time
-    kick = time + frames_after * float(times[1] - times[0])
-    assert patches or np.abs(later - kick).min() > 0.1
-    effect = ExternalImpulse()
-    site = Site(video, body, {"impulse_time": kick, "impulse_x": 0.02, "impulse_y": -0.02}, 30.0, 1e-6)
-    trial = Trial((), fit).with_cause(CauseScore(effect, {}, (site,), 30.0, 2, 1e-6, {}, 9))
-    assert trial is not None
-    assert trial.acting(effect) == [video]
-    assert trial.patches(effect) == patches
+    kick = {"impulse_time": time + float(times[1] - times[0]), "impulse_x": 0.02, "impulse_y": -0.02}
+    assert kicked(fit, video, body, kick).patches(ExternalImpulse())
+
+
+def test_a_kick_in_free_flight_is_a_cause() -> None:
+    data, fit = fitted("external_impulse", seed=1)
+    (video,) = (k for k, one in enumerate(data.truth.videos) if np.isfinite(one.laws.kick_time))
+    laws = data.truth.videos[video].laws
+    contacts = fit.fits[video].rollout.events.of_kind(RolloutEventKind.COLLISION).time
+    assert np.abs(contacts - laws.kick_time).min() > 0.2
+    kick = {"impulse_time": laws.kick_time, "impulse_x": laws.kick_x, "impulse_y": laws.kick_y}
+    trial = kicked(fit, video, int(laws.kick_body), kick)
+    assert trial.brought(Trial((), fit)) > 0.0
+    assert not trial.patches(ExternalImpulse())

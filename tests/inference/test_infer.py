@@ -11,7 +11,16 @@ import xarray as xr
 
 from tests.inference.generator import Scene, observe
 from vrdp_prob.errors import InputError
-from vrdp_prob.inference import BodyStatus, ParameterStatus, Posterior, Status, default_model, infer
+from vrdp_prob.inference import (
+    BodyStatus,
+    ParameterStatus,
+    Posterior,
+    Status,
+    default_model,
+    fit_map,
+    identified,
+    infer,
+)
 from vrdp_prob.models.parameters import RESTITUTION
 from vrdp_prob.models.simulator.rollout import simulate
 from vrdp_prob.scene import Shape, Tracks
@@ -50,6 +59,18 @@ def test_mass_ratios_and_restitutions_are_recovered() -> None:
         first, second = (int(name) for name in pair.objects)
         true = scene.restitution[first] * scene.restitution[second]
         assert pair.summary.mean == pytest.approx(true, abs=4 * pair.summary.sd)
+
+
+def test_what_can_be_told_is_known_before_anything_is_sampled() -> None:
+    scene, posterior = chain_posterior()
+    tracks = observe(scene, noise=0.005, dropout=0.05, frames=75, seed=2)
+    told = identified(fit_map(tracks, default_model(), np.random.default_rng(0)))
+    assert told.status["0"].mass.status is Status.RATIO_ONLY
+    assert told.status["3"].mass.status is Status.DEFAULT
+    assert {name: one.mass.status for name, one in told.status.items()} == {
+        name: one.mass.status for name, one in posterior.status.items()
+    }
+    assert [group.bodies for group in told.groups] == [("0", "1", "2")]
 
 
 def test_a_model_that_fits_is_not_warned_about_and_its_noise_is_found() -> None:

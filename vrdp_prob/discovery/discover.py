@@ -18,7 +18,7 @@ from vrdp_prob.discovery.selection.mimics import Unlisted
 from vrdp_prob.discovery.selection.search import Search
 from vrdp_prob.discovery.selection.tried import tried_causes
 from vrdp_prob.inference import default_model
-from vrdp_prob.inference.checkpoint import Checkpoint, model_facts, program_facts, tracks_facts
+from vrdp_prob.inference.checkpoint import Checkpoint, model_facts, program_facts, videos_facts
 from vrdp_prob.inference.infer import check_model
 from vrdp_prob.inference.journal import journal
 from vrdp_prob.inference.parallel import linear_algebra_in_one_thread, several_processes
@@ -115,9 +115,8 @@ def discover(
 
 def _facts(videos: Sequence[Tracks], model: PhysicsModel, catalogue: Sequence[Effect], seed: int) -> dict[str, str]:
     """What a search depends on, in short texts by name."""
-    seen = {f"video {tracks.video}": tracks_facts(tracks)["tracks"] for tracks in videos}
     names = ", ".join(sorted(effect.name for effect in catalogue))
-    return {**seen, **model_facts(model), **program_facts(seed=seed, catalogue=names)}
+    return {**videos_facts(videos), **model_facts(model), **program_facts(seed=seed, catalogue=names)}
 
 
 def _catalogue(model: PhysicsModel, catalogue: Sequence[Effect] | None) -> list[Effect]:

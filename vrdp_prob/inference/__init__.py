@@ -1,6 +1,7 @@
 """How we learn: MAP, Laplace draws, emcee, NUTS, identifiability, the posterior."""
 
 from vrdp_prob.inference.identifiability import BodyStatus, ParameterStatus, Status
+from vrdp_prob.inference.identified import Identified, identified
 from vrdp_prob.inference.infer import OPTIONS, SAMPLERS, check_options, default_model, infer
 from vrdp_prob.inference.map_fit import MapFit, fit_map
 from vrdp_prob.inference.plan import ALL_AT_ONCE, CURRICULUM, FREE_FIRST, GROWING, FitPlan, Optimiser
@@ -27,6 +28,7 @@ __all__ = [
     "BodyStatus",
     "Convergence",
     "FitPlan",
+    "Identified",
     "MapFit",
     "ObjectSummary",
     "Optimiser",
@@ -43,6 +45,7 @@ __all__ = [
     "default_model",
     "fit_map",
     "fit_together",
+    "identified",
     "infer",
     "infer_together",
     "predictive_log_density",

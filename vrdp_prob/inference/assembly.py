@@ -8,16 +8,16 @@ import torch
 import xarray as xr
 from jaxtyping import Float
 
-from vrdp_prob.inference.events import Pairs, collision_sequences, wall_contacts
-from vrdp_prob.inference.identifiability import BodyStatus, Status, collision_groups, identifiability
-from vrdp_prob.inference.information import Information
+from vrdp_prob.inference.events import collision_sequences
+from vrdp_prob.inference.identifiability import BodyStatus, Status
+from vrdp_prob.inference.identified import identified
 from vrdp_prob.inference.map_fit import MapFit
 from vrdp_prob.inference.posterior import Posterior
 from vrdp_prob.inference.samples import Convergence, Samples
 from vrdp_prob.inference.tree import posterior_tree
 from vrdp_prob.models.parameters import MASS, RESTITUTION
 from vrdp_prob.models.roughness import untold_noise
-from vrdp_prob.models.unknowns import felt_masses, mass_prior, prior_restitutions, structure_of
+from vrdp_prob.models.unknowns import mass_prior, prior_restitutions
 from vrdp_prob.scene import Tracks
 
 FEWEST_FRAMES = 5
@@ -60,11 +60,8 @@ def posterior_from(
         keeping default values.
     """
     tracks = fit.likelihood.tracks
-    information = Information(fit.likelihood.coordinates, fit.modes[0])
-    told = _telling(fit)
-    felt = felt_masses(fit.likelihood.model, structure_of(fit.likelihood.coordinates).moving)
-    walls = wall_contacts(fit.rollout, 0)
-    status = identifiability(tracks, told, walls, information, felt)
+    told = identified(fit)
+    status = told.status
     changed = _changed_order(fit, samples.points)
     convergence = replace(convergence, collision_order_changes=float(changed.mean()))
     names = [body.id for body in tracks.bodies]
@@ -80,15 +77,9 @@ def posterior_from(
         convergence=convergence,
         warnings=tuple(_warnings(fit, convergence, status, drawn=draw_defaults)),
         pairs=tuple((names[i], names[j]) for i, j in fit.contacts),
-        groups=collision_groups(tracks, told, walls, information),
+        groups=told.groups,
         misfit=fit.misfit,
     )
-
-
-def _telling(fit: MapFit) -> Pairs:
-    """Contacts of bodies of which both had something to tell, so that their restitutions are unknowns."""
-    places = fit.likelihood.coordinates.places
-    return tuple((i, j) for i, j in fit.contacts if {(RESTITUTION.name, i), (RESTITUTION.name, j)} <= places.keys())
 
 
 def _with_drawn_defaults(

@@ -5,11 +5,13 @@ with a seed or a state of its own, and is kept when it is whole. A file that can
 """
 
 import json
+import pickle
 import zipfile
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Mapping, Sequence
 from functools import cache
 from hashlib import sha256
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -20,6 +22,8 @@ from vrdp_prob.scene import Camera, Tracks
 from vrdp_prob.version import __version__
 
 Arrays = Mapping[str, np.ndarray]
+DAMAGED = (pickle.UnpicklingError, EOFError, AttributeError, ImportError, IndexError, KeyError, TypeError, ValueError)
+"""What reading a pickle says that was not written to its end, or damaged since."""
 PACKAGE = Path(__file__).parents[1]
 
 
@@ -38,6 +42,11 @@ def tracks_facts(tracks: Tracks) -> dict[str, str]:
     camera = None if tracks.camera is None else tracks.camera.to_document()
     seen.update(repr((tracks.bodies, tracks.walls, camera)).encode())
     return {"tracks": seen.hexdigest()}
+
+
+def videos_facts(videos: Sequence[Tracks]) -> dict[str, str]:
+    """Tracks of several videos with their cameras, in short texts by name."""
+    return {f"video {tracks.video}": tracks_facts(tracks)["tracks"] for tracks in videos}
 
 
 def film_facts(file: Path, camera: Camera | None) -> dict[str, str]:
@@ -70,7 +79,7 @@ def _code() -> str:
 
 
 FINGERPRINT = "fingerprint.json"
-KEPT = ("*.npz", "ensemble_*.h5", "step_*.pickle")
+KEPT = ("*.npz", "ensemble_*.h5", "*.pickle")
 """Files of what a run has done."""
 
 
@@ -160,6 +169,23 @@ class Checkpoint:
         """Keep the content of a file, whole or not at all."""
         with write_atomically(self.path(name)) as temporary:
             temporary.write_bytes(content)
+
+    def thing(self, name: str) -> Any:
+        """What was kept as a pickle; None where there is none, or it cannot be read.
+
+        It is read only where the folder says that it belongs to this very run: a pickle may hold any program.
+        """
+        content = self.content(f"{name}.pickle")
+        if content is None:
+            return None
+        try:
+            return pickle.loads(content)
+        except DAMAGED:
+            return None
+
+    def keep_thing(self, name: str, thing: object) -> None:
+        """Keep a thing as a pickle, whole or not at all."""
+        self.keep_content(f"{name}.pickle", pickle.dumps(thing))
 
     def keep(self, name: str, arrays: Arrays) -> None:
         """Keep arrays under a name, whole or not at all."""

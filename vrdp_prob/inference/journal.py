@@ -21,14 +21,12 @@ import numpy as np
 import torch
 import xarray
 
-from vrdp_prob.inference.checkpoint import Checkpoint
+from vrdp_prob.inference.checkpoint import DAMAGED, Checkpoint
 
 Result = TypeVar("Result")
 Arguments = ParamSpec("Arguments")
 
 _journal: ContextVar["Journal | None"] = ContextVar("_journal", default=None)
-_DAMAGED = (pickle.UnpicklingError, EOFError, AttributeError, ImportError, IndexError, KeyError, TypeError, ValueError)
-"""What reading a file says that was not written to its end, or damaged since."""
 
 
 class Step:
@@ -57,7 +55,7 @@ class Step:
             return None
         try:
             work, result = pickle.loads(content)
-        except _DAMAGED:
+        except DAMAGED:
             return None
         return (result,) if work == self._digest else None
 

@@ -50,7 +50,9 @@ def to_document(content: ReportContent) -> dict[str, Any]:
             "ess_tail": _finite(convergence.ess_tail),
             "worst": convergence.worst,
         },
-        "misfit": None if content.misfit is None else {**asdict(content.misfit), "fits": content.misfit.fits},
+        "misfit": None
+        if (misfit := content.misfit) is None
+        else {**asdict(misfit), "chi_square": misfit.chi_square, "fits": misfit.fits},
         "collision_groups": [asdict(group) for group in content.groups],
         "prior_sensitivity": [one.to_document() for one in content.sensitivities],
         "answers": [item.to_document() for item in content.answers],

@@ -327,7 +327,11 @@ def _misfit_rows(content: ReportContent) -> list[tuple[str, str, str]]:
     if misfit is None:
         return []
     noise = f"of the best fit; the noise of the tracks is {1000 * misfit.noise_sd:.2g} mm"
-    rows = [("Residuals", f"{1000 * misfit.residual_sd:.2g} mm", noise)]
+    alike = f"mean squared residual in units of the noise; neighbouring ones have correlation {misfit.correlation:.2f}"
+    rows = [
+        ("Residuals", f"{1000 * misfit.residual_sd:.2g} mm", noise),
+        ("Chi-square", f"{misfit.chi_square:.2f} per position and axis", alike),
+    ]
     if misfit.error_acceleration is not None:
         meaning = f"that the intervals allow for; it lasts about {misfit.error_duration:.2g} s"
         rows.append(("Unknown acceleration", f"{misfit.error_acceleration:.2g} m/s²", meaning))

@@ -9,12 +9,13 @@ import os
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
 from scipy.special import logsumexp
 
+from vrdp_prob.inference.checkpoint import Checkpoint
 from vrdp_prob.inference.diagnostics import Reported, drift, joined, ordered, settled, share_with_error
 from vrdp_prob.inference.samples import ESS_GOAL, R_HAT_GOAL, ModeWeight
 from vrdp_prob.inference.several_videos.arrow import ArrowGaussian
@@ -41,6 +42,9 @@ MARGIN = 1.1
 """Effective draws asked of the chains per draw that is needed, since what is kept of them is thinned."""
 START_SPREADS = (1.0, 0.3, 0.1, 0.03, 0.01, 0.0)
 """Spreads of the starting places, in turn, until each chain has support."""
+
+CHAINS = "chains"
+"""Name under which a checkpoint keeps them."""
 
 Result = TypeVar("Result")
 
@@ -83,6 +87,7 @@ def sample_gibbs(
     progress: ProgressDisplay | None = None,
     rounds: int = ROUNDS,
     reported: Sequence[Reported] | None = None,
+    checkpoint: Checkpoint | None = None,
 ) -> JointDraws:
     """Draw from the joint posterior until the goals for R-hat and effective size are met, or the rounds are over.
 
@@ -98,23 +103,25 @@ def sample_gibbs(
         Rounds after which sampling stops in any case.
     reported
         Quantities of each video that have to be known well enough beside all numbers; none where None.
+    checkpoint
+        Keeps the chains after every round; a run that is taken up goes on from there.
     """
-    sampler = _Sampler(fit, generator, reported)
-    total = WARM_UP + rounds * SWEEPS_PER_ROUND
-    with sampler.workers, (progress or SilentProgress()).stage("Sampling all videos", total=total) as advance:
-
-        def run(sweeps: int) -> None:
-            for _ in range(sweeps):
-                sampler.sweep()
-                advance(1)
-
-        run(WARM_UP // 2)
-        sampler.reshape()
-        run(WARM_UP - WARM_UP // 2)
-        sampler.reshape()
-        for _ in range(rounds):
-            run(SWEEPS_PER_ROUND)
-            if sampler.converged():
+    kept = None if checkpoint is None else checkpoint.thing(CHAINS)
+    sampler = kept if isinstance(kept, _Sampler) else _Sampler(fit, generator, reported)
+    warm = (WARM_UP // 2, WARM_UP)
+    stops = [*warm, *(WARM_UP + SWEEPS_PER_ROUND * (done + 1) for done in range(rounds))]
+    with sampler.workers, (progress or SilentProgress()).stage("Sampling all videos", total=stops[-1]) as advance:
+        advance(sampler.sweeps)
+        for stop in stops:
+            if sampler.sweeps < stop:
+                while sampler.sweeps < stop:
+                    sampler.sweep()
+                    advance(1)
+                if stop in warm:
+                    sampler.reshape()
+                if checkpoint is not None:
+                    checkpoint.keep_thing(CHAINS, sampler)
+            if stop == sampler.sweeps and stop not in warm and sampler.converged():
                 return sampler.draws()
     return replace(sampler.draws(), notes=(f"It stopped after {rounds * SWEEPS_PER_ROUND} sweeps.",))
 
@@ -268,7 +275,8 @@ class _Sampler:
             _Video(video, one, fit.gaussian, stream)
             for video, one, stream in zip(fit.videos, clouds, streams, strict=True)
         ]
-        self.workers = ThreadPoolExecutor(max_workers=min(len(fit.videos), os.cpu_count() or 1))
+        self.workers = self._new_workers()
+        self.sweeps = 0
         count = GROUPS * CHAINS_PER_GROUP
         self._shape = Shape.unit(len(fit.numbers), 0)
         places = reference_draws(count, len(fit.numbers), generator)
@@ -282,8 +290,19 @@ class _Sampler:
         self._each(lambda video: video.start(shared))
         self._add_up()
 
+    def __getstate__(self) -> dict[str, Any]:
+        return {name: value for name, value in self.__dict__.items() if name != "workers"}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__.update(state)
+        self.workers = self._new_workers()
+
+    def _new_workers(self) -> ThreadPoolExecutor:
+        return ThreadPoolExecutor(max_workers=min(len(self._fit.videos), os.cpu_count() or 1))
+
     def sweep(self) -> None:
         """Move the shared numbers, then each video's own."""
+        self.sweeps += 1
         before = self._chains.places.copy()
         slice_step(self._chains, self._log_density, self._generator)
         moved = (self._chains.places != before).any(axis=1)

@@ -84,6 +84,16 @@ class SharedNumbers:
         """Standard deviation of the Gaussian prior."""
         return self._prior.prior_sd
 
+    def quantities(self, shared: Float[np.ndarray, "*batch shared"]) -> Float[np.ndarray, "*batch shared"]:
+        """The numbers in their units, where they are inferred as logarithms, too."""
+        values: np.ndarray = np.where(self.logarithms, np.exp(np.where(self.logarithms, shared, 0.0)), shared)
+        return values
+
+    def log_priors(self, shared: Float[np.ndarray, "point shared"]) -> Float[np.ndarray, "point shared"]:
+        """Log prior of each number, up to constants."""
+        values: np.ndarray = self._prior.log_prior(torch.from_numpy(np.ascontiguousarray(shared))).numpy()
+        return values
+
     def log_prior(self, shared: Float[np.ndarray, "point shared"]) -> Float[np.ndarray, "point"]:
         """Log prior up to a constant."""
         values: np.ndarray = self.log_density(torch.from_numpy(np.ascontiguousarray(shared))).numpy()

@@ -17,6 +17,7 @@ from vrdp_prob.inference.samples import Convergence
 from vrdp_prob.inference.several_videos.linking import SharedNumbers, place_words
 from vrdp_prob.inference.storage import check_format, from_tree, reading, to_tree
 from vrdp_prob.inference.summaries import Summary
+from vrdp_prob.inference.tree import for_arviz
 from vrdp_prob.models import model_file
 from vrdp_prob.models.coordinates import Coordinate
 from vrdp_prob.models.parameters import WALL_RESTITUTION, Prior, Transform
@@ -105,12 +106,12 @@ class SharedPosterior:
         A `noise_scale` of 1 stands for the `reference_m` among its attributes, or for what each video states where
         there is none.
         """
-        return self._named(self.points, ("chain", "draw"))
+        return self._named(self.numbers.quantities(self.points), ("chain", "draw"))
 
     @property
     def map_estimate(self) -> xr.Dataset:
         """The most probable values in the same form, without axes."""
-        return self._named(self.most_probable, ())
+        return self._named(self.numbers.quantities(self.most_probable), ())
 
     def summary(self, name: str) -> Summary:
         """A shared quantity in four numbers.
@@ -125,6 +126,14 @@ class SharedPosterior:
             known = [str(one) for one, values in shared.items() if values.ndim == len(("chain", "draw"))]
             raise InputError(f"the videos share no single '{name}'; they share {', '.join(known) or 'nothing'}.")
         return Summary.of(shared[name].values)
+
+    def to_arviz(self) -> Any:
+        """What is shared as what the installed ArviZ works with: `InferenceData` before its version 1, else `DataTree`.
+
+        Its groups are `posterior`, `log_prior` and `map_estimate`; those of a video are in `video(name).to_arviz()`.
+        """
+        groups = {"posterior": self.shared, "log_prior": self._log_prior(), "map_estimate": self.map_estimate}
+        return for_arviz(xr.DataTree.from_dict(groups))
 
     def write(self, path: Path | str) -> None:
         """Save as one netCDF file that needs nothing else to be read again; an interruption leaves no half file.
@@ -196,27 +205,31 @@ class SharedPosterior:
             "videos": list(self.videos),
         }
 
-    def _named(self, points: Float[np.ndarray, "*batch shared"], axes: tuple[str, ...]) -> xr.Dataset:
-        """Values of the shared quantities by name."""
+    def _log_prior(self) -> xr.Dataset:
+        """Log prior (up to a constant) of each shared number in each draw, by the names of the posterior."""
+        terms = self.numbers.log_priors(self.points.reshape(-1, self.points.shape[-1]))
+        named = self._named(terms.reshape(self.points.shape), ("chain", "draw"))
+        return named.map(lambda values: values.drop_attrs(), keep_attrs=False)
+
+    def _named(self, values: Float[np.ndarray, "*batch shared"], axes: tuple[str, ...]) -> xr.Dataset:
+        """Columns of the shared quantities by name."""
         units = {parameter.name: parameter.unit for parameter in self.model.parameters}
-        keys, entries = self.numbers.keys, self.numbers.entries
+        keys = self.numbers.keys
         variables: dict[str, Any] = {}
         coordinates: dict[str, Any] = {
-            axis: np.arange(size) for axis, size in zip(axes, points.shape[:-1], strict=True)
+            axis: np.arange(size) for axis, size in zip(axes, values.shape[:-1], strict=True)
         }
         for field in dict.fromkeys(field for field, _ in keys):
             places = [place for place, (other, _) in enumerate(keys) if other == field]
-            values = points[..., places]
-            values = np.exp(values) if entries[places[0]].transform is Transform.LOG else values
             attributes: dict[str, Any] = {"units": units.get(field, "1")}
             if field == NOISE and self.numbers.noise_reference is not None:
                 attributes["reference_m"] = self.numbers.noise_reference
             labels = [place_words(keys[place][1]) for place in places]
             if not any(labels):
-                variables[field] = (axes, values[..., 0], attributes)
+                variables[field] = (axes, values[..., places[0]], attributes)
                 continue
             axis, meaning = ("wall", "x1, y1, x2, y2 in m") if field == WALL_RESTITUTION.name else ("material", "")
-            variables[field] = ((*axes, axis), values, attributes)
+            variables[field] = ((*axes, axis), values[..., places], attributes)
             coordinates[axis] = (axis, labels, {"long_name": meaning} if meaning else {})
         return xr.Dataset(variables, coordinates)
 

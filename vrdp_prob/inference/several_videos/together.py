@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -9,9 +10,11 @@ from jaxtyping import Float
 
 from vrdp_prob.errors import InputError
 from vrdp_prob.inference.assembly import posterior_from
+from vrdp_prob.inference.checkpoint import Checkpoint, model_facts, program_facts, videos_facts
 from vrdp_prob.inference.diagnostics import Reported, Statistics
 from vrdp_prob.inference.emcee_sampler import sample_emcee
 from vrdp_prob.inference.infer import check_counts, check_model, default_model
+from vrdp_prob.inference.journal import journal
 from vrdp_prob.inference.map_fit import MapFit
 from vrdp_prob.inference.mode_weights import UNSURE, doubts
 from vrdp_prob.inference.nuts_sampler import sample_nuts
@@ -19,7 +22,7 @@ from vrdp_prob.inference.posterior import Posterior
 from vrdp_prob.inference.proposals import proposals
 from vrdp_prob.inference.rate_steps import RateSteps
 from vrdp_prob.inference.samples import ESS_GOAL, PARETO_K_GOAL, Convergence, ModeWeight, Samples, assess
-from vrdp_prob.inference.several_videos.fitting import SharedFit, fit_together
+from vrdp_prob.inference.several_videos.fitting import SharedFit, check_videos, fit_together
 from vrdp_prob.inference.several_videos.gibbs import sample_gibbs
 from vrdp_prob.inference.several_videos.importance import sample_by_importance
 from vrdp_prob.inference.several_videos.parts import stream
@@ -56,6 +59,7 @@ def infer_together(
     draws: int = 1000,
     model_error: bool = True,
     hand_on: bool = True,
+    checkpoint: Path | str | None = None,
     progress: ProgressDisplay | None = None,
 ) -> SharedPosterior:
     """Infer what several videos share, and each video's motion, masses and restitutions with it.
@@ -80,6 +84,9 @@ def infer_together(
         Whether what the model leaves unexplained in a video is looked for, and widens its part of the density.
     hand_on
         Whether `gibbs` goes on where `laplace` finds that it cannot be trusted.
+    checkpoint
+        Folder that keeps what was done: the fits of the videos, and what the sampler has drawn. A run that was killed
+        and is started again with the same arguments goes on from there and ends with the same numbers.
     progress
         Told how far the work is.
 
@@ -87,14 +94,21 @@ def infer_together(
     ------
     InputError
         If there is no video, two have one name, a name is none that videos can share, a video shows no motion, the
-        model is none, the sampler is unknown, fewer than 4 draws are asked for, the seed is negative, or the videos
-        have no common world.
+        model is none, the sampler is unknown, fewer than 4 draws are asked for, the seed is negative, the videos
+        have no common world, or the checkpoint belongs to another run.
     """
     _check(sampler, draws, seed)
     check_model(model)
+    check_videos(videos)
     physics = default_model() if model is None else model
-    fit = fit_together(videos, model=physics, shared=shared, seed=seed, model_error=model_error, progress=progress)
-    return sample_together(fit, sampler=sampler, seed=seed, draws=draws, hand_on=hand_on, progress=progress)
+    own = None
+    if checkpoint is not None:
+        settings = {"shared": shared, "sampler": sampler, "seed": seed, "draws": draws}
+        settings |= {"model_error": model_error, "hand_on": hand_on}
+        own = Checkpoint(checkpoint, {**videos_facts(videos), **model_facts(physics), **program_facts(**settings)})
+    with journal(own):
+        fit = fit_together(videos, model=physics, shared=shared, seed=seed, model_error=model_error, progress=progress)
+    return _sampled(fit, sampler, seed=seed, draws=draws, hand_on=hand_on, checkpoint=own, progress=progress)
 
 
 def sample_together(
@@ -108,19 +122,34 @@ def sample_together(
 ) -> SharedPosterior:
     """The posterior around a joint fit; parameters as in `infer_together`."""
     _check(sampler, draws, seed)
+    return _sampled(fit, sampler, seed=seed, draws=draws, hand_on=hand_on, checkpoint=None, progress=progress)
+
+
+def _sampled(
+    fit: SharedFit,
+    sampler: str,
+    *,
+    seed: int,
+    draws: int,
+    hand_on: bool,
+    checkpoint: Checkpoint | None,
+    progress: ProgressDisplay | None,
+) -> SharedPosterior:
+    """The posterior around a joint fit, with what its sampler has drawn kept in a checkpoint."""
     generator = np.random.default_rng(seed)
     names = [part.likelihood.tracks.video for part in fit.fits]
     reported = [
         Reported.of(part.likelihood.coordinates, part.contacts, part.likelihood.tracks.bodies) for part in fit.fits
     ]
     if sampler == "gibbs":
-        drawn = _by_gibbs(fit, reported, generator, progress)
+        drawn = _by_gibbs(fit, reported, generator, progress, checkpoint=checkpoint)
     elif sampler in WHOLE:
-        drawn = _by_whole_vector(fit, WHOLE[sampler], reported, draws=draws, generator=generator, progress=progress)
+        options = {"draws": draws, "generator": generator, "progress": progress, "checkpoint": checkpoint}
+        drawn = _by_whole_vector(fit, WHOLE[sampler], reported, **options)
     else:
         drawn = _by_importance(fit, draws, generator, progress)
         if hand_on and (reason := _distrust(drawn.shared, draws)):
-            drawn = _by_gibbs(fit, reported, generator, progress, reason=reason)
+            drawn = _by_gibbs(fit, reported, generator, progress, checkpoint=checkpoint, reason=reason)
     each = {
         name: assess(sampler, samples, shown)
         for name, samples, shown in zip(names, drawn.videos, reported, strict=True)
@@ -156,10 +185,11 @@ def _by_gibbs(
     generator: np.random.Generator,
     progress: ProgressDisplay | None,
     *,
+    checkpoint: Checkpoint | None,
     reason: str | None = None,
 ) -> _Drawn:
     """Draws of chains, which go on for a reason where they were not asked for."""
-    found = sample_gibbs(fit.joint, generator=generator, progress=progress, reported=reported)
+    found = sample_gibbs(fit.joint, generator=generator, progress=progress, reported=reported, checkpoint=checkpoint)
     shape = found.shared.shape
     flat = found.shared.reshape(shape[0] * shape[1], shape[2])
     log_prior = fit.joint.numbers.log_prior(flat).reshape(shape[:2])

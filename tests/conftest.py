@@ -5,11 +5,13 @@ from pathlib import Path
 import pytest
 from hypothesis import settings
 from jaxtyping import install_import_hook
+from shape_checker import check_now_and_then
 
 ROOT = Path(__file__).parents[1]
 MODULES = [".".join(path.relative_to(ROOT).with_suffix("").parts) for path in sorted(ROOT.glob("vrdp_prob/**/*.py"))]
 CHECKED = [name for name in MODULES if not name.endswith(("_kernel", "__init__"))]
 
+check_now_and_then()
 install_import_hook(CHECKED, "shape_checker.check")
 
 # how long an example takes says nothing on a busy machine, and compiles or builds a grammar the first time

@@ -147,6 +147,7 @@ def asked_in(path: Path, video: str, program: list[str]) -> Path:
     return path
 
 
+@pytest.mark.slow
 def test_questions_are_answered_with_both_models(
     videos: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:

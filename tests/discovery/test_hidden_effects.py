@@ -50,6 +50,7 @@ def tilted(tmp_path_factory: pytest.TempPathFactory) -> tuple[Truth, Finding]:
     return finding_of(tmp_path_factory.mktemp("tilted"), ["surface_tilt"], seed=1, catalogue=SMOOTH)
 
 
+@pytest.mark.slow
 def test_a_tilt_is_named_and_left_out_videos_are_predicted_better(tilted: tuple[Truth, Finding]) -> None:
     _, finding = tilted
     assert finding.verdict is Verdict.NAMED

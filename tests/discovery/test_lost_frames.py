@@ -16,6 +16,7 @@ def found() -> tuple[Trial, Trial]:
     return with_cause("clock_error", SIZE, ClockError(), seed=SEED)
 
 
+@pytest.mark.slow
 def test_the_lost_time_is_that_of_the_truth(found: tuple[Trial, Trial]) -> None:
     data, _ = fitted("clock_error", SIZE, seed=SEED)
     base, trial = found

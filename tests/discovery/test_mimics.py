@@ -36,6 +36,7 @@ def search_that_found(cause: Effect, way: str, effect_size: float, setting: Sett
     return Search(base, refitted.continued(), (), (base,), ((),), refits)
 
 
+@pytest.mark.slow
 def test_a_patch_that_follows_the_grain_of_a_table_is_not_named() -> None:
     before = search_that_found(FrictionPatch(), "grain", 8.0, LONGER)
     found, unlisted = without_mimics(before, [UnlistedMotion()], seed=0)

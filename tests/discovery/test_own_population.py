@@ -43,6 +43,7 @@ def test_friction_by_mass_makes_bodies_alike_and_is_worth_it() -> None:
     assert np.median(np.abs(gains(again, base))) < 1.0
 
 
+@pytest.mark.slow
 def test_without_a_cause_bodies_are_believed_to_be_what_the_given_model_says() -> None:
     _, fit = fitted("surface_tilt", 5.0, seed=2)
     tilted = fit.under(fit.model.with_effect(tilt := SurfaceTilt()), model_error=False)

@@ -1,5 +1,7 @@
 """Where a fit has lost its way, single videos tell the cause."""
 
+import pytest
+
 from tests.discovery.fitted import fitted
 from vrdp_prob.discovery.candidates.single_videos import causes_of_lost_videos, lost_videos
 from vrdp_prob.models.effects.clock_error import ClockError
@@ -14,6 +16,7 @@ def test_no_video_of_a_null_is_lost() -> None:
     assert causes_of_lost_videos(fit, [], [SurfaceTilt()], {"surface_tilt"}, 6.0, seed=0) == []
 
 
+@pytest.mark.slow
 def test_friction_of_contacts_is_told_by_the_videos_that_nothing_else_explains() -> None:
     _, fit = fitted("contact_friction", 3.0, seed=1)
     ratios = [part.misfit.ratio for part in fit.fits]

@@ -94,6 +94,7 @@ def without() -> Trial:
     return Trial((), fit.under(with_learned_population(fit), model_error=False))
 
 
+@pytest.mark.slow
 def test_kicks_in_video_after_video_explain_no_slope(without: Trial) -> None:
     kicks = ExternalImpulse()
     (score,) = score_causes(without.fit, without.unexplained.plain, [kicks], seed=0)

@@ -16,7 +16,8 @@ from vrdp_prob.inference.plan import TURNING
 SIX = Setting(videos=6, bodies=3)
 
 
-@pytest.mark.parametrize("seed", [*(pytest.param(seed, marks=pytest.mark.slow) for seed in (7, 10, 11)), 18])
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [7, 10, 11, 18])
 def test_no_video_loses_its_course_among_the_others(seed: int) -> None:
     _, fit = fitted(None, seed=seed, setting=SIX)
     assert fit.joint.converged

@@ -52,7 +52,9 @@ def test_a_mode_that_hardly_a_draw_is_in_forbids_to_trust_the_others(monkeypatch
     assert "Hardly a draw is in mode 2, which holds 0.0" in convergence.sentence
 
 
-@pytest.mark.parametrize("name", SAMPLERS)
+@pytest.mark.parametrize(
+    "name", [pytest.param(one, marks=pytest.mark.slow) if one == "nuts" else one for one in SAMPLERS]
+)
 def test_jumps_reach_a_mode_that_the_fit_did_not_find(name: str) -> None:
     target = TwoModes()
     known = Mixture.of(target.start.components[0])

@@ -127,6 +127,7 @@ def walled(courses: Callable[[torch.Tensor], list[bool]] | None) -> Samples:
     )
 
 
+@pytest.mark.slow
 def test_ends_behind_a_change_of_course_are_told_from_other_divergences_for_which_steps_are_halved() -> None:
     told, alike = walled(Walled.courses), walled(None)
     assert told.divergences == 0

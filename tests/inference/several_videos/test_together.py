@@ -122,7 +122,8 @@ def test_the_whole_vector_has_the_density_of_its_videos_and_its_slope() -> None:
     assert changes == pytest.approx(along @ slopes[0], rel=1e-3, abs=1e-7)
 
 
-@pytest.mark.parametrize("sampler", ["emcee", pytest.param("nuts", marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("sampler", ["emcee", "nuts"])
 def test_samplers_of_one_video_agree_with_gibbs_on_two(sampler: str) -> None:
     fit = fit_together([sliding(1), sliding(2)], model=BASE)
     ours, theirs = (sample_together(fit, sampler=name, draws=800) for name in (sampler, "gibbs"))

@@ -19,7 +19,8 @@ def injected(tracks: Tracks, way: str, strength: float) -> Tracks:
     Parameters
     ----------
     tracks
-        What was seen; for all but `lens_distortion` of bodies that meet nothing, in all frames.
+        What was seen, in all frames. A drag asks for bodies that meet nothing. A slope may act on bodies that meet: all
+        fall alike, and contacts see differences only; friction that follows the velocity would make it inexact.
     way
         A key of `WAYS`.
     strength

@@ -74,7 +74,7 @@ def check(title: str, value: float | str | None, goal: float | str, *, met: bool
 
 def samplers(videos: Sequence[Tracks], names: Sequence[str]) -> list[Check]:
     """Run every sampler from the same modes."""
-    results: dict[str, list[tuple[float, float]]] = {key: [] for key in names}
+    results: dict[str, list[tuple[float, float, bool]]] = {key: [] for key in names}
     print("video        unknowns  sampler  cpu s  ESS bulk  tail  ESS/s  densities  gradients  converged")
     for tracks in videos:
         fit = fit_map(tracks, default_model(), np.random.default_rng(0))
@@ -85,7 +85,7 @@ def samplers(videos: Sequence[Tracks], names: Sequence[str]) -> list[Check]:
             seconds = processor_seconds() - begin
             convergence = assess(key, samples, reported)
             bulk, tail = convergence.ess_bulk or 0.0, convergence.ess_tail or 0.0
-            results[key].append((seconds, min(bulk, tail) / seconds))
+            results[key].append((seconds, min(bulk, tail) / seconds, convergence.converged))
             handed = "" if convergence.sampler == key else f", by {convergence.sampler}"
             print(
                 f"{tracks.video}  {len(fit.point):8d}  {key:7s}  {seconds:5.1f}  {bulk:8.0f}  {tail:4.0f}  "
@@ -96,11 +96,13 @@ def samplers(videos: Sequence[Tracks], names: Sequence[str]) -> list[Check]:
     return _sampler_checks(results)
 
 
-def _sampler_checks(results: dict[str, list[tuple[float, float]]]) -> list[Check]:
+def _sampler_checks(results: dict[str, list[tuple[float, float, bool]]]) -> list[Check]:
     checks, rates = [], {}
     for key, values in ((key, values) for key, values in results.items() if values):
-        seconds, rate = (float(np.median(column)) for column in zip(*values, strict=True))
+        seconds, rate = (float(np.median(column)) for column in list(zip(*values, strict=True))[:2])
+        converged = float(np.mean([one for *_, one in values]))
         checks.append(check(f"{key}: processor seconds, median", seconds, GOALS[key], met=seconds <= GOALS[key]))
+        checks.append(check(f"{key}: share of videos converged", converged, 1.0, met=converged == 1.0))
         if key != "laplace":
             rates[key] = rate
     if rates:

@@ -63,6 +63,7 @@ TASKS = (
     Task(GLIDERS),
     Task(GLIDERS, "lens_distortion", 0.1),
     Task(GLIDERS, first=8),
+    Task(GLIDERS, "surface_tilt", 0.003, first=8),
     Task(PUCKS, first=8),
     Task(PUCKS, "surface_tilt", 0.003, first=8),
     Task(PUCKS),
@@ -124,7 +125,8 @@ def _summary(finding: Finding) -> Result:
 
 def _findings(results: Sequence[Result], tasks: Mapping[str, Task]) -> list[str]:
     """What was found in the tracks as they are."""
-    head = ("set", "videos", "verdict", "causes", "gain, nats", "error, mm", "one second ahead", "noise, mm", "CPU min")
+    head: tuple[str, ...] = ("set", "videos", "verdict", "causes", "gain, nats", "error, mm", "one second ahead")
+    head += ("90 % hold", "noise, mm", "checks that fail", "CPU min", "commit")
     lines = [table_row(*head), table_row(*["---"] * len(head))]
     return lines + [table_row(*_row(result)) for result in results if tasks[result["name"]].way is None]
 
@@ -139,7 +141,23 @@ def _row(result: Result) -> list[str]:
         ", ".join(f"{_mm(one['before'][key])} → {_mm(one['after'][key])}" for one in gains) or "-"
         for key in ("rmse", "rmse_one_second")
     ]
-    return [*cells, _mm(gains[0]["noise_sd"]) if gains else "-", f"{result['seconds'] / 60:.0f}"]
+    cells.append(", ".join(_covered(one) for one in gains) or "-")
+    noise = _mm(gains[0]["noise_sd"]) if gains else "-"
+    return [*cells, noise, _failing(result), f"{result['seconds'] / 60:.0f}", f"`{result['version']}`"]
+
+
+def _covered(gain: Result) -> str:
+    """Share of the positions of left-out videos within 90 % of what is predicted, without and with a cause."""
+    return " → ".join(f"{100 * gain[when]['coverage_90']:.0f} %" for when in ("before", "after"))
+
+
+def _failing(result: Result) -> str:
+    """Checks that fail under the model that was given and under the extended one, of so many."""
+    before, after = (
+        sum(check["significant"] for check in result[when] or ()) for when in ("evidence", "evidence_after")
+    )
+    extended = f" → {after}" if result["evidence_after"] else ""
+    return f"{before}{extended} of {len(result['evidence'])}"
 
 
 def _mm(value: float | None) -> str:
@@ -148,7 +166,8 @@ def _mm(value: float | None) -> str:
 
 def _recovered(results: Sequence[Result], tasks: Mapping[str, Task]) -> list[str]:
     """What became of the effects that were added."""
-    head = ("set", "added", "strength", "verdict", "its probability", "found (95 %)", "inside", "named beside it")
+    head: tuple[str, ...] = ("set", "added", "strength", "verdict", "its probability", "found (95 %)", "inside")
+    head += ("gain, nats", "checks that fail", "named beside it", "commit")
     lines = ["", table_row(*head), table_row(*["---"] * len(head))]
     for result in results:
         task = tasks[result["name"]]
@@ -158,13 +177,16 @@ def _recovered(results: Sequence[Result], tasks: Mapping[str, Task]) -> list[str
         others = [one["name"] for one in result["causes"] if one["named"] and one["name"] != task.way]
         cells = [f"`{result['name'].partition('+')[0]}`", f"`{task.way}`", f"{task.strength:g}", result["verdict"]]
         if cause is None:
-            cells += ["-", "-", "-"]
+            cells += ["-", "-", "-", "-"]
         else:
             found = cause["parameters"][TRUE_PARAMETER[task.way]]
             inside = "yes" if found["q025"] <= task.strength <= found["q975"] else "**no**"
             interval = f"{found['mean']:.3g} ({found['q025']:.3g} to {found['q975']:.3g})"
-            cells += [f"{cause['probability']:.2f}", interval, inside]
-        lines.append(table_row(*cells, ", ".join(f"`{one}`" for one in others) or "-"))
+            gain = cause["held_out_gain"]
+            told = f"{gain['elpd_difference']:.0f} ± {gain['elpd_se']:.0f}"
+            cells += [f"{cause['probability']:.2f}", interval, inside, told]
+        beside = ", ".join(f"`{one}`" for one in others) or "-"
+        lines.append(table_row(*cells, _failing(result), beside, f"`{result['version']}`"))
     return lines
 
 

@@ -55,8 +55,11 @@ def tables(results: Sequence[Result]) -> str:
 
 
 def _summary(results: Sequence[Result]) -> str:
-    rows = [(one["name"], _figure(one["value"]), _figure(one["goal"]), _met(one)) for one in checks(results)]
-    return _table(("", "measured", "goal", "met"), rows)
+    rows = [
+        (one["name"], _figure(one["value"]), one.get("counts", "-"), _figure(one["goal"]), _met(one))
+        for one in checks(results)
+    ]
+    return _table(("", "measured", "counts (95 %)", "goal", "met"), rows)
 
 
 def _met(check: Result) -> str:

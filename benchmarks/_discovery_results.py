@@ -145,29 +145,38 @@ def checks(results: Sequence[Result]) -> list[dict[str, Any]]:
     values = [estimate for mine in intervals(results).values() for estimate in mine]
     removed = between(of(results, Kind.REMOVED), 3.0, np.inf)
     entries = [
-        _at_least("recall from 3 noise sd", Share(strong, hit).value, STRONG_RECALL),
-        _at_least("recall from 1.5 to 3 noise sd", Share(weak, hit).value, WEAK_RECALL),
-        _at_most("false alarms", Share(nulls, alarm).value, FALSE_ALARMS),
+        _at_least("recall from 3 noise sd", Share(strong, hit), STRONG_RECALL),
+        _at_least("recall from 1.5 to 3 noise sd", Share(weak, hit), WEAK_RECALL),
+        _at_most("false alarms", Share(nulls, alarm), FALSE_ALARMS),
         _at_least("nulls", len(nulls), FEWEST_NULLS),
-        _at_least("two causes, both named", Share(of(results, Kind.TWO), hit).value, BOTH),
+        _at_least("two causes, both named", Share(of(results, Kind.TWO), hit), BOTH),
         _at_most(
             "outside the catalogue or taken out of it, called a cause of it with probability > 0.9",
-            Share(of(results, Kind.OUTSIDE, Kind.REMOVED), sure).value,
+            Share(of(results, Kind.OUTSIDE, Kind.REMOVED), sure),
             0.0,
         ),
-        _at_least("removed from the catalogue, from 3 noise sd, verdict unknown", Share(removed, unknown).value, 1.0),
+        _at_least("removed from the catalogue, from 3 noise sd, verdict unknown", Share(removed, unknown), 1.0),
     ]
     if values:
         inside = Share(values, covered)
         low, high = inside.interval
-        coverage = {"name": "95 % intervals that hold the truth, within binomial error", "value": inside.value}
+        coverage = _measured("95 % intervals that hold the truth, within binomial error", inside)
         entries.append({**coverage, "goal": CERTAIN, "ok": low <= CERTAIN <= high})
     return [*entries, _at_most("data sets on which discovery failed", sum("exception" in one for one in results), 0)]
 
 
-def _at_least(name: str, value: float | None, goal: float) -> dict[str, Any]:
-    return {"name": name, "value": value, "goal": goal, "ok": value is not None and value >= goal}
+def _at_least(name: str, figure: Share | float, goal: float) -> dict[str, Any]:
+    entry = _measured(name, figure)
+    return {**entry, "goal": goal, "ok": entry["value"] is not None and entry["value"] >= goal}
 
 
-def _at_most(name: str, value: float | None, goal: float) -> dict[str, Any]:
-    return {"name": name, "value": value, "goal": goal, "ok": value is not None and value <= goal}
+def _at_most(name: str, figure: Share | float, goal: float) -> dict[str, Any]:
+    entry = _measured(name, figure)
+    return {**entry, "goal": goal, "ok": entry["value"] is not None and entry["value"] <= goal}
+
+
+def _measured(name: str, figure: Share | float) -> dict[str, Any]:
+    """A figure by its name; of a share also the counts, with their 95 % interval."""
+    if isinstance(figure, Share):
+        return {"name": name, "value": figure.value, "counts": str(figure)}
+    return {"name": name, "value": figure}

@@ -135,6 +135,7 @@ def test_a_scan_pays_for_looking_everywhere() -> None:
     assert one.p_value > 2 * float(chi2.sf(one.chi_square, one.degrees))
 
 
+@pytest.mark.slow
 def test_a_kick_is_found_in_its_video_at_its_body_and_time() -> None:
     data, fit = fitted("external_impulse", seed=2)
     number, (body, time) = next(

@@ -47,7 +47,7 @@ def test_a_null_leaves_nothing_significant() -> None:
     assert all(np.isfinite([check.p_value, check.statistic]).all() for check in checks)
 
 
-@pytest.mark.parametrize("resistance", [0.0, 0.02])
+@pytest.mark.parametrize("resistance", [0.0, pytest.param(0.02, marks=pytest.mark.slow)])
 def test_a_table_that_hardly_brakes_is_no_misfit(resistance: float) -> None:
     """Friction and drag are far from what is believed of them beforehand, which is no error of the model."""
     _, fit = fitted(seed=1, setting=Setting(videos=6, bodies=1, frames=40, resistance=resistance))

@@ -74,6 +74,7 @@ def test_checks_and_causes_go_by_their_names(trial: Trial) -> None:
     assert names >= {name for name in own if "friction of the bodies" not in name and AT_WALLS not in name}
 
 
+@pytest.mark.slow
 def test_a_doubted_cause_is_told_of_and_not_part_of_the_extended_model(monkeypatch: pytest.MonkeyPatch) -> None:
     data, _ = fitted("surface_tilt", 5.0, seed=2, setting=SMALL)
     described: list[SharedFit] = []

@@ -28,6 +28,7 @@ def kicked() -> Trial:
     return found
 
 
+@pytest.mark.slow
 def test_a_disc_is_guessed_where_it_touches_the_hidden_one(kicked: Trial) -> None:
     data, _ = fitted(WAY, 20.0, seed=SEED)
     disc = data.truth.videos[0].hidden_discs[0]

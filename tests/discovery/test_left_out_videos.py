@@ -22,6 +22,7 @@ from vrdp_prob.models.effects.surface_tilt import SurfaceTilt
 from vrdp_prob.scene import Tracks
 
 
+@pytest.mark.slow
 def test_a_video_is_as_probable_as_the_evidence_with_it_over_that_without_it() -> None:
     data, fit = fitted(seed=2)
     others = fit_together(data.tracks[1:], model=fit.model, model_error=False)
@@ -139,6 +140,7 @@ def test_a_video_is_searched_beside_others_that_have_followed_what_they_agree_on
     assert (handed[1].point == strayed.joint.point(1)).all()
 
 
+@pytest.mark.slow
 def test_gains_are_divided_by_the_overdispersion_of_each_video() -> None:
     _, fit = fitted("surface_tilt", 3.0, seed=2)
     score = score_causes(fit, ResidualModel.of(fit), [SurfaceTilt()], seed=0)[0]

@@ -47,6 +47,7 @@ def test_a_patch_that_follows_the_grain_of_a_table_is_not_named() -> None:
     assert found.lesser == found.rivals == ()
 
 
+@pytest.mark.slow
 def test_a_tilt_that_acts_stays_and_leaves_nothing_to_a_law_outside_the_catalogue() -> None:
     before = search_that_found(SurfaceTilt(), "surface_tilt", 5.0, SMALL)
     found, unlisted = without_mimics(before, [UnlistedMotion()], seed=0)

@@ -11,7 +11,7 @@ from vrdp_prob.inference.several_videos.population import with_learned_populatio
 from vrdp_prob.models.parameters import AIR_DRAG, MASS, RESTITUTION
 
 
-@pytest.mark.parametrize("spread", [0.05, 0.3])
+@pytest.mark.parametrize("spread", [0.05, pytest.param(0.3, marks=pytest.mark.slow)])
 def test_the_spread_of_friction_is_that_of_the_bodies(spread: float) -> None:
     data, fit = fitted(seed=1, setting=Setting(videos=5, bodies=3, friction_spread=spread))
     learned = with_learned_population(fit).beliefs["friction_ratio"].prior.sd

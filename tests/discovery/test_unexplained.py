@@ -104,6 +104,7 @@ def test_kicks_in_video_after_video_explain_no_slope(without: Trial) -> None:
     assert kicked.patches(kicks)
 
 
+@pytest.mark.slow
 def test_a_cause_stands_out_and_leaves_nothing(without: Trial) -> None:
     tilt = SurfaceTilt()
     fit = without.fit.under(without.fit.model.with_effect(tilt), model_error=False)

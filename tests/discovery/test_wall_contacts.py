@@ -79,6 +79,7 @@ def checked(model: ResidualModel, generator: np.random.Generator | None = None) 
     return by_name(tuple(contact_checks(model, flight, replicas)))
 
 
+@pytest.mark.slow
 def test_what_discs_leave_at_walls_is_noise_where_nothing_is_wrong() -> None:
     _, model = bouncing()
     assert sum(len(FittedContacts.of(video.motion, RolloutEventKind.WALL)) for video in model.videos) >= 6

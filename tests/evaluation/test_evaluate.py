@@ -96,6 +96,7 @@ if __name__ == "__main__":
 """
 
 
+@pytest.mark.slow
 def test_a_killed_evaluation_goes_on(folder: Path, tmp_path: Path) -> None:
     script = tmp_path / "command.py"
     script.write_text(COMMAND)

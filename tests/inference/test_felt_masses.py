@@ -6,6 +6,7 @@ import pytest
 from tests.inference.repelling_discs import MASSES, inferred
 from vrdp_prob.inference import assembly
 from vrdp_prob.inference.identifiability import BodyStatus, ParameterStatus, Status
+from vrdp_prob.inference.identified import Identified
 from vrdp_prob.inference.posterior import Posterior
 
 
@@ -28,10 +29,11 @@ def test_only_the_restitution_of_bodies_that_never_collide_is_called_a_default(p
     assert told == ["Objects a, b, c never collide in view: restitution is a default value, not measured."]
 
 
+@pytest.mark.slow
 def test_a_mass_that_is_drawn_though_nothing_tells_it_is_not_called_a_default(monkeypatch: pytest.MonkeyPatch) -> None:
     nothing = ParameterStatus(Status.DEFAULT)
     told = dict(zip("abc", [BodyStatus(nothing, nothing)] * 3, strict=True))
-    monkeypatch.setattr(assembly, "identifiability", lambda *_given: told)
+    monkeypatch.setattr(assembly, "identified", lambda _fit: Identified(told, ()))
     assert inferred().warnings[-2:] == (
         "Objects a, b never collide in view: mass is drawn from the prior and restitution is a default value, not "
         "measured.",

@@ -14,6 +14,7 @@ SCENES, MANY, FIRST = 40, 300, 20_000
 FALSE_ALARM = 1e-3
 
 
+@pytest.mark.slow
 def test_its_errors_are_standard_normal_over_scenes() -> None:
     chosen = [_one_of(scene, "position", "velocity") for scene in _scenes(SCENES)]
     low, high = chi2.ppf([FALSE_ALARM / 2, 1 - FALSE_ALARM / 2], SCENES)

@@ -31,6 +31,7 @@ def test_outliers_neither_hide_a_wrong_course_nor_count_as_one(seed: int) -> Non
     assert judge(fit.likelihood, astray, fit.clues).ratio > 3
 
 
+@pytest.mark.slow
 def test_a_push_that_no_model_knows_shows_among_outliers() -> None:
     tracks = observe(chain(), noise=0.005, seed=4)
     positions = tracks.positions.copy()

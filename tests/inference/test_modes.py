@@ -32,6 +32,7 @@ def test_two_modes_get_the_weights_that_they_have(name: str) -> None:
     assert convergence.converged or name == "nuts", convergence.sentence
 
 
+@pytest.mark.slow
 def test_a_small_mode_that_chains_of_nuts_leave_and_enter_keeps_its_share() -> None:
     target = SmallNeighbour()
     generator = np.random.default_rng(1)

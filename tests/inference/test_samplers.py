@@ -43,6 +43,7 @@ class SkewedRidge:
         return Mixture.of(CurvedGaussian.straight(Gaussian(np.zeros(DIMENSION), self.root * scales)))
 
 
+@pytest.mark.slow
 def test_walkers_that_cannot_move_leave_draws_that_are_not_trusted() -> None:
     samples = sample_laplace(Needle(), Needle().start, draws=400, generator=np.random.default_rng(0))
     assert np.isfinite(samples.points).all()

@@ -37,6 +37,7 @@ def test_a_fit_finds_that_a_slope_and_not_friction_has_stopped_a_body() -> None:
     assert fit.misfit.ratio < 1.1
 
 
+@pytest.mark.slow
 def test_videos_that_know_nothing_of_the_turn_do_not_outvote_the_one_that_shows_it() -> None:
     videos = [uphill(0.28, 3.0), uphill(0.13, 6.0), uphill(0.22, 3.0), uphill(0.6, 1.5)]
     fit = fit_together(videos, model=TILTED, model_error=False)

@@ -57,6 +57,7 @@ def test_emcee_tells_the_mass_ratio() -> None:
     assert posterior.draw_count >= 200
 
 
+@pytest.mark.slow
 def test_nuts_agrees_with_emcee() -> None:
     fit = fit_map(tracks(), default_model(), np.random.default_rng(0))
     reported = Reported.of(fit.likelihood.coordinates, fit.contacts, tracks().bodies)

@@ -39,6 +39,7 @@ def test_an_answer_near_one_half_takes_more_draws_than_a_sure_one() -> None:
     assert 550 <= used[OPEN] <= 650
 
 
+@pytest.mark.slow
 def test_repeated_runs_scatter_by_the_stated_error() -> None:
     goal = 0.05
     found = np.array(

@@ -40,6 +40,7 @@ def test_the_grammar_reads_its_own_wording_of_every_question(production: str) ->
         assert bare or parse_question(wording) == program
 
 
+@pytest.mark.slow
 def test_the_practice_set_comes_back_in_the_grammars_words(shared_data: Path) -> None:
     wrong = []
     for questions in read_questions(shared_data / "clevrer_bullet" / "questions.json").values():

@@ -27,6 +27,7 @@ ROW = (Disc((-1.5, 0.0), (0.85, 0.0)), Disc((0.0, 0.05)), Disc((0.9, 0.15)), Dis
 """Disc 0 stops just before disc 1; faster it hits it, which hits 2."""
 
 
+@pytest.mark.slow
 def test_one_telling_question() -> None:
     learned = learn_concept("faster", [example_of("faster", faster, ROW[:3])], draws=10)
     before, after = 0.2, learned.probabilities

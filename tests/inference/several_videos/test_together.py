@@ -181,6 +181,7 @@ def test_what_is_reported_of_each_video_is_judged() -> None:
     assert own.worst.startswith("the ")
 
 
+@pytest.mark.slow
 def test_a_mass_ratio_that_is_not_known_well_enough_keeps_chains_going(monkeypatch: pytest.MonkeyPatch) -> None:
     asked: list[Reported] = []
 
@@ -196,6 +197,7 @@ def test_a_mass_ratio_that_is_not_known_well_enough_keeps_chains_going(monkeypat
     assert draws.notes == ("It stopped after 32 sweeps.",)
 
 
+@pytest.mark.slow
 def test_gibbs_goes_on_where_weights_cannot_be_trusted(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(together, "PARETO_K_GOAL", -np.inf)
     monkeypatch.setattr(together, "sample_gibbs", partial(sample_gibbs, rounds=1))
@@ -240,6 +242,7 @@ def test_noise_is_shared_in_metres_where_bodies_differ_in_size() -> None:
     assert sizes[0] == pytest.approx(NOISE, rel=0.25)
 
 
+@pytest.mark.slow
 def test_what_is_not_shared_stays_each_video_s_own() -> None:
     fit = fit_together([sliding(1), sliding(2, noise=0.02)], model=BASE, shared=["air_drag"])
     assert fit.joint.numbers.names == ("air_drag",)

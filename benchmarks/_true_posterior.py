@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import torch
 
-from vrdp_prob.inference.identifiability import BodyStatus, ParameterStatus, Status
-from vrdp_prob.inference.samples import Convergence
+from vrdp_prob.inference.draws.samples import Convergence
+from vrdp_prob.inference.identifiability.status import BodyStatus, ParameterStatus, Status
 from vrdp_prob.models.physics import PhysicsModel
 from vrdp_prob.models.simulator.worlds import Worlds
 from vrdp_prob.scene import Shape, Tracks

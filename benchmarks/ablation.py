@@ -27,9 +27,9 @@ from vrdp_prob.datasets import load, read_questions
 from vrdp_prob.evaluation.judgement import judge
 from vrdp_prob.inference import Posterior, default_model
 from vrdp_prob.inference.assembly import posterior_from
+from vrdp_prob.inference.draws.samples import Convergence, Samples
 from vrdp_prob.inference.map_fit import MapFit, fit_map
-from vrdp_prob.inference.plan import FitPlan
-from vrdp_prob.inference.samples import Convergence, Samples
+from vrdp_prob.inference.search.plan import FitPlan
 from vrdp_prob.models.simulator.rollout import simulate
 from vrdp_prob.models.simulator.worlds import Worlds
 from vrdp_prob.reasoning import PosteriorWorlds

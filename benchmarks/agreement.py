@@ -30,10 +30,10 @@ from arviz_stats.base.array import array_stats
 from tests.inference.prior_scenes import prior_scene
 from vrdp_prob.errors import InputError
 from vrdp_prob.inference import default_model
-from vrdp_prob.inference.diagnostics import Reported
+from vrdp_prob.inference.draws.diagnostics import Reported
+from vrdp_prob.inference.draws.samples import Samples, assess
 from vrdp_prob.inference.infer import sampled
 from vrdp_prob.inference.map_fit import fit_map
-from vrdp_prob.inference.samples import Samples, assess
 from vrdp_prob.models.simulator.rollout import compile_model
 
 SAMPLERS = {"laplace": 8000, "nuts": 1000, "emcee": 1000}

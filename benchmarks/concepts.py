@@ -21,7 +21,7 @@ from vrdp_prob.concepts.perceived.concepts import Concepts
 from vrdp_prob.concepts.perceived.from_files import facts, films, look_at
 from vrdp_prob.concepts.perceived.learning import learn
 from vrdp_prob.datasets import read_questions
-from vrdp_prob.inference.checkpoint import Checkpoint
+from vrdp_prob.inference.runs.checkpoint import Checkpoint
 from vrdp_prob.perception import see_video
 from vrdp_prob.progress import progress_display
 from vrdp_prob.scene import Camera, QuestionType

@@ -25,7 +25,7 @@ from tests.discovery.scenes import Setting
 from vrdp_prob.discovery.discover import discover
 from vrdp_prob.files import write_atomically
 from vrdp_prob.inference import default_model
-from vrdp_prob.inference.parallel import several_processes
+from vrdp_prob.inference.runs.parallel import several_processes
 from vrdp_prob.inference.several_videos.fitting import fit_together
 from vrdp_prob.models.simulator.rollout import compile_model
 

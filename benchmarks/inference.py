@@ -26,13 +26,13 @@ from _fixed_step_posterior import FixedStepPosterior
 from tests.inference.generator import observe, random_scene
 from vrdp_prob.datasets import load_all
 from vrdp_prob.inference import SAMPLERS, default_model
-from vrdp_prob.inference.diagnostics import Reported
+from vrdp_prob.inference.draws.diagnostics import Reported
+from vrdp_prob.inference.draws.samples import ESS_GOAL, assess
 from vrdp_prob.inference.infer import sampled
 from vrdp_prob.inference.map_fit import fit_map
-from vrdp_prob.inference.nuts_chain import Task, make
-from vrdp_prob.inference.proposals import proposals
-from vrdp_prob.inference.samples import ESS_GOAL, assess
-from vrdp_prob.inference.straightening import Rates
+from vrdp_prob.inference.samplers.nuts_chain import Task, make
+from vrdp_prob.inference.samplers.proposals import proposals
+from vrdp_prob.inference.samplers.straightening import Rates
 from vrdp_prob.models.physics import PhysicsModel
 from vrdp_prob.models.simulator.rollout import compile_model
 from vrdp_prob.scene import Tracks

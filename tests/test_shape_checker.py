@@ -6,7 +6,7 @@ import pytest
 from jaxtyping import Float, TypeCheckError
 from shape_checker import ALWAYS, SOMETIMES, check
 
-from vrdp_prob.inference.samples import Gaussian
+from vrdp_prob.inference.draws.samples import Gaussian
 
 
 def test_arrays_of_other_shapes_are_refused_by_the_package() -> None:

@@ -11,7 +11,7 @@ from command_line import refused
 from vrdp_prob import cli
 from vrdp_prob.concepts.perceived.from_files import facts, films
 from vrdp_prob.concepts.perceived.storage import read_concepts
-from vrdp_prob.inference.checkpoint import Checkpoint
+from vrdp_prob.inference.runs.checkpoint import Checkpoint
 
 COUNT = {"question_id": 0, "question": "How many collisions happen?", "answer": "1"}
 

@@ -13,7 +13,7 @@ from vrdp_prob.discovery.discover import discover
 from vrdp_prob.discovery.finding import Finding
 from vrdp_prob.discovery.page.document import to_document
 from vrdp_prob.errors import InputError
-from vrdp_prob.inference.journal import Step
+from vrdp_prob.inference.runs.journal import Step
 from vrdp_prob.models.model_file import known_effects
 from vrdp_prob.scene import Tracks
 

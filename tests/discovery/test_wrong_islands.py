@@ -11,7 +11,7 @@ from tests.discovery.hidden import hide
 from tests.discovery.scenes import Setting
 from vrdp_prob.inference import default_model
 from vrdp_prob.inference.map_fit import fit_map
-from vrdp_prob.inference.plan import TURNING
+from vrdp_prob.inference.search.plan import TURNING
 
 SIX = Setting(videos=6, bodies=3)
 

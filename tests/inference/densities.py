@@ -6,9 +6,9 @@ import numpy as np
 import torch
 from scipy.stats import norm
 
-from vrdp_prob.inference.curved_gaussian import CurvedGaussian
-from vrdp_prob.inference.mixture import Mixture
-from vrdp_prob.inference.samples import Gaussian
+from vrdp_prob.inference.draws.samples import Gaussian
+from vrdp_prob.inference.samplers.curved_gaussian import CurvedGaussian
+from vrdp_prob.inference.samplers.mixture import Mixture
 
 FAR = 20.0
 """Distance between two modes in standard deviations of the narrow one."""

@@ -13,9 +13,9 @@ import numpy as np
 import torch
 
 from tests.inference.random_scenes import Truth
-from vrdp_prob.inference.events import first_contacts
 from vrdp_prob.inference.map_fit import MapFit
-from vrdp_prob.inference.noise_fit import best_noise
+from vrdp_prob.inference.search.events import first_contacts
+from vrdp_prob.inference.search.noise_fit import best_noise
 from vrdp_prob.models.likelihood import Likelihood
 from vrdp_prob.models.unknowns import Structure, unknowns
 from vrdp_prob.scene import Shape

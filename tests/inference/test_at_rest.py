@@ -6,8 +6,8 @@ import pytest
 from tests.inference.generator import Scene, observe
 from tests.inference.prior_scenes import prior_scene
 from vrdp_prob.inference import default_model, infer
-from vrdp_prob.inference.clues import Clues
 from vrdp_prob.inference.map_fit import MapFit, fit_map
+from vrdp_prob.inference.search.clues import Clues
 from vrdp_prob.scene import Shape, Tracks
 
 HIT = 0.1

@@ -12,12 +12,12 @@ import pytest
 
 from tests.inference.densities import TwoModes
 from vrdp_prob.errors import InputError
-from vrdp_prob.inference.checkpoint import Checkpoint, fingerprint
+from vrdp_prob.inference.draws.samples import Samples
 from vrdp_prob.inference.emcee_sampler import sample_emcee
 from vrdp_prob.inference.infer import default_model, infer
 from vrdp_prob.inference.nuts_sampler import sample_nuts
-from vrdp_prob.inference.plan import CURRICULUM
-from vrdp_prob.inference.samples import Samples
+from vrdp_prob.inference.runs.checkpoint import Checkpoint, fingerprint
+from vrdp_prob.inference.search.plan import CURRICULUM
 from vrdp_prob.scene import Body, Shape, Tracks
 
 FACTS = {"seed": "3"}

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from vrdp_prob.inference.clues import Clues
+from vrdp_prob.inference.search.clues import Clues
 from vrdp_prob.scene import Body, Shape, Tracks
 
 NOISE = 0.01

@@ -8,13 +8,13 @@ import torch
 
 from tests.inference.generator import Scene, observe
 from vrdp_prob.inference import default_model
-from vrdp_prob.inference.contact_ridges import ContactRidge, contact_ridges
-from vrdp_prob.inference.curved_gaussian import CurvedGaussian, SeveralClouds
-from vrdp_prob.inference.importance import Weighted, effective_count, smoothed_weights
+from vrdp_prob.inference.draws.samples import Gaussian
 from vrdp_prob.inference.map_fit import MapFit, fit_map
-from vrdp_prob.inference.proposals import proposals
-from vrdp_prob.inference.samples import Gaussian
-from vrdp_prob.inference.straightening import Rates
+from vrdp_prob.inference.samplers.contact_ridges import ContactRidge, contact_ridges
+from vrdp_prob.inference.samplers.curved_gaussian import CurvedGaussian, SeveralClouds
+from vrdp_prob.inference.samplers.importance import Weighted, effective_count, smoothed_weights
+from vrdp_prob.inference.samplers.proposals import proposals
+from vrdp_prob.inference.samplers.straightening import Rates
 from vrdp_prob.scene import Shape
 
 CONTACT = 0.05

@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 import torch
 
-from vrdp_prob.inference.curved_gaussian import CurvedGaussian
-from vrdp_prob.inference.samples import Gaussian
+from vrdp_prob.inference.draws.samples import Gaussian
+from vrdp_prob.inference.samplers.curved_gaussian import CurvedGaussian
 
 WIDTH, CURVATURE = 0.05, 0.8
 STRAIGHT = Gaussian(np.zeros(3), np.diag([1.0, WIDTH, 2.0]))

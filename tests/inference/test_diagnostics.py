@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from vrdp_prob.inference.diagnostics import (
+from vrdp_prob.inference.draws.diagnostics import (
     Reported,
     chain_statistics,
     drift,
@@ -11,9 +11,9 @@ from vrdp_prob.inference.diagnostics import (
     share_with_error,
     weighted_statistics,
 )
+from vrdp_prob.inference.draws.samples import ESS_GOAL, R_HAT_GOAL, Samples, assess
 from vrdp_prob.inference.emcee_sampler import PER_WALKER
 from vrdp_prob.inference.infer import default_model
-from vrdp_prob.inference.samples import ESS_GOAL, R_HAT_GOAL, Samples, assess
 from vrdp_prob.models.unknowns import Structure, unknowns
 from vrdp_prob.scene import Body, Shape, Tracks
 

@@ -5,7 +5,7 @@ import pytest
 
 from tests.inference.repelling_discs import MASSES, inferred
 from vrdp_prob.inference import assembly
-from vrdp_prob.inference.identifiability import BodyStatus, ParameterStatus, Status
+from vrdp_prob.inference.identifiability.status import BodyStatus, ParameterStatus, Status
 from vrdp_prob.inference.identified import Identified
 from vrdp_prob.inference.posterior import Posterior
 

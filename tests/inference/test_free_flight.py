@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from tests.inference.generator import Scene, observe
-from vrdp_prob.inference.free_flight import release_fit, seen_contacts
+from vrdp_prob.inference.search.free_flight import release_fit, seen_contacts
 from vrdp_prob.models.roughness import noise_scale
 from vrdp_prob.scene import Shape
 

@@ -2,7 +2,7 @@ import emcee
 import numpy as np
 import pytest
 
-from vrdp_prob.inference.hamiltonian_move import ACCEPTANCE, FARTHEST, HamiltonianMove
+from vrdp_prob.inference.samplers.hamiltonian_move import ACCEPTANCE, FARTHEST, HamiltonianMove
 
 SCALES = np.array([0.5, 1.0, 2.0])
 WALKERS, WARM_UP, STEPS = 40, 40, 300

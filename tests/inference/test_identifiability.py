@@ -1,10 +1,10 @@
 import numpy as np
 import pytest
 
-from vrdp_prob.inference.identifiability import BodyStatus, Status, collision_groups, uninformed
-from vrdp_prob.inference.identifiability import identifiability as identifiability_of
-from vrdp_prob.inference.information import Information
-from vrdp_prob.inference.mode import Mode
+from vrdp_prob.inference.draws.mode import Mode
+from vrdp_prob.inference.identifiability.information import Information
+from vrdp_prob.inference.identifiability.status import BodyStatus, Status, collision_groups, uninformed
+from vrdp_prob.inference.identifiability.status import identifiability as identifiability_of
 from vrdp_prob.models.coordinates import Coordinates
 from vrdp_prob.models.physics import PhysicsModel
 from vrdp_prob.models.unknowns import Structure, unknowns

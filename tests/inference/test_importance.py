@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from scipy.stats import norm
 
-from vrdp_prob.inference.importance import effective_count, flattened, resampled, smoothed_weights
+from vrdp_prob.inference.samplers.importance import effective_count, flattened, resampled, smoothed_weights
 
 
 def test_importance_weights_tell_a_good_proposal_from_a_bad_one() -> None:

@@ -10,7 +10,7 @@ import torch
 
 from tests.discovery.hidden import hide
 from tests.discovery.scenes import Setting
-from vrdp_prob.inference.journal import _digest
+from vrdp_prob.inference.runs.journal import _digest
 from vrdp_prob.models.effects.bowl import Bowl
 from vrdp_prob.models.effects.wind import Wind
 from vrdp_prob.models.physics import PhysicsModel

@@ -6,7 +6,7 @@ import pytest
 from tests.inference.generator import Scene, observe, random_scene
 from vrdp_prob.datasets import load_all
 from vrdp_prob.inference import infer
-from vrdp_prob.inference.samples import ESS_GOAL
+from vrdp_prob.inference.draws.samples import ESS_GOAL
 
 SCENES = 12
 

@@ -12,14 +12,14 @@ from tests.inference.map_comparison import Comparison, compare
 from tests.inference.prior_scenes import prior_scene
 from tests.inference.random_scenes import Truth, collisions_of_each, random_truth
 from vrdp_prob.inference import default_model
-from vrdp_prob.inference.encounters import CROWDED, MANY_PARTNERS, hard_to_explain
-from vrdp_prob.inference.events import courses
-from vrdp_prob.inference.hypothesis import distances, yaw_places
 from vrdp_prob.inference.map_fit import MapFit, fit_map
-from vrdp_prob.inference.mode_search import ModeSearch
-from vrdp_prob.inference.modes import structure_at, with_all_that_meet
-from vrdp_prob.inference.plan import CURRICULUM, GROWING, FitPlan, Optimiser
-from vrdp_prob.inference.refinement import Refined, at_the_top, climb
+from vrdp_prob.inference.search.encounters import CROWDED, MANY_PARTNERS, hard_to_explain
+from vrdp_prob.inference.search.events import courses
+from vrdp_prob.inference.search.hypothesis import distances, yaw_places
+from vrdp_prob.inference.search.mode_search import ModeSearch
+from vrdp_prob.inference.search.modes import structure_at, with_all_that_meet
+from vrdp_prob.inference.search.plan import CURRICULUM, GROWING, FitPlan, Optimiser
+from vrdp_prob.inference.search.refinement import Refined, at_the_top, climb
 from vrdp_prob.models.likelihood import Likelihood
 from vrdp_prob.models.model_error import ModelError
 from vrdp_prob.models.simulator.events import RolloutEventKind

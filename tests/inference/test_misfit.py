@@ -8,9 +8,9 @@ import pytest
 from tests.inference.generator import observe
 from tests.inference.test_infer import chain, with_outliers
 from vrdp_prob.inference import default_model
-from vrdp_prob.inference.clues import Clues
 from vrdp_prob.inference.map_fit import MapFit, fit_map
-from vrdp_prob.inference.misfit import Misfit, judge, tempered
+from vrdp_prob.inference.search.clues import Clues
+from vrdp_prob.inference.search.misfit import Misfit, judge, tempered
 from vrdp_prob.models.noise import NoiseFamily
 from vrdp_prob.scene import Tracks
 

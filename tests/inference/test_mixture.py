@@ -3,11 +3,11 @@ import pytest
 import torch
 from scipy.stats import multivariate_t
 
-from vrdp_prob.inference.curved_gaussian import CurvedGaussian
-from vrdp_prob.inference.mixture import DEGREES_OF_FREEDOM, Mixture
-from vrdp_prob.inference.mode import Mode
-from vrdp_prob.inference.proposals import LEAST_WEIGHT, proposals
-from vrdp_prob.inference.samples import Gaussian
+from vrdp_prob.inference.draws.mode import Mode
+from vrdp_prob.inference.draws.samples import Gaussian
+from vrdp_prob.inference.samplers.curved_gaussian import CurvedGaussian
+from vrdp_prob.inference.samplers.mixture import DEGREES_OF_FREEDOM, Mixture
+from vrdp_prob.inference.samplers.proposals import LEAST_WEIGHT, proposals
 
 WEIGHTS = np.array([0.3, 0.7])
 

@@ -7,11 +7,11 @@ import pytest
 
 from tests.inference.densities import FAR, Hopeless, SmallNeighbour, TwoModes
 from vrdp_prob.inference import laplace, nuts_sampler
+from vrdp_prob.inference.draws.samples import PARETO_K_GOAL, assess
 from vrdp_prob.inference.emcee_sampler import sample_emcee
 from vrdp_prob.inference.laplace import sample_laplace
-from vrdp_prob.inference.mixture import Jumps, Mixture
 from vrdp_prob.inference.nuts_sampler import sample_nuts
-from vrdp_prob.inference.samples import PARETO_K_GOAL, assess
+from vrdp_prob.inference.samplers.mixture import Jumps, Mixture
 
 SAMPLERS = {"emcee": sample_emcee, "nuts": sample_nuts, "laplace": sample_laplace}
 

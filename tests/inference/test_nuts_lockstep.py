@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 import torch
 
-from vrdp_prob.inference.nuts_lockstep import Ask, in_lockstep
+from vrdp_prob.inference.samplers.nuts_lockstep import Ask, in_lockstep
 
 
 def paraboloid(places: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -3,8 +3,8 @@ import pytest
 
 from tests.inference.generator import observe
 from tests.inference.test_infer import chain, with_outliers
-from vrdp_prob.inference.clues import Clues
-from vrdp_prob.inference.outliers import gross_outliers, without
+from vrdp_prob.inference.search.clues import Clues
+from vrdp_prob.inference.search.outliers import gross_outliers, without
 from vrdp_prob.models.noise import NoiseFamily
 from vrdp_prob.scene import Body, Shape, Tracks
 

@@ -6,7 +6,7 @@ import threading
 
 import pytest
 
-from vrdp_prob.inference.parallel import in_parallel, in_processes, several_processes
+from vrdp_prob.inference.runs.parallel import in_parallel, in_processes, several_processes
 
 
 def process(_: int) -> int:

@@ -6,7 +6,7 @@ import pytest
 from tests.inference.prior_scenes import prior_scene
 from vrdp_prob.inference import default_model
 from vrdp_prob.inference.map_fit import fit_map
-from vrdp_prob.inference.passing import close_passes
+from vrdp_prob.inference.search.passing import close_passes
 from vrdp_prob.models.unknowns import structure_of
 from vrdp_prob.scene import Body, Shape, Tracks, Wall
 

@@ -10,13 +10,13 @@ import torch
 from jaxtyping import Float
 from numpy.random import RandomState
 
-from vrdp_prob.inference.curved_gaussian import CurvedGaussian
+from vrdp_prob.inference.draws.mode import Mode
+from vrdp_prob.inference.draws.samples import Gaussian
 from vrdp_prob.inference.laplace import sample_laplace
-from vrdp_prob.inference.mixture import Mixture
-from vrdp_prob.inference.mode import Mode
-from vrdp_prob.inference.rate_steps import RateSteps
-from vrdp_prob.inference.samples import Gaussian
-from vrdp_prob.inference.straightening import Rates
+from vrdp_prob.inference.samplers.curved_gaussian import CurvedGaussian
+from vrdp_prob.inference.samplers.mixture import Mixture
+from vrdp_prob.inference.samplers.rate_steps import RateSteps
+from vrdp_prob.inference.samplers.straightening import Rates
 
 DIRECTIONS = np.array([[1, 1, 0, 0, 0, 0], [1, 0, 1, 0, 0, 0], [0, 0, 0, 1, 0, 0]], dtype=float)
 PRIOR_SD = np.array([0.5, 0.4, 0.4, 1.0, 3.0, 3.0])

@@ -6,12 +6,12 @@ import torch
 from scipy.stats import truncnorm
 
 from tests.inference.densities import Needle, TwoModes
-from vrdp_prob.inference.curved_gaussian import CurvedGaussian
+from vrdp_prob.inference.draws.samples import Gaussian, Samples, assess
 from vrdp_prob.inference.emcee_sampler import sample_emcee
 from vrdp_prob.inference.laplace import sample_laplace
-from vrdp_prob.inference.mixture import Mixture
 from vrdp_prob.inference.nuts_sampler import CHAINS, CHUNK, RESULTS, sample_nuts
-from vrdp_prob.inference.samples import Gaussian, Samples, assess
+from vrdp_prob.inference.samplers.curved_gaussian import CurvedGaussian
+from vrdp_prob.inference.samplers.mixture import Mixture
 
 SAMPLERS = {"emcee": sample_emcee, "nuts": sample_nuts, "laplace": sample_laplace}
 DIMENSION = 6

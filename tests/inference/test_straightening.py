@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 import torch
 
+from vrdp_prob.inference.draws.mode import Mode
 from vrdp_prob.inference.laplace import smoothed_weights
-from vrdp_prob.inference.mode import Mode
-from vrdp_prob.inference.proposals import proposals
-from vrdp_prob.inference.straightening import ROOM, Rates, Straightening, all_straightened, straight_gaussian
+from vrdp_prob.inference.samplers.proposals import proposals
+from vrdp_prob.inference.samplers.straightening import ROOM, Rates, Straightening, all_straightened, straight_gaussian
 from vrdp_prob.models.coordinates import Coordinate, Coordinates
 from vrdp_prob.models.parameters import Prior, Transform
 from vrdp_prob.scene import Body, Shape, Tracks

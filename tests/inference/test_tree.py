@@ -13,9 +13,9 @@ import xarray as xr
 
 from tests.inference.three_bodies import NOISE, tracks
 from vrdp_prob.inference import Posterior, default_model, infer, tree
+from vrdp_prob.inference.draws.samples import Samples
 from vrdp_prob.inference.map_fit import MapFit, fit_map
 from vrdp_prob.inference.predictive import replicated
-from vrdp_prob.inference.samples import Samples
 from vrdp_prob.inference.tree import PREDICTIVE_DRAWS, posterior_tree
 from vrdp_prob.models.likelihood import Likelihood
 from vrdp_prob.models.model_error import ModelError, straying

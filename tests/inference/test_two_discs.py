@@ -14,7 +14,7 @@ import xarray as xr
 
 from tests.inference.generator import Scene, observe
 from vrdp_prob.inference import Posterior, default_model, fit_map, infer
-from vrdp_prob.inference.diagnostics import Reported
+from vrdp_prob.inference.draws.diagnostics import Reported
 from vrdp_prob.inference.infer import sampled
 from vrdp_prob.scene import Shape, Tracks
 

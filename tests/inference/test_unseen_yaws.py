@@ -9,16 +9,17 @@ import torch
 from tests.inference.prior_scenes import PriorScene, prior_scene
 from tests.inference.scene_ranks import ranks
 from tests.inference.three_bodies import tracks
-from vrdp_prob.inference import FitPlan, Optimiser, default_model, growing_fit, infer, map_fit, yaw_search
-from vrdp_prob.inference.descent import Descent
-from vrdp_prob.inference.hypothesis import QUARTER
-from vrdp_prob.inference.importance import Weighted, effective_count, smoothed_weights
+from vrdp_prob.inference import FitPlan, Optimiser, default_model, infer, map_fit
+from vrdp_prob.inference.draws.samples import PARETO_K_GOAL
 from vrdp_prob.inference.map_fit import MapFit, fit_map
-from vrdp_prob.inference.mixture import Jumps
-from vrdp_prob.inference.samples import PARETO_K_GOAL
-from vrdp_prob.inference.straightening import Rates
-from vrdp_prob.inference.yaw_search import turned_worlds, unseen_yaws
-from vrdp_prob.inference.yaw_tiles import yaw_jumps
+from vrdp_prob.inference.samplers.importance import Weighted, effective_count, smoothed_weights
+from vrdp_prob.inference.samplers.mixture import Jumps
+from vrdp_prob.inference.samplers.straightening import Rates
+from vrdp_prob.inference.samplers.yaw_tiles import yaw_jumps
+from vrdp_prob.inference.search import growing_fit, yaw_search
+from vrdp_prob.inference.search.descent import Descent
+from vrdp_prob.inference.search.hypothesis import QUARTER
+from vrdp_prob.inference.search.yaw_search import turned_worlds, unseen_yaws
 from vrdp_prob.models.likelihood import Likelihood
 
 ONE_CUBE = 2689

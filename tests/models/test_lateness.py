@@ -12,8 +12,8 @@ from scipy.stats import multivariate_normal
 
 from vrdp_prob.errors import InputError
 from vrdp_prob.inference import infer
-from vrdp_prob.inference.noise_fit import best_noise
 from vrdp_prob.inference.predictive import drawn_lateness, replicated, replicated_angles
+from vrdp_prob.inference.search.noise_fit import best_noise
 from vrdp_prob.inference.several_videos import fit_together
 from vrdp_prob.models.effects.effect import Effect
 from vrdp_prob.models.effects.irregular_frames import IrregularFrames

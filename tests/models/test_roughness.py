@@ -5,7 +5,7 @@ import pytest
 
 from tests.inference.generator import Scene, observe
 from vrdp_prob.inference import infer
-from vrdp_prob.inference.clues import Clues
+from vrdp_prob.inference.search.clues import Clues
 from vrdp_prob.models.roughness import noise_scale, untold_noise
 from vrdp_prob.scene import Body, Shape, Tracks
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tests.inference.repelling_discs import MASSES, inferred, video
-from vrdp_prob.inference.identifiability import BodyStatus, ParameterStatus, Status
+from vrdp_prob.inference.identifiability.status import BodyStatus, ParameterStatus, Status
 from vrdp_prob.inference.posterior import Posterior
 from vrdp_prob.reasoning.changes import Change
 from vrdp_prob.reasoning.stock import Stock

@@ -4,8 +4,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from vrdp_prob.inference.samples import Convergence
-from vrdp_prob.inference.summaries import ObjectSummary, PairSummary, ParameterSummary, Summary
+from vrdp_prob.inference.draws.samples import Convergence
+from vrdp_prob.inference.draws.summaries import ObjectSummary, PairSummary, ParameterSummary, Summary
 from vrdp_prob.reasoning.answer import Answer, ChoiceAnswer, monte_carlo_error
 from vrdp_prob.report.content import (
     FACTUAL,

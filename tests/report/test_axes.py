@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from vrdp_prob.inference.summaries import Summary
+from vrdp_prob.inference.draws.summaries import Summary
 from vrdp_prob.report.axes import linear_axis, log_axis, size_axis, unit_axis
 
 

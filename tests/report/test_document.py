@@ -7,8 +7,8 @@ import jsonschema
 import pytest
 from example_content import with_unsure_material
 
-from vrdp_prob.inference.samples import Convergence
-from vrdp_prob.inference.summaries import PairSummary, Summary
+from vrdp_prob.inference.draws.samples import Convergence
+from vrdp_prob.inference.draws.summaries import PairSummary, Summary
 from vrdp_prob.report import schema, to_document, write_report
 
 

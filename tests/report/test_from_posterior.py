@@ -10,10 +10,10 @@ import xarray as xr
 from example_content import RADIUS, make_tracks
 
 from tests.concepts.physical.words import UNSURE
-from vrdp_prob.inference.identifiability import BodyStatus, ParameterStatus, Status
+from vrdp_prob.inference.draws.samples import Convergence
+from vrdp_prob.inference.identifiability.status import BodyStatus, ParameterStatus, Status
 from vrdp_prob.inference.infer import infer
 from vrdp_prob.inference.posterior import Posterior
-from vrdp_prob.inference.samples import Convergence
 from vrdp_prob.models.parameters import MASS, RESTITUTION
 from vrdp_prob.models.physics import PhysicsModel
 from vrdp_prob.models.simulator.worlds import Worlds

@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 
-from vrdp_prob.inference.samples import Convergence
+from vrdp_prob.inference.draws.samples import Convergence
 from vrdp_prob.report.summary import answer_words, by_doubt, is_doubtful, summary
 
 

@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from vrdp_prob.inference.summaries import ParameterSummary, Summary
+from vrdp_prob.inference.draws.summaries import ParameterSummary, Summary
 from vrdp_prob.reasoning.answer import monte_carlo_error
 from vrdp_prob.report.wording import (
     counted,

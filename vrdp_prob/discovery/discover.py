@@ -18,10 +18,10 @@ from vrdp_prob.discovery.selection.mimics import Unlisted
 from vrdp_prob.discovery.selection.search import Search
 from vrdp_prob.discovery.selection.tried import tried_causes
 from vrdp_prob.inference import default_model
-from vrdp_prob.inference.checkpoint import Checkpoint, model_facts, program_facts, videos_facts
 from vrdp_prob.inference.infer import check_model
-from vrdp_prob.inference.journal import journal
-from vrdp_prob.inference.parallel import linear_algebra_in_one_thread, several_processes
+from vrdp_prob.inference.runs.checkpoint import Checkpoint, model_facts, program_facts, videos_facts
+from vrdp_prob.inference.runs.journal import journal
+from vrdp_prob.inference.runs.parallel import linear_algebra_in_one_thread, several_processes
 from vrdp_prob.inference.several_videos.fitting import fit_together
 from vrdp_prob.inference.several_videos.second_look import explained
 from vrdp_prob.models.effects.effect import Effect

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from vrdp_prob.discovery.finding import ComparedAnswer, ComparedOption, Finding
 from vrdp_prob.errors import InputError
 from vrdp_prob.inference import infer
-from vrdp_prob.inference.parallel import in_processes, several_processes
+from vrdp_prob.inference.runs.parallel import in_processes, several_processes
 from vrdp_prob.models.physics import PhysicsModel
 from vrdp_prob.models.simulator.rollout import compile_model
 from vrdp_prob.progress import ProgressDisplay, SilentProgress

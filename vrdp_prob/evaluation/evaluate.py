@@ -26,7 +26,7 @@ from vrdp_prob.evaluation.one_scene import BEST_FIT, POSTERIOR, VARIANTS, SceneR
 from vrdp_prob.evaluation.scores import Interval, Scores, brier_gain
 from vrdp_prob.files import write_atomically
 from vrdp_prob.inference import check_options, default_model
-from vrdp_prob.inference.checkpoint import Checkpoint, film_facts, model_facts, program_facts, tracks_facts
+from vrdp_prob.inference.runs.checkpoint import Checkpoint, film_facts, model_facts, program_facts, tracks_facts
 from vrdp_prob.models.physics import PhysicsModel
 from vrdp_prob.models.simulator.rollout import compile_model
 from vrdp_prob.progress import ProgressDisplay, SilentProgress

@@ -8,12 +8,12 @@ import torch
 import xarray as xr
 from jaxtyping import Float
 
-from vrdp_prob.inference.events import collision_sequences
-from vrdp_prob.inference.identifiability import BodyStatus, Status
+from vrdp_prob.inference.draws.samples import Convergence, Samples
+from vrdp_prob.inference.identifiability.status import BodyStatus, Status
 from vrdp_prob.inference.identified import identified
 from vrdp_prob.inference.map_fit import MapFit
 from vrdp_prob.inference.posterior import Posterior
-from vrdp_prob.inference.samples import Convergence, Samples
+from vrdp_prob.inference.search.events import collision_sequences
 from vrdp_prob.inference.tree import posterior_tree
 from vrdp_prob.models.parameters import MASS, RESTITUTION
 from vrdp_prob.models.roughness import untold_noise

@@ -16,14 +16,14 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 from jaxtyping import Float
 
-from vrdp_prob.inference.checkpoint import Checkpoint, kept
-from vrdp_prob.inference.diagnostics import Reported, drift, joined, ordered, settled
-from vrdp_prob.inference.emcee_ensemble import Ensemble
-from vrdp_prob.inference.mixture import Jumps, Mixture
-from vrdp_prob.inference.mode_weights import doubts, weights_from_chains
-from vrdp_prob.inference.rate_steps import RateSteps
-from vrdp_prob.inference.samples import ESS_GOAL, R_HAT_GOAL, LogDensity, Samples
-from vrdp_prob.inference.shaping import Shaped, shaped, starting_places
+from vrdp_prob.inference.draws.diagnostics import Reported, drift, joined, ordered, settled
+from vrdp_prob.inference.draws.samples import ESS_GOAL, R_HAT_GOAL, LogDensity, Samples
+from vrdp_prob.inference.runs.checkpoint import Checkpoint, kept
+from vrdp_prob.inference.samplers.emcee_ensemble import Ensemble
+from vrdp_prob.inference.samplers.mixture import Jumps, Mixture
+from vrdp_prob.inference.samplers.mode_weights import doubts, weights_from_chains
+from vrdp_prob.inference.samplers.rate_steps import RateSteps
+from vrdp_prob.inference.samplers.shaping import Shaped, shaped, starting_places
 from vrdp_prob.models.simulator.work import metered, work_sentence
 from vrdp_prob.progress import Advance, ProgressDisplay, SilentProgress
 

@@ -2,10 +2,10 @@
 
 from dataclasses import dataclass
 
-from vrdp_prob.inference.events import Pairs, wall_contacts
-from vrdp_prob.inference.identifiability import BodyStatus, CollisionGroup, collision_groups, identifiability
-from vrdp_prob.inference.information import Information
+from vrdp_prob.inference.identifiability.information import Information
+from vrdp_prob.inference.identifiability.status import BodyStatus, CollisionGroup, collision_groups, identifiability
 from vrdp_prob.inference.map_fit import MapFit
+from vrdp_prob.inference.search.events import Pairs, wall_contacts
 from vrdp_prob.models.parameters import RESTITUTION
 from vrdp_prob.models.unknowns import felt_masses, structure_of
 

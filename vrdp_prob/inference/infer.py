@@ -10,23 +10,23 @@ import numpy as np
 
 from vrdp_prob.errors import InputError
 from vrdp_prob.inference.assembly import posterior_from
-from vrdp_prob.inference.checkpoint import Checkpoint, fingerprint
-from vrdp_prob.inference.contact_ridges import contact_ridges
-from vrdp_prob.inference.diagnostics import Reported
+from vrdp_prob.inference.draws.diagnostics import Reported
+from vrdp_prob.inference.draws.samples import Samples, assess
 from vrdp_prob.inference.emcee_sampler import sample_emcee
-from vrdp_prob.inference.events import courses_at
 from vrdp_prob.inference.laplace import sample_laplace
 from vrdp_prob.inference.map_fit import MapFit, fit_map
-from vrdp_prob.inference.mode_weights import UNSURE
 from vrdp_prob.inference.nuts_sampler import sample_nuts
-from vrdp_prob.inference.parallel import linear_algebra_in_one_thread
-from vrdp_prob.inference.plan import FitPlan
 from vrdp_prob.inference.posterior import Posterior
-from vrdp_prob.inference.proposals import proposals, share_left_out
-from vrdp_prob.inference.rate_steps import RateSteps
-from vrdp_prob.inference.samples import Samples, assess
-from vrdp_prob.inference.straightening import Rates
-from vrdp_prob.inference.yaw_tiles import yaw_jumps, yaws_left_out
+from vrdp_prob.inference.runs.checkpoint import Checkpoint, fingerprint
+from vrdp_prob.inference.runs.parallel import linear_algebra_in_one_thread
+from vrdp_prob.inference.samplers.contact_ridges import contact_ridges
+from vrdp_prob.inference.samplers.mode_weights import UNSURE
+from vrdp_prob.inference.samplers.proposals import proposals, share_left_out
+from vrdp_prob.inference.samplers.rate_steps import RateSteps
+from vrdp_prob.inference.samplers.straightening import Rates
+from vrdp_prob.inference.samplers.yaw_tiles import yaw_jumps, yaws_left_out
+from vrdp_prob.inference.search.events import courses_at
+from vrdp_prob.inference.search.plan import FitPlan
 from vrdp_prob.models.effects.body_friction import BodyFriction
 from vrdp_prob.models.noise import NoiseFamily
 from vrdp_prob.models.physics import PhysicsModel

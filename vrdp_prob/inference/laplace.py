@@ -12,10 +12,11 @@ from dataclasses import replace
 import numpy as np
 from jaxtyping import Float
 
-from vrdp_prob.inference.checkpoint import Checkpoint
-from vrdp_prob.inference.diagnostics import Reported, weighted_statistics
+from vrdp_prob.inference.draws.diagnostics import Reported, weighted_statistics
+from vrdp_prob.inference.draws.samples import ESS_GOAL, PARETO_K_GOAL, LogDensity, Samples
 from vrdp_prob.inference.emcee_sampler import sample_emcee
-from vrdp_prob.inference.importance import (
+from vrdp_prob.inference.runs.checkpoint import Checkpoint
+from vrdp_prob.inference.samplers.importance import (
     Weighted,
     effective_count,
     evaluated_in_batches,
@@ -23,11 +24,10 @@ from vrdp_prob.inference.importance import (
     resampled,
     smoothed_weights,
 )
-from vrdp_prob.inference.mixture import Jumps, Mixture
-from vrdp_prob.inference.mode_weights import doubts, weights_from_importance
-from vrdp_prob.inference.rate_steps import RateSteps
-from vrdp_prob.inference.samples import ESS_GOAL, PARETO_K_GOAL, LogDensity, Samples
-from vrdp_prob.inference.shaping import shaped
+from vrdp_prob.inference.samplers.mixture import Jumps, Mixture
+from vrdp_prob.inference.samplers.mode_weights import doubts, weights_from_importance
+from vrdp_prob.inference.samplers.rate_steps import RateSteps
+from vrdp_prob.inference.samplers.shaping import shaped
 from vrdp_prob.models.simulator.work import metered
 from vrdp_prob.progress import Advance, ProgressDisplay, SilentProgress
 

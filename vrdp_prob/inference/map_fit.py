@@ -13,16 +13,16 @@ import torch
 from jaxtyping import Float
 
 from vrdp_prob.errors import InputError
-from vrdp_prob.inference.at_rest import Explained, with_bodies_at_rest
-from vrdp_prob.inference.clues import Clues
-from vrdp_prob.inference.descent import Descent
-from vrdp_prob.inference.events import Pairs, first_contacts
-from vrdp_prob.inference.growing_fit import GrowingFit, merged
-from vrdp_prob.inference.misfit import Misfit, judge, shows_outliers, with_outliers
-from vrdp_prob.inference.mode import Mode
-from vrdp_prob.inference.mode_search import ModeSearch
-from vrdp_prob.inference.model_error_fit import TURNS, next_model_error
-from vrdp_prob.inference.modes import (
+from vrdp_prob.inference.draws.mode import Mode
+from vrdp_prob.inference.search.at_rest import Explained, with_bodies_at_rest
+from vrdp_prob.inference.search.clues import Clues
+from vrdp_prob.inference.search.descent import Descent
+from vrdp_prob.inference.search.events import Pairs, first_contacts
+from vrdp_prob.inference.search.growing_fit import GrowingFit, merged
+from vrdp_prob.inference.search.misfit import Misfit, judge, shows_outliers, with_outliers
+from vrdp_prob.inference.search.mode_search import ModeSearch
+from vrdp_prob.inference.search.model_error_fit import TURNS, next_model_error
+from vrdp_prob.inference.search.modes import (
     HOPELESS,
     distinct_modes,
     restricted,
@@ -30,9 +30,9 @@ from vrdp_prob.inference.modes import (
     with_all_that_meet,
     without_idle,
 )
-from vrdp_prob.inference.plan import FitPlan
-from vrdp_prob.inference.refinement import Refined, at_the_top, climb, refine
-from vrdp_prob.inference.yaw_search import with_other_yaws
+from vrdp_prob.inference.search.plan import FitPlan
+from vrdp_prob.inference.search.refinement import Refined, at_the_top, climb, refine
+from vrdp_prob.inference.search.yaw_search import with_other_yaws
 from vrdp_prob.models.likelihood import Likelihood
 from vrdp_prob.models.noise import NoiseFamily
 from vrdp_prob.models.physics import PhysicsModel

@@ -11,16 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from vrdp_prob.inference.checkpoint import Checkpoint, kept
-from vrdp_prob.inference.diagnostics import Reported, drift, joined, ordered, settled
-from vrdp_prob.inference.importance import Weighted, smoothed_weights
-from vrdp_prob.inference.mixture import Jumps, Mixture
-from vrdp_prob.inference.mode_weights import doubts, weights_from_chains, weights_from_importance
-from vrdp_prob.inference.nuts_chain import Courses
-from vrdp_prob.inference.nuts_groups import Group, GroupRun
-from vrdp_prob.inference.nuts_worker import workers
-from vrdp_prob.inference.rate_steps import RateSteps
-from vrdp_prob.inference.samples import (
+from vrdp_prob.inference.draws.diagnostics import Reported, drift, joined, ordered, settled
+from vrdp_prob.inference.draws.samples import (
     ESS_GOAL,
     PARETO_K_GOAL,
     R_HAT_GOAL,
@@ -29,7 +21,15 @@ from vrdp_prob.inference.samples import (
     Samples,
     evaluate,
 )
-from vrdp_prob.inference.shaping import Shaped, shaped, starting_places
+from vrdp_prob.inference.runs.checkpoint import Checkpoint, kept
+from vrdp_prob.inference.samplers.importance import Weighted, smoothed_weights
+from vrdp_prob.inference.samplers.mixture import Jumps, Mixture
+from vrdp_prob.inference.samplers.mode_weights import doubts, weights_from_chains, weights_from_importance
+from vrdp_prob.inference.samplers.nuts_chain import Courses
+from vrdp_prob.inference.samplers.nuts_groups import Group, GroupRun
+from vrdp_prob.inference.samplers.nuts_worker import workers
+from vrdp_prob.inference.samplers.rate_steps import RateSteps
+from vrdp_prob.inference.samplers.shaping import Shaped, shaped, starting_places
 from vrdp_prob.models.simulator.work import metered, work_sentence
 from vrdp_prob.progress import ProgressDisplay, SilentProgress
 

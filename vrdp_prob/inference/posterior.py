@@ -11,10 +11,10 @@ import xarray as xr
 from jaxtyping import Float
 from torch import Tensor
 
-from vrdp_prob.inference.identifiability import BodyStatus, CollisionGroup, ParameterStatus, Status
-from vrdp_prob.inference.misfit import Misfit
-from vrdp_prob.inference.samples import Convergence
-from vrdp_prob.inference.summaries import ObjectSummary, PairSummary, ParameterSummary, Summary
+from vrdp_prob.inference.draws.samples import Convergence
+from vrdp_prob.inference.draws.summaries import ObjectSummary, PairSummary, ParameterSummary, Summary
+from vrdp_prob.inference.identifiability.status import BodyStatus, CollisionGroup, ParameterStatus, Status
+from vrdp_prob.inference.search.misfit import Misfit
 from vrdp_prob.inference.tree import for_arviz
 from vrdp_prob.models.parameters import MASS, RESTITUTION, WALL_RESTITUTION
 from vrdp_prob.models.physics import PhysicsModel

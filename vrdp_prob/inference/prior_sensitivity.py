@@ -14,8 +14,8 @@ from arviz_stats.base.array import array_stats
 from jaxtyping import Float
 
 from vrdp_prob.errors import InputError
-from vrdp_prob.inference.noise_fit import NOISE_FIELDS
 from vrdp_prob.inference.posterior import Posterior
+from vrdp_prob.inference.search.noise_fit import NOISE_FIELDS
 from vrdp_prob.models.parameters import MASS, RESTITUTION, ROLLING_RESISTANCE, SLIDING_FRICTION
 
 THRESHOLD = 0.05

@@ -14,10 +14,10 @@ import xarray as xr
 
 from vrdp_prob.errors import InputError
 from vrdp_prob.files import write_atomically
-from vrdp_prob.inference.identifiability import BodyStatus, CollisionGroup, Combination, ParameterStatus, Status
-from vrdp_prob.inference.misfit import Misfit
+from vrdp_prob.inference.draws.samples import Convergence
+from vrdp_prob.inference.identifiability.status import BodyStatus, CollisionGroup, Combination, ParameterStatus, Status
 from vrdp_prob.inference.posterior import Posterior
-from vrdp_prob.inference.samples import Convergence
+from vrdp_prob.inference.search.misfit import Misfit
 from vrdp_prob.models import model_file
 from vrdp_prob.models.physics import PhysicsModel
 from vrdp_prob.scene import Body, Camera, Shape, Tracks, Wall

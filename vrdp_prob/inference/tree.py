@@ -8,10 +8,10 @@ import numpy as np
 import xarray as xr
 from jaxtyping import Float, Int
 
-from vrdp_prob.inference.draws import flat_draws, named_draws, named_fields
+from vrdp_prob.inference.draws.samples import Samples
 from vrdp_prob.inference.map_fit import MapFit
+from vrdp_prob.inference.named_draws import flat_draws, named_draws, named_fields
 from vrdp_prob.inference.predictive import drawn_lateness, replicated, replicated_angles
-from vrdp_prob.inference.samples import Samples
 from vrdp_prob.models.likelihood import Likelihood
 
 PRIOR_DRAWS = 500

@@ -14,7 +14,7 @@ import numpy as np
 from jaxtyping import Float
 from scipy.special import expit, logsumexp
 
-from vrdp_prob.inference.free_flight import contact_distances
+from vrdp_prob.inference.search.free_flight import contact_distances
 from vrdp_prob.reasoning.smoother import BodyTrack, OneMoreKick, Smoother, fitted
 from vrdp_prob.scene import Body, Shape
 

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from vrdp_prob.inference import Posterior
-from vrdp_prob.inference.identifiability import BodyStatus
-from vrdp_prob.inference.samples import Convergence
+from vrdp_prob.inference.draws.samples import Convergence
+from vrdp_prob.inference.identifiability.status import BodyStatus
 from vrdp_prob.models.physics import PhysicsModel
 from vrdp_prob.models.simulator.worlds import Worlds
 from vrdp_prob.reasoning.chance import MostProbable

@@ -4,8 +4,8 @@ from typing import Protocol, runtime_checkable
 
 import numpy as np
 
-from vrdp_prob.inference.identifiability import BodyStatus
-from vrdp_prob.inference.samples import Convergence
+from vrdp_prob.inference.draws.samples import Convergence
+from vrdp_prob.inference.identifiability.status import BodyStatus
 from vrdp_prob.models.physics import PhysicsModel
 from vrdp_prob.models.simulator.worlds import Worlds
 from vrdp_prob.scene import Tracks

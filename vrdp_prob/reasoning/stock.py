@@ -5,7 +5,7 @@ from functools import cached_property
 import numpy as np
 from jaxtyping import Int
 
-from vrdp_prob.inference.identifiability import BodyStatus
+from vrdp_prob.inference.identifiability.status import BodyStatus
 from vrdp_prob.models.simulator.worlds import Worlds
 from vrdp_prob.reasoning.batch import Batch, Common
 from vrdp_prob.reasoning.chance import Chance, Purpose, Seeded

@@ -4,7 +4,7 @@ import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
-from vrdp_prob.inference.summaries import Summary
+from vrdp_prob.inference.draws.summaries import Summary
 
 
 @dataclass(frozen=True)

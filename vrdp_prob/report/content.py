@@ -9,11 +9,11 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float, Int, UInt8
 
-from vrdp_prob.inference.identifiability import CollisionGroup
-from vrdp_prob.inference.misfit import Misfit
+from vrdp_prob.inference.draws.samples import Convergence
+from vrdp_prob.inference.draws.summaries import ObjectSummary, PairSummary
+from vrdp_prob.inference.identifiability.status import CollisionGroup
 from vrdp_prob.inference.prior_sensitivity import Sensitivity
-from vrdp_prob.inference.samples import Convergence
-from vrdp_prob.inference.summaries import ObjectSummary, PairSummary
+from vrdp_prob.inference.search.misfit import Misfit
 from vrdp_prob.reasoning.answer import Answer
 from vrdp_prob.reasoning.explanation.explanation import Explanation
 from vrdp_prob.scene import Tracks

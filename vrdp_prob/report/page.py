@@ -6,7 +6,7 @@ from typing import Any
 
 from markupsafe import Markup
 
-from vrdp_prob.inference.summaries import PairSummary, ParameterSummary, Summary
+from vrdp_prob.inference.draws.summaries import PairSummary, ParameterSummary, Summary
 from vrdp_prob.reasoning.answer import Answer
 from vrdp_prob.report.axes import log_axis, unit_axis
 from vrdp_prob.report.content import FACTUAL, FUTURE, AnswerContent, Footage, ReportContent

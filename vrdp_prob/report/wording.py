@@ -5,7 +5,7 @@ import re
 import string
 from collections.abc import Iterable, Mapping, Sequence
 
-from vrdp_prob.inference.summaries import ParameterSummary, Summary
+from vrdp_prob.inference.draws.summaries import ParameterSummary, Summary
 from vrdp_prob.report.content import FACTUAL, FUTURE, REMOVED, WorldContent
 from vrdp_prob.scene import Body, Tracks
 from vrdp_prob.scene.body import COLORS

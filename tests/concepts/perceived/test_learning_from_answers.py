@@ -19,7 +19,7 @@ from vrdp_prob.concepts.perceived.storage import read_concepts, write_concepts
 from vrdp_prob.concepts.perceived.training import train
 from vrdp_prob.concepts.perceived.vocabulary import Vocabulary
 from vrdp_prob.errors import InputError
-from vrdp_prob.inference.checkpoint import Checkpoint
+from vrdp_prob.inference.runs.checkpoint import Checkpoint
 from vrdp_prob.reasoning.program import check
 from vrdp_prob.scene import Choice, Question
 

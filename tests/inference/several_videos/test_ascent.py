@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from tests.inference.several_videos.videos import sliding
-from vrdp_prob.inference.least_squares import jacobian
+from vrdp_prob.inference.search.least_squares import jacobian
 from vrdp_prob.inference.several_videos import ascent
 from vrdp_prob.inference.several_videos.arrow import Expansion
 from vrdp_prob.inference.several_videos.linking import LinkedVideo, SharedNumbers

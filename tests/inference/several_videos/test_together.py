@@ -17,9 +17,9 @@ import torch
 from tests.inference.several_videos.videos import DRAG, FRICTION, NOISE, colliding, sliding
 from vrdp_prob.errors import InputError
 from vrdp_prob.inference import Posterior
-from vrdp_prob.inference.diagnostics import Reported, chain_statistics
-from vrdp_prob.inference.mode_search import ModeSearch
-from vrdp_prob.inference.samples import Gaussian, evaluate, evaluate_with_gradient
+from vrdp_prob.inference.draws.diagnostics import Reported, chain_statistics
+from vrdp_prob.inference.draws.samples import Gaussian, evaluate, evaluate_with_gradient
+from vrdp_prob.inference.search.mode_search import ModeSearch
 from vrdp_prob.inference.several_videos import (
     SharedFit,
     SharedPosterior,

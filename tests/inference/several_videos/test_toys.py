@@ -9,7 +9,7 @@ import pytest
 from scipy.special import logsumexp
 
 from tests.inference.several_videos.videos import sliding
-from vrdp_prob.inference.diagnostics import chain_statistics
+from vrdp_prob.inference.draws.diagnostics import chain_statistics
 from vrdp_prob.inference.several_videos.arrow import ArrowGaussian, Expansion, Expansions, SharedExpansion
 from vrdp_prob.inference.several_videos.gibbs import sample_gibbs
 from vrdp_prob.inference.several_videos.importance import sample_by_importance

@@ -17,7 +17,7 @@ from vrdp_prob.concepts.perceived.observation import Observation
 from vrdp_prob.datasets import check_scenes, find_camera, questions_about, video_files
 from vrdp_prob.datasets.loading import CameraChoice
 from vrdp_prob.errors import InputError
-from vrdp_prob.inference.checkpoint import Arrays, Checkpoint, film_facts, program_facts
+from vrdp_prob.inference.runs.checkpoint import Arrays, Checkpoint, film_facts, program_facts
 from vrdp_prob.perception.reading import see_video
 from vrdp_prob.progress import ProgressDisplay, SilentProgress
 from vrdp_prob.scene import Camera

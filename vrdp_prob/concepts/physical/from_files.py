@@ -18,7 +18,7 @@ from vrdp_prob.datasets import load_all, questions_about, video_names
 from vrdp_prob.datasets.loading import CameraChoice
 from vrdp_prob.errors import InputError
 from vrdp_prob.inference import check_options, default_model, infer
-from vrdp_prob.inference.checkpoint import Checkpoint, fingerprint
+from vrdp_prob.inference.runs.checkpoint import Checkpoint, fingerprint
 from vrdp_prob.models.physics import PhysicsModel
 from vrdp_prob.models.simulator.rollout import compile_model
 from vrdp_prob.progress import ProgressDisplay, SilentProgress

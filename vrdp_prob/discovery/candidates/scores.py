@@ -18,7 +18,7 @@ from vrdp_prob.discovery.candidates.probes import Probe, probes
 from vrdp_prob.discovery.residuals.jitter import jitter
 from vrdp_prob.discovery.residuals.linear import RANK, Score
 from vrdp_prob.discovery.residuals.residual_model import ResidualModel
-from vrdp_prob.inference.parallel import in_parallel, in_processes
+from vrdp_prob.inference.runs.parallel import in_parallel, in_processes
 from vrdp_prob.inference.several_videos.fitting import SharedFit
 from vrdp_prob.inference.several_videos.linking import Key
 from vrdp_prob.models.effects.effect import Effect

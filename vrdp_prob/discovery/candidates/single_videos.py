@@ -9,8 +9,8 @@ from functools import partial
 
 from vrdp_prob.discovery.candidates.scores import happens_once
 from vrdp_prob.inference.map_fit import MapFit
-from vrdp_prob.inference.parallel import in_processes
-from vrdp_prob.inference.plan import IN_DOUBT
+from vrdp_prob.inference.runs.parallel import in_processes
+from vrdp_prob.inference.search.plan import IN_DOUBT
 from vrdp_prob.inference.several_videos.fitting import SharedFit
 from vrdp_prob.inference.several_videos.parts import fit_alone
 from vrdp_prob.inference.several_videos.second_look import may_take_another_course

@@ -14,8 +14,8 @@ import numpy as np
 from jaxtyping import Float
 from scipy.linalg import cho_solve, cholesky, solve_triangular, svdvals
 
-from vrdp_prob.inference.parallel import in_parallel
-from vrdp_prob.inference.prior_mass import log_prior_constant
+from vrdp_prob.inference.runs.parallel import in_parallel
+from vrdp_prob.inference.search.prior_mass import log_prior_constant
 from vrdp_prob.inference.several_videos.arrow import LOG_TWO_PI
 from vrdp_prob.inference.several_videos.ascent import STEEP
 from vrdp_prob.inference.several_videos.fitting import SharedFit

@@ -23,7 +23,7 @@ from scipy.stats import chi2
 from vrdp_prob.discovery.residuals.held_out import all_but_each, left_out
 from vrdp_prob.discovery.residuals.linear import LinearFit, LinearVideo, log_evidence
 from vrdp_prob.discovery.residuals.residual_model import ResidualModel, VideoResiduals
-from vrdp_prob.inference.parallel import in_processes
+from vrdp_prob.inference.runs.parallel import in_processes
 from vrdp_prob.inference.several_videos.fitting import SharedFit
 from vrdp_prob.models.model_error import Factors, Strand, Whitening, by_law, factors
 

@@ -15,9 +15,9 @@ from scipy.stats import norm
 
 from vrdp_prob.discovery.finding import HeldOut
 from vrdp_prob.discovery.residuals.held_out import Cavity
-from vrdp_prob.inference.least_squares import jacobian, minimise
-from vrdp_prob.inference.noise_fit import NOISE_FIELDS
-from vrdp_prob.inference.parallel import in_parallel
+from vrdp_prob.inference.runs.parallel import in_parallel
+from vrdp_prob.inference.search.least_squares import jacobian, minimise
+from vrdp_prob.inference.search.noise_fit import NOISE_FIELDS
 from vrdp_prob.inference.several_videos.linking import LinkedVideo
 from vrdp_prob.models.likelihood import Likelihood
 from vrdp_prob.models.noise import NoiseFamily

@@ -11,7 +11,7 @@ from functools import cached_property, partial
 import numpy as np
 from jaxtyping import Float
 
-from vrdp_prob.inference.parallel import in_parallel
+from vrdp_prob.inference.runs.parallel import in_parallel
 from vrdp_prob.inference.several_videos.fitting import SharedFit
 from vrdp_prob.inference.several_videos.joint_fit import settle
 

@@ -12,7 +12,7 @@ from vrdp_prob.discovery.candidates.scores import CauseScore, happens_once, scor
 from vrdp_prob.discovery.candidates.single_videos import causes_of_lost_videos, lost_videos
 from vrdp_prob.discovery.residuals.overdispersion import overdispersion
 from vrdp_prob.discovery.selection.trials import Trial, gain
-from vrdp_prob.inference.parallel import in_processes
+from vrdp_prob.inference.runs.parallel import in_processes
 from vrdp_prob.inference.several_videos.ascent import ImpossibleStartError
 from vrdp_prob.inference.several_videos.fitting import fit_together
 from vrdp_prob.inference.several_videos.second_look import MOST, explained, may_take_another_course

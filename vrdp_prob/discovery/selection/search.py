@@ -10,7 +10,7 @@ from jaxtyping import Float
 from vrdp_prob.discovery.candidates.scores import happens_once
 from vrdp_prob.discovery.selection.refits import HOPEFUL, Left, Refits, lasting, merit
 from vrdp_prob.discovery.selection.trials import Trial, gain, weights, with_own_population
-from vrdp_prob.inference.parallel import in_processes
+from vrdp_prob.inference.runs.parallel import in_processes
 from vrdp_prob.inference.several_videos.fitting import SharedFit
 from vrdp_prob.inference.several_videos.second_look import doubtful
 from vrdp_prob.models.effects.effect import Effect

@@ -6,12 +6,12 @@ from dataclasses import replace
 import numpy as np
 from jaxtyping import Float
 
-from vrdp_prob.inference.parallel import in_parallel
-from vrdp_prob.inference.samples import Gaussian
+from vrdp_prob.inference.draws.samples import Gaussian
+from vrdp_prob.inference.runs.parallel import in_parallel
+from vrdp_prob.inference.search.yaw_search import tells_yaws_by_contacts
 from vrdp_prob.inference.several_videos.arrow import Expansion, Expansions
 from vrdp_prob.inference.several_videos.joint_fit import expand, expand_prior, follow_or_settle
 from vrdp_prob.inference.several_videos.linking import LinkedVideo, SharedNumbers
-from vrdp_prob.inference.yaw_search import tells_yaws_by_contacts
 from vrdp_prob.models.parameters import ANGULAR_DRAG
 
 

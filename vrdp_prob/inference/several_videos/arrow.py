@@ -15,7 +15,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 from scipy.linalg import solve_triangular
 
-from vrdp_prob.inference.triangles import lower_root, upper_root
+from vrdp_prob.inference.draws.triangles import lower_root, upper_root
 
 LARGEST_LOGARITHM = 5.0
 LOG_TWO_PI = float(np.log(2 * np.pi))

@@ -14,8 +14,8 @@ from jaxtyping import Bool, Float
 from scipy.optimize import minimize
 
 from vrdp_prob.errors import InputError
-from vrdp_prob.inference.noise_fit import NOISE_FIELDS, best_noise
-from vrdp_prob.inference.parallel import in_parallel
+from vrdp_prob.inference.runs.parallel import in_parallel
+from vrdp_prob.inference.search.noise_fit import NOISE_FIELDS, best_noise
 from vrdp_prob.inference.several_videos.arrow import Expansion, Expansions
 from vrdp_prob.inference.several_videos.joint_fit import JointFit, expand, expand_prior, follow_or_settle, settle
 from vrdp_prob.inference.several_videos.linking import LinkedVideo, SharedNumbers

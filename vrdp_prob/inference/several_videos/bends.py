@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from vrdp_prob.inference.second_differences import second_differences
+from vrdp_prob.inference.samplers.second_differences import second_differences
 from vrdp_prob.inference.several_videos.arrow import ArrowGaussian, LocalGaussian
 from vrdp_prob.inference.several_videos.linking import LinkedVideo
 

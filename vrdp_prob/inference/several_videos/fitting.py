@@ -9,13 +9,13 @@ from pathlib import Path
 import numpy as np
 
 from vrdp_prob.errors import InputError
-from vrdp_prob.inference.journal import kept
+from vrdp_prob.inference.draws.mode import Mode
 from vrdp_prob.inference.map_fit import MapFit
-from vrdp_prob.inference.misfit import judge
-from vrdp_prob.inference.mode import Mode
-from vrdp_prob.inference.model_error_fit import TURNS, next_model_error
-from vrdp_prob.inference.parallel import in_processes
-from vrdp_prob.inference.plan import IN_DOUBT, FitPlan
+from vrdp_prob.inference.runs.journal import kept
+from vrdp_prob.inference.runs.parallel import in_processes
+from vrdp_prob.inference.search.misfit import judge
+from vrdp_prob.inference.search.model_error_fit import TURNS, next_model_error
+from vrdp_prob.inference.search.plan import IN_DOUBT, FitPlan
 from vrdp_prob.inference.several_videos.agreement import following_ones
 from vrdp_prob.inference.several_videos.ascent import WHOLE, Effort, ImpossibleStartError, NoCommonWorldError, climb
 from vrdp_prob.inference.several_videos.joining import joined

@@ -16,8 +16,8 @@ import numpy as np
 from jaxtyping import Float, Int
 from scipy.linalg import qr, solve_triangular
 
-from vrdp_prob.inference.least_squares import jacobian, robust_cost
-from vrdp_prob.inference.noise_fit import NOISE_FIELDS
+from vrdp_prob.inference.search.least_squares import jacobian, robust_cost
+from vrdp_prob.inference.search.noise_fit import NOISE_FIELDS
 from vrdp_prob.inference.several_videos.linking import LinkedVideo
 
 STRIDES = (1.0, 0.6, 0.3, 0.15, 0.07, 0.03, 0.015, 0.006, 0.002)

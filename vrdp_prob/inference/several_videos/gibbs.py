@@ -15,9 +15,9 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 from scipy.special import logsumexp
 
-from vrdp_prob.inference.checkpoint import Checkpoint
-from vrdp_prob.inference.diagnostics import Reported, drift, joined, ordered, settled, share_with_error
-from vrdp_prob.inference.samples import ESS_GOAL, R_HAT_GOAL, ModeWeight
+from vrdp_prob.inference.draws.diagnostics import Reported, drift, joined, ordered, settled, share_with_error
+from vrdp_prob.inference.draws.samples import ESS_GOAL, R_HAT_GOAL, ModeWeight
+from vrdp_prob.inference.runs.checkpoint import Checkpoint
 from vrdp_prob.inference.several_videos.arrow import ArrowGaussian
 from vrdp_prob.inference.several_videos.clouds import Clouds
 from vrdp_prob.inference.several_videos.joint_fit import JointFit

@@ -7,10 +7,10 @@ from jaxtyping import Float
 from scipy.special import logsumexp
 
 from vrdp_prob.errors import InputError
-from vrdp_prob.inference.clues import Clues
-from vrdp_prob.inference.importance import effective_count, resampled, smoothed_weights
+from vrdp_prob.inference.draws.samples import PARETO_K_GOAL
 from vrdp_prob.inference.map_fit import fit_map
-from vrdp_prob.inference.samples import PARETO_K_GOAL
+from vrdp_prob.inference.samplers.importance import effective_count, resampled, smoothed_weights
+from vrdp_prob.inference.search.clues import Clues
 from vrdp_prob.inference.several_videos.arrow import ArrowGaussian
 from vrdp_prob.inference.several_videos.clouds import Clouds
 from vrdp_prob.inference.several_videos.importance import weighted_locals

@@ -12,8 +12,8 @@ import numpy as np
 from jaxtyping import Float
 from scipy.special import gammaln, logsumexp
 
-from vrdp_prob.inference.importance import effective_count, flattened, resampled, smoothed_weights
-from vrdp_prob.inference.prior_mass import log_prior_constant
+from vrdp_prob.inference.samplers.importance import effective_count, flattened, resampled, smoothed_weights
+from vrdp_prob.inference.search.prior_mass import log_prior_constant
 from vrdp_prob.inference.several_videos.arrow import ArrowGaussian
 from vrdp_prob.inference.several_videos.clouds import Clouds
 from vrdp_prob.inference.several_videos.joint_fit import JointFit

@@ -7,11 +7,12 @@ from functools import partial
 import numpy as np
 from jaxtyping import Float
 
-from vrdp_prob.inference.journal import kept
 from vrdp_prob.inference.map_fit import MapFit
-from vrdp_prob.inference.misfit import judge
-from vrdp_prob.inference.parallel import in_processes
-from vrdp_prob.inference.plan import TURNING
+from vrdp_prob.inference.runs.journal import kept
+from vrdp_prob.inference.runs.parallel import in_processes
+from vrdp_prob.inference.search.misfit import judge
+from vrdp_prob.inference.search.plan import TURNING
+from vrdp_prob.inference.search.yaw_search import tells_yaws_by_contacts
 from vrdp_prob.inference.several_videos.agreement import first_guess
 from vrdp_prob.inference.several_videos.ascent import ImpossibleStartError, climb
 from vrdp_prob.inference.several_videos.joint_fit import JointFit
@@ -26,7 +27,6 @@ from vrdp_prob.inference.several_videos.second_look import (
     look_again,
     trusted,
 )
-from vrdp_prob.inference.yaw_search import tells_yaws_by_contacts
 from vrdp_prob.models.physics import PhysicsModel
 
 

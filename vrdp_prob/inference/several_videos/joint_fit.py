@@ -9,11 +9,11 @@ import numpy as np
 from jaxtyping import Float, Int
 from scipy.linalg import solve_triangular
 
-from vrdp_prob.inference.least_squares import jacobian, minimise
-from vrdp_prob.inference.noise_fit import NOISE_FIELDS, noise_curvature
-from vrdp_prob.inference.parallel import in_parallel
-from vrdp_prob.inference.prior_mass import log_prior_constant
-from vrdp_prob.inference.samples import evaluate_with_gradient
+from vrdp_prob.inference.draws.samples import evaluate_with_gradient
+from vrdp_prob.inference.runs.parallel import in_parallel
+from vrdp_prob.inference.search.least_squares import jacobian, minimise
+from vrdp_prob.inference.search.noise_fit import NOISE_FIELDS, noise_curvature
+from vrdp_prob.inference.search.prior_mass import log_prior_constant
 from vrdp_prob.inference.several_videos.arrow import (
     LOG_TWO_PI,
     ArrowGaussian,

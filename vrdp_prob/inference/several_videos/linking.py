@@ -15,8 +15,8 @@ from jaxtyping import Bool, Float, Int
 from torch import Tensor
 
 from vrdp_prob.errors import InputError
-from vrdp_prob.inference.noise_fit import NOISE_FIELDS
-from vrdp_prob.inference.samples import evaluate
+from vrdp_prob.inference.draws.samples import evaluate
+from vrdp_prob.inference.search.noise_fit import NOISE_FIELDS
 from vrdp_prob.models.coordinates import Coordinate, Coordinates
 from vrdp_prob.models.likelihood import Likelihood
 from vrdp_prob.models.parameters import WALL_RESTITUTION, Prior, Scope, Transform

@@ -6,9 +6,9 @@ from collections.abc import Collection, Sequence
 import numpy as np
 from jaxtyping import Float
 
-from vrdp_prob.inference.clues import Clues
 from vrdp_prob.inference.map_fit import MapFit, fit_map
-from vrdp_prob.inference.plan import FitPlan
+from vrdp_prob.inference.search.clues import Clues
+from vrdp_prob.inference.search.plan import FitPlan
 from vrdp_prob.inference.several_videos.linking import LinkedVideo, SharedNumbers, link
 from vrdp_prob.models.likelihood import Likelihood
 from vrdp_prob.models.physics import PhysicsModel

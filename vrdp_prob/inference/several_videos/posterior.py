@@ -12,11 +12,11 @@ from jaxtyping import Float
 
 from vrdp_prob.errors import InputError
 from vrdp_prob.files import write_atomically
+from vrdp_prob.inference.draws.samples import Convergence
+from vrdp_prob.inference.draws.summaries import Summary
 from vrdp_prob.inference.posterior import Posterior
-from vrdp_prob.inference.samples import Convergence
 from vrdp_prob.inference.several_videos.linking import SharedNumbers, place_words
 from vrdp_prob.inference.storage import check_format, from_tree, reading, to_tree
-from vrdp_prob.inference.summaries import Summary
 from vrdp_prob.inference.tree import for_arviz
 from vrdp_prob.models import model_file
 from vrdp_prob.models.coordinates import Coordinate

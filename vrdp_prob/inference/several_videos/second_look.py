@@ -11,8 +11,8 @@ import numpy as np
 from jaxtyping import Bool
 
 from vrdp_prob.inference.map_fit import MapFit, fit_map
-from vrdp_prob.inference.parallel import in_processes
-from vrdp_prob.inference.plan import IN_DOUBT, TURNING, TURNING_ON, FitPlan
+from vrdp_prob.inference.runs.parallel import in_processes
+from vrdp_prob.inference.search.plan import IN_DOUBT, TURNING, TURNING_ON, FitPlan
 from vrdp_prob.inference.several_videos.agreement import consensus
 from vrdp_prob.inference.several_videos.parts import carried_starts, link_fits, plain_likelihood, stream
 from vrdp_prob.models.parameters import Prior, Scope

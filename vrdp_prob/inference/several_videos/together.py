@@ -10,25 +10,25 @@ from jaxtyping import Float
 
 from vrdp_prob.errors import InputError
 from vrdp_prob.inference.assembly import posterior_from
-from vrdp_prob.inference.checkpoint import Checkpoint, model_facts, program_facts, videos_facts
-from vrdp_prob.inference.diagnostics import Reported, Statistics
+from vrdp_prob.inference.draws.diagnostics import Reported, Statistics
+from vrdp_prob.inference.draws.samples import ESS_GOAL, PARETO_K_GOAL, Convergence, ModeWeight, Samples, assess
 from vrdp_prob.inference.emcee_sampler import sample_emcee
 from vrdp_prob.inference.infer import check_counts, check_model, default_model
-from vrdp_prob.inference.journal import journal
 from vrdp_prob.inference.map_fit import MapFit
-from vrdp_prob.inference.mode_weights import UNSURE, doubts
 from vrdp_prob.inference.nuts_sampler import sample_nuts
 from vrdp_prob.inference.posterior import Posterior
-from vrdp_prob.inference.proposals import proposals
-from vrdp_prob.inference.rate_steps import RateSteps
-from vrdp_prob.inference.samples import ESS_GOAL, PARETO_K_GOAL, Convergence, ModeWeight, Samples, assess
+from vrdp_prob.inference.runs.checkpoint import Checkpoint, model_facts, program_facts, videos_facts
+from vrdp_prob.inference.runs.journal import journal
+from vrdp_prob.inference.samplers.mode_weights import UNSURE, doubts
+from vrdp_prob.inference.samplers.proposals import proposals
+from vrdp_prob.inference.samplers.rate_steps import RateSteps
+from vrdp_prob.inference.search.yaw_search import unseen_yaws
 from vrdp_prob.inference.several_videos.fitting import SharedFit, check_videos, fit_together
 from vrdp_prob.inference.several_videos.gibbs import sample_gibbs
 from vrdp_prob.inference.several_videos.importance import sample_by_importance
 from vrdp_prob.inference.several_videos.parts import stream
 from vrdp_prob.inference.several_videos.posterior import SharedPosterior, VideoPosteriors
 from vrdp_prob.inference.several_videos.whole_vector import WholeVector
-from vrdp_prob.inference.yaw_search import unseen_yaws
 from vrdp_prob.models.physics import PhysicsModel
 from vrdp_prob.progress import ProgressDisplay
 from vrdp_prob.scene import Tracks

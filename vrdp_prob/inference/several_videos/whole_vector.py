@@ -15,12 +15,12 @@ from jaxtyping import Float, Int
 from scipy.linalg import solve_triangular
 from torch import Tensor
 
-from vrdp_prob.inference.diagnostics import Reported
-from vrdp_prob.inference.events import Pairs, courses_at
-from vrdp_prob.inference.mode import Mode
+from vrdp_prob.inference.draws.diagnostics import Reported
+from vrdp_prob.inference.draws.mode import Mode
+from vrdp_prob.inference.samplers.straightening import Rates
+from vrdp_prob.inference.search.events import Pairs, courses_at
 from vrdp_prob.inference.several_videos.joint_fit import JointFit
 from vrdp_prob.inference.several_videos.linking import LinkedVideo, SharedNumbers
-from vrdp_prob.inference.straightening import Rates
 
 
 @dataclass(frozen=True)

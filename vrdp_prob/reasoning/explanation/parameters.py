@@ -6,7 +6,7 @@ import numpy as np
 import torch
 from jaxtyping import Float
 
-from vrdp_prob.inference.identifiability import Status
+from vrdp_prob.inference.identifiability.status import Status
 from vrdp_prob.reasoning.explanation.quantities import RARE, Kind, Measurement, Quantity
 from vrdp_prob.reasoning.run import World
 from vrdp_prob.reasoning.worlds import PosteriorWorlds

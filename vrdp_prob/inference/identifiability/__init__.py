@@ -1,0 +1,1 @@
+"""What the data say about single masses and restitutions, and what only about combinations."""

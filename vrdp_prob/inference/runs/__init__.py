@@ -1,0 +1,1 @@
+"""Long work: kept in a folder, gone on with, spread over processes."""

@@ -1,0 +1,163 @@
+"""One explanation of the first frames of a video, and whether two of them are the same."""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import torch
+from jaxtyping import Float
+
+from vrdp_prob.inference.search.least_squares import Minimum
+from vrdp_prob.models.coordinates import Coordinates
+from vrdp_prob.models.likelihood import Likelihood
+from vrdp_prob.models.simulator.events import RolloutEventKind
+from vrdp_prob.scene import Shape
+
+QUARTER = np.pi / 2
+"""A square looks the same after a quarter turn (rad)."""
+SLOPE_STEP = 1e-4
+"""Step in spin (rad/s) and in the logarithm of its decay for differences."""
+
+
+@dataclass(frozen=True)
+class Hypothesis:
+    """An explanation of the first frames.
+
+    Parameters
+    ----------
+    point
+        The values.
+    cost
+        Robust negative log posterior (nats, up to a constant) of the frames so far.
+    precision
+        Gauss-Newton curvature when it was last refined.
+    pairs
+        Pairs that have collided, in order.
+    unrefined
+        Windows since it was last refined.
+    earlier
+        What it was after earlier windows, with the time (s) at which each window ended.
+    """
+
+    point: Float[np.ndarray, "dimension"]
+    cost: float
+    precision: Float[np.ndarray, "dimension dimension"]
+    pairs: tuple[tuple[int, int], ...] = ()
+    unrefined: int = 0
+    earlier: tuple[tuple[float, "Hypothesis"], ...] = ()
+
+    def before(self, time: float) -> "Hypothesis":
+        """What it was after the last window that ended before a time (s); itself where there is none."""
+        known = [one for end, one in self.earlier if end < time]
+        return known[-1] if known else self
+
+    def noted(self, end: float) -> "Hypothesis":
+        """The same, remembered as what it is after the window that ends at a time (s)."""
+        kept = tuple((time, one) for time, one in self.earlier if time < end)
+        return replace(self, earlier=(*kept, (end, replace(self, earlier=()))))
+
+
+def yaw_places(likelihood: Likelihood, bodies: Iterable[int] | None = None) -> list[int]:
+    """Places of the yaws (of some bodies) that only contacts tell: cubes whose angle was not measured."""
+    coordinates, tracks = likelihood.coordinates, likelihood.tracks
+    measured = set(likelihood.observations.angle_bodies)
+    chosen = range(len(tracks.bodies)) if bodies is None else sorted(bodies)
+    cubes = (body for body in chosen if tracks.bodies[body].shape is Shape.CUBE and body not in measured)
+    places = (coordinates.places.get(("angle", body)) for body in cubes)
+    return [place for place in places if place is not None]
+
+
+def least_turn(angles: Float[np.ndarray, "*angle"]) -> Float[np.ndarray, "*angle"]:
+    """Turns that a square cannot tell from some angles (rad), by at most an eighth of a turn."""
+    return angles - QUARTER * np.round(angles / QUARTER)
+
+
+def turned_least(
+    points: Float[np.ndarray, "*point dimension"], places: Sequence[int]
+) -> Float[np.ndarray, "*point dimension"]:
+    """The same worlds with the yaws at some places within an eighth of a turn from zero."""
+    result = points.copy()
+    result[..., places] = least_turn(result[..., places])
+    return result
+
+
+def distances(
+    likelihood: Likelihood,
+    reference: Float[np.ndarray, "dimension"],
+    precision: Float[np.ndarray, "dimension dimension"],
+    others: Float[np.ndarray, "point dimension"],
+    frame_count: int | None = None,
+) -> Float[np.ndarray, "point"]:
+    """How far points are from a reference in standard deviations.
+
+    Only the yaw with which a cube meets something is known, so release yaw and spin make up for each other along a
+    curve. Yaws are compared just before the first contact in the reference, where that curve is a straight line; a
+    quarter turn is no difference.
+    """
+    coordinates = likelihood.coordinates
+    before = frames_before_contact(likelihood, reference, frame_count)
+    yaws = [place for place in yaw_places(likelihood) if coordinates.entries[place].owner in before]
+    slopes = [
+        place
+        for place, entry in enumerate(coordinates.entries)
+        if entry.field == "angular_drag" or (entry.field == "spin" and entry.owner in before)
+    ]
+    moved = np.tile(reference, (len(slopes), 1))
+    moved[np.arange(len(slopes)), slopes] += SLOPE_STEP
+    with torch.no_grad():
+        points = torch.from_numpy(np.concatenate([reference[None], moved, others]))
+        turned = likelihood.rollout(points, frame_count).trajectory[..., 2].numpy()
+    change = np.eye(len(reference))
+    difference = turned_least(others - reference, yaw_places(likelihood))
+    for place in yaws:
+        body = coordinates.entries[place].owner or 0
+        angle = turned[:, before[body], body]
+        change[place, slopes] = (angle[1 : len(slopes) + 1] - angle[0]) / SLOPE_STEP
+        difference[:, place] = least_turn(angle[len(slopes) + 1 :] - angle[0])
+    straight = np.linalg.inv(change)
+    metric = straight.T @ precision @ straight
+    return np.sqrt(np.maximum(np.einsum("ij,jk,ik->i", difference, metric, difference), 0.0))
+
+
+def different(
+    likelihood: Likelihood,
+    found: Sequence[Minimum],
+    *,
+    worse: float,
+    most: int,
+    frame_count: int | None = None,
+) -> list[Minimum]:
+    """The best of some minima that are not the same, none of them so many nats worse than the best one."""
+    left = sorted((one for one in found if np.isfinite(one.cost)), key=lambda one: one.cost)
+    left = [one for one in left if one.cost < left[0].cost + worse]
+    kept: list[Minimum] = []
+    while left and len(kept) < most:
+        best = left[0]
+        kept.append(best)
+        precision = best.jacobian.T @ best.jacobian
+        apart = distances(likelihood, best.point, precision, np.array([one.point for one in left]), frame_count) > 1
+        left = [one for one, far in zip(left[1:], apart[1:].tolist(), strict=True) if far]
+    return kept
+
+
+def frames_before_contact(
+    likelihood: Likelihood, point: Float[np.ndarray, "dimension"], frame_count: int | None = None
+) -> dict[int, int]:
+    """Frame just before the first contact of each body that has one after it was released."""
+    with torch.no_grad():
+        events = likelihood.rollout(torch.from_numpy(point[None]), frame_count).events
+    touching = (events.kind == RolloutEventKind.COLLISION) | (events.kind == RolloutEventKind.WALL)
+    frames: dict[int, int] = {}
+    for kind, time, *pair in zip(
+        events.kind[touching], events.time[touching], events.first[touching], events.second[touching], strict=True
+    ):
+        frame = int(np.searchsorted(likelihood.tracks.times, float(time), side="right")) - 1
+        for body in pair if kind == RolloutEventKind.COLLISION else pair[:1]:
+            frames[int(body)] = min(frame, frames.get(int(body), frame))
+    return frames
+
+
+def owned(coordinates: Coordinates, bodies: Iterable[int]) -> np.ndarray:
+    """Which coordinates belong to some bodies."""
+    chosen = set(bodies)
+    return np.array([entry.owner in chosen and entry.field != "wall_restitution" for entry in coordinates.entries])

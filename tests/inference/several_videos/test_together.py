@@ -253,6 +253,7 @@ def test_what_is_not_shared_stays_each_video_s_own() -> None:
     one = fit_together([sliding(1)], model=BASE, shared=[])
     alone = sample_together(one, sampler="laplace", draws=100, hand_on=False)
     assert list(alone.shared) == []
+    assert len(alone.to_arviz()["posterior"].data_vars) == 0
     assert alone.video("slide 1").draw_count == 100
     for sampler in ("gibbs", "emcee"):
         chains = sample_together(one, sampler=sampler, draws=100)
@@ -346,6 +347,8 @@ def test_a_run_that_is_broken_off_ends_with_the_same_numbers(tmp_path: Path, mon
     again = infer_together(videos, model=BASE, checkpoint=folder)
     assert (again.points == whole.points).all()
     assert (folder / "chains.pickle").stat().st_mtime_ns > done
+    with pytest.raises(InputError, match="belongs to another run"):
+        infer_together(videos[::-1], model=BASE, checkpoint=folder)
     (folder / "chains.pickle").write_bytes((folder / "chains.pickle").read_bytes()[:100])
     assert (infer_together(videos, model=BASE, checkpoint=folder).points == whole.points).all()
 

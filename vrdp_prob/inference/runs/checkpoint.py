@@ -22,7 +22,10 @@ from vrdp_prob.scene import Camera, Tracks
 from vrdp_prob.version import __version__
 
 Arrays = Mapping[str, np.ndarray]
-DAMAGED = (pickle.UnpicklingError, EOFError, AttributeError, ImportError, IndexError, KeyError, TypeError, ValueError)
+DAMAGED = (
+    *(pickle.UnpicklingError, EOFError, AttributeError, ImportError, LookupError, TypeError, ValueError),
+    *(RuntimeError, MemoryError, OverflowError),
+)
 """What reading a pickle says that was not written to its end, or damaged since."""
 PACKAGE = Path(__file__).parents[2]
 
@@ -45,8 +48,9 @@ def tracks_facts(tracks: Tracks) -> dict[str, str]:
 
 
 def videos_facts(videos: Sequence[Tracks]) -> dict[str, str]:
-    """Tracks of several videos with their cameras, in short texts by name."""
-    return {f"video {tracks.video}": tracks_facts(tracks)["tracks"] for tracks in videos}
+    """Tracks of several videos with their cameras and their order, in short texts by name."""
+    each = {f"video {tracks.video}": tracks_facts(tracks)["tracks"] for tracks in videos}
+    return {**each, "order of the videos": ", ".join(tracks.video for tracks in videos)}
 
 
 def film_facts(file: Path, camera: Camera | None) -> dict[str, str]:
@@ -79,7 +83,7 @@ def _code() -> str:
 
 
 FINGERPRINT = "fingerprint.json"
-KEPT = ("*.npz", "ensemble_*.h5", "*.pickle")
+KEPT = ("*.npz", "ensemble_*.h5", "step_*.pickle", "chains.pickle")
 """Files of what a run has done."""
 
 
@@ -105,22 +109,34 @@ class Checkpoint:
         check_writable(self.folder)
         self._facts = dict(facts)
         found = self._owner()
+        self._refuse_another(found)
         if found is None and any(any(self.folder.glob(pattern)) for pattern in KEPT):
             raise InputError(
                 f"{self.folder}: there is a checkpoint that does not say what run it belongs to ({FINGERPRINT} is "
                 "missing or cannot be read); choose another folder, or delete this one to start anew."
             )
-        if found is not None and found != self._facts:
-            names = sorted(set(found) | set(facts))
-            other = ", ".join(name for name in names if found.get(name) != facts.get(name))
+
+    def _refuse_another(self, owner: dict[str, str] | None) -> None:
+        """Refuse a folder that belongs to another run."""
+        if owner is not None and owner != self._facts:
+            names = sorted(set(owner) | set(self._facts))
+            other = ", ".join(name for name in names if owner.get(name) != self._facts.get(name))
             raise InputError(
                 f"{self.folder}: the checkpoint belongs to another run (other {other}); choose another folder, or "
                 "delete this one to start anew."
             )
 
     def claim(self) -> None:
-        """From now on the folder belongs to this run, which does so by itself when it keeps something."""
-        if self._owner() is None:
+        """From now on the folder belongs to this run, which does so by itself when it keeps something.
+
+        Raises
+        ------
+        InputError
+            If it belongs to another run by now.
+        """
+        owner = self._owner()
+        self._refuse_another(owner)
+        if owner is None:
             with write_atomically(self.folder / FINGERPRINT) as temporary:
                 temporary.write_text(json.dumps(self._facts, indent=1), encoding="utf-8")
 
@@ -173,7 +189,7 @@ class Checkpoint:
     def thing(self, name: str) -> Any:
         """What was kept as a pickle; None where there is none, or it cannot be read.
 
-        It is read only where the folder says that it belongs to this very run: a pickle may hold any program.
+        A pickle may hold any program: only a folder that one has made oneself is to be gone on with.
         """
         content = self.content(f"{name}.pickle")
         if content is None:
@@ -183,9 +199,14 @@ class Checkpoint:
         except DAMAGED:
             return None
 
-    def keep_thing(self, name: str, thing: object) -> None:
-        """Keep a thing as a pickle, whole or not at all."""
-        self.keep_content(f"{name}.pickle", pickle.dumps(thing))
+    def keep_thing(self, name: str, thing: Any) -> Any:
+        """Keep a thing as a pickle, whole or not at all; gives what a run that is taken up would read.
+
+        That may differ in the layout of arrays, and so in the last digit of what is made of them.
+        """
+        content = pickle.dumps(thing)
+        self.keep_content(f"{name}.pickle", content)
+        return pickle.loads(content)
 
     def keep(self, name: str, arrays: Arrays) -> None:
         """Keep arrays under a name, whole or not at all."""

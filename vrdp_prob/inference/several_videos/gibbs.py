@@ -106,11 +106,14 @@ def sample_gibbs(
     checkpoint
         Keeps the chains after every round; a run that is taken up goes on from there.
     """
-    kept = None if checkpoint is None else checkpoint.thing(CHAINS)
-    sampler = kept if isinstance(kept, _Sampler) else _Sampler(fit, generator, reported)
+    kept: Any = None if checkpoint is None else checkpoint.thing(CHAINS)
     warm = (WARM_UP // 2, WARM_UP)
     stops = [*warm, *(WARM_UP + SWEEPS_PER_ROUND * (done + 1) for done in range(rounds))]
-    with sampler.workers, (progress or SilentProgress()).stage("Sampling all videos", total=stops[-1]) as advance:
+    threads = min(len(fit.videos), os.cpu_count() or 1)
+    display = progress or SilentProgress()
+    with ThreadPoolExecutor(threads) as workers, display.stage("Sampling all videos", total=stops[-1]) as advance:
+        known = isinstance(kept, _Sampler)
+        sampler: _Sampler = kept.with_workers(workers) if known else _Sampler(fit, generator, workers, reported)
         advance(sampler.sweeps)
         for stop in stops:
             if sampler.sweeps < stop:
@@ -120,7 +123,7 @@ def sample_gibbs(
                 if stop in warm:
                     sampler.reshape()
                 if checkpoint is not None:
-                    checkpoint.keep_thing(CHAINS, sampler)
+                    sampler = checkpoint.keep_thing(CHAINS, sampler).with_workers(workers)
             if stop == sampler.sweeps and stop not in warm and sampler.converged():
                 return sampler.draws()
     return replace(sampler.draws(), notes=(f"It stopped after {rounds * SWEEPS_PER_ROUND} sweeps.",))
@@ -264,7 +267,11 @@ class _Sampler:
     """All chains, and the order in which they move. Shared numbers are whitened by the Gaussian of the fit."""
 
     def __init__(
-        self, fit: JointFit, generator: np.random.Generator, reported: Sequence[Reported] | None = None
+        self,
+        fit: JointFit,
+        generator: np.random.Generator,
+        workers: ThreadPoolExecutor,
+        reported: Sequence[Reported] | None = None,
     ) -> None:
         self._fit, self._arrow, self._generator = fit, fit.gaussian, generator
         self._reported = [one.combined for one in reported or ()]
@@ -275,7 +282,7 @@ class _Sampler:
             _Video(video, one, fit.gaussian, stream)
             for video, one, stream in zip(fit.videos, clouds, streams, strict=True)
         ]
-        self.workers = self._new_workers()
+        self._workers = workers
         self.sweeps = 0
         count = GROUPS * CHAINS_PER_GROUP
         self._shape = Shape.unit(len(fit.numbers), 0)
@@ -291,14 +298,12 @@ class _Sampler:
         self._add_up()
 
     def __getstate__(self) -> dict[str, Any]:
-        return {name: value for name, value in self.__dict__.items() if name != "workers"}
+        return {name: value for name, value in self.__dict__.items() if name != "_workers"}
 
-    def __setstate__(self, state: dict[str, Any]) -> None:
-        self.__dict__.update(state)
-        self.workers = self._new_workers()
-
-    def _new_workers(self) -> ThreadPoolExecutor:
-        return ThreadPoolExecutor(max_workers=min(len(self._fit.videos), os.cpu_count() or 1))
+    def with_workers(self, workers: ThreadPoolExecutor) -> "_Sampler":
+        """The same chains, moved by some threads, which are not kept with them."""
+        self._workers = workers
+        return self
 
     def sweep(self) -> None:
         """Move the shared numbers, then each video's own."""
@@ -372,7 +377,7 @@ class _Sampler:
         return self._fit.numbers.log_prior(self._arrow.shared_points(shared))
 
     def _each(self, task: Callable[[_Video], Result]) -> list[Result]:
-        return list(self.workers.map(task, self._videos))
+        return list(self._workers.map(task, self._videos))
 
 
 def _met(sweeps: Sequence[Float[np.ndarray, "chain dimension"]], reported: Reported | None = None) -> bool:

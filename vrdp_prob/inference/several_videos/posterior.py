@@ -207,7 +207,8 @@ class SharedPosterior:
 
     def _log_prior(self) -> xr.Dataset:
         """Log prior (up to a constant) of each shared number in each draw, by the names of the posterior."""
-        terms = self.numbers.log_priors(self.points.reshape(-1, self.points.shape[-1]))
+        chains, draws, count = self.points.shape
+        terms = self.numbers.log_priors(self.points.reshape(chains * draws, count))
         named = self._named(terms.reshape(self.points.shape), ("chain", "draw"))
         return named.map(lambda values: values.drop_attrs(), keep_attrs=False)
 

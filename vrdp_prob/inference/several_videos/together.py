@@ -85,8 +85,9 @@ def infer_together(
     hand_on
         Whether `gibbs` goes on where `laplace` finds that it cannot be trusted.
     checkpoint
-        Folder that keeps what was done: the fits of the videos, and what the sampler has drawn. A run that was killed
-        and is started again with the same arguments goes on from there and ends with the same numbers.
+        Folder that keeps what was done: the fits of the single videos, and what the sampler has drawn. A run that was
+        killed and is started again with the same arguments goes on from there and ends with the same numbers. Its files
+        can hold programs (pickles): go on with folders of your own only.
     progress
         Told how far the work is.
 
@@ -103,9 +104,11 @@ def infer_together(
     physics = default_model() if model is None else model
     own = None
     if checkpoint is not None:
-        settings = {"shared": shared, "sampler": sampler, "seed": seed, "draws": draws}
+        names = None if shared is None else tuple(shared)
+        settings = {"shared": names, "sampler": sampler, "seed": seed, "draws": draws}
         settings |= {"model_error": model_error, "hand_on": hand_on}
         own = Checkpoint(checkpoint, {**videos_facts(videos), **model_facts(physics), **program_facts(**settings)})
+        own.claim()
     with journal(own):
         fit = fit_together(videos, model=physics, shared=shared, seed=seed, model_error=model_error, progress=progress)
     return _sampled(fit, sampler, seed=seed, draws=draws, hand_on=hand_on, checkpoint=own, progress=progress)

@@ -137,6 +137,7 @@ def test_nothing_is_asked_of_masses_where_collisions_tell_none(bodies: int) -> N
     assert "friction of the bodies against mass" not in by_name(run_checks(fit, seed=0))
 
 
+@pytest.mark.slow
 def test_friction_that_goes_with_masses_that_nobody_stated_is_seen() -> None:
     data = hide(["mass_dependent_friction"], seed=1, effect_size=6.0, setting=Setting(videos=5, bodies=3))
     fit = fit_together(data.tracks, model=default_model(), model_error=False)

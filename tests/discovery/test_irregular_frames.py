@@ -29,6 +29,7 @@ def found() -> tuple[Trial, Trial]:
     return with_cause("irregular_frames", SIZE, IrregularFrames(), seed=SEED)
 
 
+@pytest.mark.slow
 def test_the_jitter_is_that_of_the_truth(found: tuple[Trial, Trial]) -> None:
     data, fit = fitted("irregular_frames", SIZE, seed=SEED)
     base, trial = found

@@ -93,6 +93,7 @@ def test_forecasts_of_a_null_are_as_far_off_as_they_say() -> None:
     assert found.pit[0] + found.pit[-1] < 0.5
 
 
+@pytest.mark.slow
 def test_a_body_that_comes_after_the_fitted_frames_is_not_predicted() -> None:
     data, before = fitted(seed=1)
     late = []

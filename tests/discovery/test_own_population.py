@@ -27,6 +27,7 @@ def spread_of(fit: SharedFit) -> float:
     return fit.model.believed(FRICTION_RATIO).prior.sd
 
 
+@pytest.mark.slow
 def test_friction_by_mass_makes_bodies_alike_and_is_worth_it() -> None:
     data = hide(["mass_dependent_friction"], seed=1, effect_size=3.0, setting=Setting(videos=6, bodies=3))
     fit = fit_together(data.tracks, model=default_model(), model_error=False)

@@ -57,6 +57,7 @@ def test_a_body_at_rest_has_no_release_velocity_though_few_frames_show_it(shape:
     assert fit.misfit.ratio < 1.2
 
 
+@pytest.mark.slow
 def test_a_posterior_says_that_it_takes_a_body_to_have_been_at_rest() -> None:
     posterior = infer(hit_soon((0.0, 0.0)), sampler="laplace", seed=0, draws=100)
     assert "Object 1 was hit too soon to show motion: taken to have been at rest." in posterior.warnings

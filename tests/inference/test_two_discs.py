@@ -71,6 +71,7 @@ def test_nuts_agrees_with_emcee() -> None:
     assert drawn.std() == pytest.approx(float(ratio.std()), rel=0.5)
 
 
+@pytest.mark.slow
 def test_a_video_whose_sampling_was_killed_goes_on_to_the_same_numbers(tmp_path: Path) -> None:
     folder, about_half = tmp_path / "checkpoint", tmp_path / "checkpoint" / "ensemble_2.h5"
     program = "import sys; from pathlib import Path; from tests.inference.test_two_discs import by_emcee; "

@@ -99,8 +99,9 @@ def samplers(videos: Sequence[Tracks], names: Sequence[str]) -> list[Check]:
 def _sampler_checks(results: dict[str, list[tuple[float, float, bool]]]) -> list[Check]:
     checks, rates = [], {}
     for key, values in ((key, values) for key, values in results.items() if values):
-        seconds, rate = (float(np.median(column)) for column in list(zip(*values, strict=True))[:2])
-        converged = float(np.mean([one for *_, one in values]))
+        each_seconds, each_rate, each_converged = zip(*values, strict=True)
+        seconds, rate = float(np.median(each_seconds)), float(np.median(each_rate))
+        converged = float(np.mean(each_converged))
         checks.append(check(f"{key}: processor seconds, median", seconds, GOALS[key], met=seconds <= GOALS[key]))
         checks.append(check(f"{key}: share of videos converged", converged, 1.0, met=converged == 1.0))
         if key != "laplace":

@@ -136,7 +136,7 @@ def _row(result: Result) -> list[str]:
     cells = [f"`{result['name']}`", str(result["videos"]), result["verdict"]]
     cells.append(", ".join(f"`{one['name']}` {one['probability']:.2f}" for one in named) or "-")
     gains = [one["held_out_gain"] for one in named]
-    cells.append(", ".join(f"{one['elpd_difference']:.0f} ± {one['elpd_se']:.0f}" for one in gains) or "-")
+    cells.append(", ".join(map(_nats, gains)) or "-")
     cells += [
         ", ".join(f"{_mm(one['before'][key])} → {_mm(one['after'][key])}" for one in gains) or "-"
         for key in ("rmse", "rmse_one_second")
@@ -144,6 +144,10 @@ def _row(result: Result) -> list[str]:
     cells.append(", ".join(_covered(one) for one in gains) or "-")
     noise = _mm(gains[0]["noise_sd"]) if gains else "-"
     return [*cells, noise, _failing(result), f"{result['seconds'] / 60:.0f}", f"`{result['version']}`"]
+
+
+def _nats(gain: Result) -> str:
+    return f"{gain['elpd_difference']:.0f} ± {gain['elpd_se']:.0f}"
 
 
 def _covered(gain: Result) -> str:
@@ -182,9 +186,7 @@ def _recovered(results: Sequence[Result], tasks: Mapping[str, Task]) -> list[str
             found = cause["parameters"][TRUE_PARAMETER[task.way]]
             inside = "yes" if found["q025"] <= task.strength <= found["q975"] else "**no**"
             interval = f"{found['mean']:.3g} ({found['q025']:.3g} to {found['q975']:.3g})"
-            gain = cause["held_out_gain"]
-            told = f"{gain['elpd_difference']:.0f} ± {gain['elpd_se']:.0f}"
-            cells += [f"{cause['probability']:.2f}", interval, inside, told]
+            cells += [f"{cause['probability']:.2f}", interval, inside, _nats(cause["held_out_gain"])]
         beside = ", ".join(f"`{one}`" for one in others) or "-"
         lines.append(table_row(*cells, _failing(result), beside, f"`{result['version']}`"))
     return lines

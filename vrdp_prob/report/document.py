@@ -6,6 +6,7 @@ from dataclasses import asdict
 from importlib import resources
 from typing import Any, Literal
 
+from vrdp_prob.inference.search.misfit import Misfit
 from vrdp_prob.report.content import ReportContent
 
 
@@ -50,14 +51,16 @@ def to_document(content: ReportContent) -> dict[str, Any]:
             "ess_tail": _finite(convergence.ess_tail),
             "worst": convergence.worst,
         },
-        "misfit": None
-        if (misfit := content.misfit) is None
-        else {**asdict(misfit), "chi_square": misfit.chi_square, "fits": misfit.fits},
+        "misfit": None if content.misfit is None else _misfit(content.misfit),
         "collision_groups": [asdict(group) for group in content.groups],
         "prior_sensitivity": [one.to_document() for one in content.sensitivities],
         "answers": [item.to_document() for item in content.answers],
         "warnings": list(content.warnings),
     }
+
+
+def _misfit(misfit: Misfit) -> dict[str, Any]:
+    return {**asdict(misfit), "chi_square": misfit.chi_square, "fits": misfit.fits}
 
 
 def _finite(value: float | None) -> float | None:

@@ -12,9 +12,7 @@ SMALLER = 0.95
 
 
 def stated_smaller(tracks: Tracks) -> Tracks:
-    sizes = [body.radius for body in tracks.bodies]
-    bodies = [replace(body, radius=SMALLER * size) for body, size in zip(tracks.bodies, sizes, strict=True) if size]
-    return replace(tracks, bodies=tuple(bodies))
+    return replace(tracks, bodies=tuple(replace(body, radius=SMALLER * body.radius) for body in tracks.bodies))
 
 
 def test_several_videos_tell_together_by_how_much_radii_are_wrong() -> None:

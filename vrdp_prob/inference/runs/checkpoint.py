@@ -172,31 +172,16 @@ class Checkpoint:
         except (OSError, ValueError):
             return None
 
-    def content(self, name: str) -> bytes | None:
-        """Content of a file that was kept; None where there is none. Reading does not claim the folder."""
-        if self._owner() is None:
-            return None
-        try:
-            return (self.folder / name).read_bytes()
-        except OSError:
-            return None
-
-    def keep_content(self, name: str, content: bytes) -> None:
-        """Keep the content of a file, whole or not at all."""
-        with write_atomically(self.path(name)) as temporary:
-            temporary.write_bytes(content)
-
     def thing(self, name: str) -> Any:
         """What was kept as a pickle; None where there is none, or it cannot be read.
 
         A pickle may hold any program: only a folder that one has made oneself is to be gone on with.
         """
-        content = self.content(f"{name}.pickle")
-        if content is None:
+        if self._owner() is None:
             return None
         try:
-            return pickle.loads(content)
-        except DAMAGED:
+            return pickle.loads((self.folder / f"{name}.pickle").read_bytes())
+        except (OSError, *DAMAGED):
             return None
 
     def keep_thing(self, name: str, thing: Any) -> Any:
@@ -205,7 +190,8 @@ class Checkpoint:
         That may differ in the layout of arrays, and so in the last digit of what is made of them.
         """
         content = pickle.dumps(thing)
-        self.keep_content(f"{name}.pickle", content)
+        with write_atomically(self.path(f"{name}.pickle")) as temporary:
+            temporary.write_bytes(content)
         return pickle.loads(content)
 
     def keep(self, name: str, arrays: Arrays) -> None:

@@ -21,7 +21,7 @@ import numpy as np
 import torch
 import xarray
 
-from vrdp_prob.inference.runs.checkpoint import DAMAGED, Checkpoint
+from vrdp_prob.inference.runs.checkpoint import Checkpoint
 
 Result = TypeVar("Result")
 Arguments = ParamSpec("Arguments")
@@ -44,27 +44,23 @@ class Step:
 
     def __init__(self, checkpoint: Checkpoint, number: int, work: tuple[Callable[..., Any], tuple[Any, ...]]) -> None:
         self._checkpoint = checkpoint
-        self._file = f"step_{number:05d}.pickle"
+        self._name = f"step_{number:05d}"
         self._work = pickle.dumps(work)
         self._digest = _digest(work)
 
     def read(self) -> tuple[Any] | None:
         """Its result, alone in a tuple; None where it has to be made."""
-        content = self._checkpoint.content(self._file)
-        if content is None:
+        found = self._checkpoint.thing(self._name)
+        if not isinstance(found, tuple) or len(found) != len(("digest", "result")):
             return None
-        try:
-            work, result = pickle.loads(content)
-        except DAMAGED:
-            return None
+        work, result = found
         return (result,) if work == self._digest else None
 
     def make(self) -> Any:
         """Its result, which is kept."""
         function, arguments = pickle.loads(self._work)
-        content = pickle.dumps((self._digest, function(*arguments)))
-        self._checkpoint.keep_content(self._file, content)
-        return pickle.loads(content)[1]
+        _, result = self._checkpoint.keep_thing(self._name, (self._digest, function(*arguments)))
+        return result
 
 
 def _digest(thing: object) -> str:

@@ -14,7 +14,9 @@ from _discovery_results import (
     alarm,
     alone,
     answer,
+    below,
     between,
+    bounds,
     checks,
     clearly_gains,
     covered,
@@ -48,6 +50,7 @@ def tables(results: Sequence[Result]) -> str:
         "Removed from the catalogue": _removed(results),
         "Gain in held-out videos": _gains(results),
         "Coverage of 95 % intervals": _coverage(results),
+        "Upper bounds of what was hidden and not named": _limits(results),
         "What failed": _failures(results),
         "Of which code": _versions(results),
     }
@@ -187,6 +190,23 @@ def _coverage(results: Sequence[Result]) -> str:
     rows = [(name, str(Share(mine, covered))) for name, mine in found.items()]
     rows.append(("all", str(Share([one for mine in found.values() for one in mine], covered))))
     return _table(("parameter", "truth inside"), rows) if found else ""
+
+
+def _limits(results: Sequence[Result]) -> str:
+    found = bounds(results)
+    rows = []
+    for name, mine in (*found.items(), ("all", [one for several in found.values() for one in several])):
+        ratios = [one["bound"] / one["truth"] for one in mine if one["bound"] is not None and one["truth"] > 0]
+        rows.append(
+            (
+                name,
+                str(Share(mine, below)),
+                f"{np.median(ratios):.1f}" if ratios else "-",
+                str(sum(one["bound"] is None for one in mine)),
+            )
+        )
+    head = ("parameter", "no more than the bound (95 %)", "bound over what was hidden, median", "no bound")
+    return _table(head, rows) if found else ""
 
 
 def _failures(results: Sequence[Result]) -> str:

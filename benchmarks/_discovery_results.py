@@ -138,6 +138,20 @@ def covered(estimate: Result) -> bool:
     return bool(estimate["low"] <= estimate["truth"] <= estimate["high"])
 
 
+def bounds(results: Sequence[Result]) -> dict[str, list[Result]]:
+    """Upper bounds of what was hidden and is not told of, by the parameter."""
+    found: dict[str, list[Result]] = {}
+    for result in of(results, Kind.ONE, Kind.TWO):
+        for bound in result.get("bounds", ()):
+            found.setdefault(bound["parameter"], []).append(bound)
+    return found
+
+
+def below(bound: Result) -> bool:
+    """Whether there was no more of it than the bound says; where the data put none on it, that says nothing wrong."""
+    return bound["bound"] is None or bool(bound["truth"] <= bound["bound"])
+
+
 def checks(results: Sequence[Result]) -> list[dict[str, Any]]:
     """Goals of discovery."""
     ones, nulls = of(results, Kind.ONE), of(results, *NULLS)
@@ -162,6 +176,10 @@ def checks(results: Sequence[Result]) -> list[dict[str, Any]]:
         low, high = inside.interval
         coverage = _measured("95 % intervals that hold the truth, within binomial error", inside)
         entries.append({**coverage, "goal": CERTAIN, "ok": low <= CERTAIN <= high})
+    if limits := [bound for mine in bounds(results).values() for bound in mine]:
+        held = Share(limits, below)
+        entry = _measured("95 % upper bounds that hold what was hidden and not named, within binomial error", held)
+        entries.append({**entry, "goal": CERTAIN, "ok": held.interval[1] >= CERTAIN})
     return [*entries, _at_most("data sets on which discovery failed", sum("exception" in one for one in results), 0)]
 
 

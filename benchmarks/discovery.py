@@ -15,7 +15,7 @@ import os
 import sys
 import time
 import traceback
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -138,8 +138,21 @@ def outcome(finding: Finding, truth: Truth) -> Result:
         "causes": [_cause(cause, truth) for cause in finding.causes],
         "failing_checks": [check.name for check in finding.checks if check.significant],
         "failing_checks_after": [check.name for check in finding.checks_after if check.significant],
+        "bounds": list(_bounds(finding, truth)),
         "notes": list(finding.notes),
     }
+
+
+def _bounds(finding: Finding, truth: Truth) -> Iterator[Result]:
+    """Upper bounds of what was hidden and is not told of, each beside how much of it there was."""
+    hidden = {cause.name for cause in truth.causes}
+    for bound in finding.upper_bounds:
+        asked = {bound.parameter: 0.0} | ({} if isinstance(bound.vanishes_at, float) else {bound.vanishes_at: 0.0})
+        true = true_values(truth, asked)
+        nothing = bound.vanishes_at if isinstance(bound.vanishes_at, float) else true.get(bound.vanishes_at)
+        if bound.name in hidden and bound.parameter in true and nothing is not None:
+            strength = abs(true[bound.parameter] - nothing)
+            yield {"name": bound.name, "parameter": bound.parameter, "bound": bound.bound, "truth": strength}
 
 
 def _cause(cause: FoundCause, truth: Truth) -> Result:

@@ -28,6 +28,7 @@ def test_friction_of_contacts_is_told_by_the_videos_that_nothing_else_explains()
     assert found[0][1] > 50
 
 
+@pytest.mark.slow
 def test_nothing_is_searched_with_what_is_neither_likely_nor_acts_in_contacts() -> None:
     _, fit = fitted("contact_friction", 3.0, seed=1)
     assert causes_of_lost_videos(fit, [0, 1], [SurfaceTilt(), ClockError()], set(), 6.0, seed=0) == []

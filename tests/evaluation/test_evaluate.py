@@ -120,6 +120,7 @@ def test_a_killed_evaluation_goes_on(folder: Path, tmp_path: Path) -> None:
     assert {**expected, "seconds_per_video": 0} == {**again, "seconds_per_video": 0}
 
 
+@pytest.mark.slow
 def test_results_of_other_settings_are_not_mixed(folder: Path, tmp_path: Path) -> None:
     evaluate(folder, folder / "questions.json", scenes=(10, 11), draws=DRAWS, out=tmp_path, processes=1)
     with pytest.raises(InputError, match=r"another run \(other seed\)"):
@@ -158,6 +159,7 @@ def test_one_video_gives_no_intervals(folder: Path, tmp_path: Path) -> None:
     assert any(line.startswith("1 video, ") for line in table(alone))
 
 
+@pytest.mark.slow
 def test_a_quiet_evaluation_prints_nothing(folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     command = ["evaluate", str(folder), "--questions", str(folder / "questions.json"), "--scenes", "10:11"]
     command += ["--processes", "1", "--out", str(tmp_path)]

@@ -15,6 +15,7 @@ def posterior() -> Posterior:
     return inferred()
 
 
+@pytest.mark.slow
 def test_masses_of_bodies_that_only_repel_each_other_are_found(posterior: Posterior) -> None:
     log_mass = np.log(posterior.data["posterior"]["mass"].values.reshape(-1, 3))
     sd = log_mass.std(axis=0)
@@ -23,6 +24,7 @@ def test_masses_of_bodies_that_only_repel_each_other_are_found(posterior: Poster
     assert [one.mass.status for one in posterior.status.values()] == [Status.IDENTIFIED] * 3
 
 
+@pytest.mark.slow
 def test_only_the_restitution_of_bodies_that_never_collide_is_called_a_default(posterior: Posterior) -> None:
     assert [one.restitution.status for one in posterior.status.values()] == [Status.DEFAULT] * 3
     told = [sentence for sentence in posterior.warnings if "default" in sentence]

@@ -16,7 +16,10 @@ from vrdp_prob.inference.samplers.mixture import Jumps, Mixture
 SAMPLERS = {"emcee": sample_emcee, "nuts": sample_nuts, "laplace": sample_laplace}
 
 
-@pytest.mark.parametrize("name", SAMPLERS)
+NUTS_SLOWLY = [pytest.param(one, marks=pytest.mark.slow) if one == "nuts" else one for one in SAMPLERS]
+
+
+@pytest.mark.parametrize("name", NUTS_SLOWLY)
 def test_two_modes_get_the_weights_that_they_have(name: str) -> None:
     target = TwoModes()
     options = {"processes": 1, "warm_up": 20, "most_gradients": 1} if name == "nuts" else {}
@@ -53,9 +56,7 @@ def test_a_mode_that_hardly_a_draw_is_in_forbids_to_trust_the_others(monkeypatch
     assert "Hardly a draw is in mode 2, which holds 0.0" in convergence.sentence
 
 
-@pytest.mark.parametrize(
-    "name", [pytest.param(one, marks=pytest.mark.slow) if one == "nuts" else one for one in SAMPLERS]
-)
+@pytest.mark.parametrize("name", NUTS_SLOWLY)
 def test_jumps_reach_a_mode_that_the_fit_did_not_find(name: str) -> None:
     target = TwoModes()
     known = Mixture.of(target.start.components[0])

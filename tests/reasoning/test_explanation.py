@@ -112,6 +112,7 @@ def test_weighing_lowers_the_entropy_as_predicted(part: Part) -> None:
     assert np.mean(found) < predicted.before - 0.3
 
 
+@pytest.mark.slow
 def test_filming_on_lowers_the_entropy_as_predicted(part: Part, monkeypatch: pytest.MonkeyPatch) -> None:
     """Each truth is run by the integrator of the tests, filmed for longer, and asked about the same time."""
     predicted = part.observations[0]

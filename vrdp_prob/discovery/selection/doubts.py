@@ -87,6 +87,12 @@ def doubts(trial: Trial, cause: Effect, left: Sequence[Check] = ()) -> Iterator[
         )
 
 
+def causes_with_own_check_failing(checks: Sequence[Check]) -> set[str]:
+    """Names of causes whose very traces some checks have found."""
+    failing = {check.name for check in checks if check.significant}
+    return {name for name, own in OWN_CHECKS.items() if failing.intersection(own)}
+
+
 def with_doubts(
     shares: Float[np.ndarray, "model"], reasons: Mapping[int, Sequence[Doubt]]
 ) -> Float[np.ndarray, "model"]:

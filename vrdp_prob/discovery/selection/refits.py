@@ -10,7 +10,9 @@ from jaxtyping import Float
 from vrdp_prob.discovery.candidates.proposals import hidden_things
 from vrdp_prob.discovery.candidates.scores import CauseScore, happens_once, score_causes
 from vrdp_prob.discovery.candidates.single_videos import causes_of_lost_videos, lost_videos
+from vrdp_prob.discovery.checks.battery import run_checks
 from vrdp_prob.discovery.residuals.overdispersion import overdispersion
+from vrdp_prob.discovery.selection.doubts import causes_with_own_check_failing
 from vrdp_prob.discovery.selection.trials import Trial, gain
 from vrdp_prob.inference.runs.parallel import in_processes
 from vrdp_prob.inference.several_videos.ascent import ImpossibleStartError
@@ -104,13 +106,22 @@ class Refits:
         return self._made[trial]
 
     def _new(self, trial: Trial) -> list[Trial]:
-        """Refits in any order; hidden things are tried only where nothing explains the videos better than kicks do."""
+        """Refits in any order; hidden things are tried only where nothing explains the videos better than kicks do.
+
+        Where nothing brings enough, causes are tried, too, for whose own traces a check has been made that fails: what
+        lies in numbers that bodies have of their own anyway is hardly seen in residuals.
+        """
         scores = self.left(trial).scores
         likely = _shortlist(scores)
         close = _shortlist(scores, CLOSE)
         found = self.made_of(trial, close)
         if not self.settled(trial, found):
             found += self.made_of(trial, [one for one in likely if one not in close], beside=found)
+            found.sort(key=merit, reverse=True)
+        if not trial.causes and (not found or found[0].brought(trial) < self.needed):
+            tried = {one.causes[-1].name for one in found}
+            seen = causes_with_own_check_failing(run_checks(trial.fit, seed=self.seed)) - tried
+            found += self.made_of(trial, [one for one in scores if one.effect.name in seen], beside=found)
             found.sort(key=merit, reverse=True)
         kicks = next((one for one in scores if _kicks(one) and one.sites), None)
         if kicks is not None and (not found or found[0].causes[-1].name == kicks.effect.name):

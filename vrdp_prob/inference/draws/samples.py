@@ -215,7 +215,7 @@ class Convergence:
         """The verdict in plain words, and how it came about."""
         facts = []
         if self.r_hat is not None:
-            facts.append(f"R-hat {self.r_hat:.3f} (goal {R_HAT_GOAL:g} or less)")
+            facts.append(f"R-hat {self.r_hat:.4f} (goal {R_HAT_GOAL:g} or less)")
         if self.ess_bulk is not None:
             tail = "" if self.ess_tail is None else f" and {self.ess_tail:.0f} in the tails"
             facts.append(f"effective sample size {self.ess_bulk:.0f}{tail} (goal {self.ess_goal:g})")

@@ -6,11 +6,12 @@ Runs what `vrdp-prob discover FOLDER` runs, on each set of ../shared/data that m
 are left out and predicted. Then an effect of known strength is added to the same tracks, so that noise and misfit are
 real and the truth is known. `finding.html` of each run is kept in `--results`, as are its steps, so that a run that was
 interrupted goes on (its seconds are then those since); delete that folder after a change of the code. `--docs` writes
-the tables into `measured-data.md` there.
+the tables into `measured-data.md` there, and figures of tracks as they are beside it.
 """
 
 import argparse
 import os
+import shutil
 import sys
 import time
 from collections.abc import Mapping, Sequence
@@ -34,6 +35,13 @@ from vrdp_prob.models.simulator.rollout import compile_model
 DATA = Path(__file__).parents[2] / "shared" / "data"
 RESULTS = Path("out") / "measured"
 FREE, GLIDERS, PUCKS = "glider_free_1d", "glider_collisions_1d_rubber", "puck_collisions_2d"
+DRAWN = (
+    "Missing acceleration over the plane",
+    "Missing acceleration against speed",
+    "Tangential against normal impulse",
+)
+"""Figures of the page of a finding that are kept as files too."""
+WHITE = '<rect width="100%" height="100%" fill="white"/>'
 TRUE_PARAMETER = {"surface_tilt": "tilt_x", "linear_drag": "linear_drag", "lens_distortion": "distortion"}
 
 
@@ -91,6 +99,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     )
     text = "\n".join([*_findings(results, tasks), *_recovered(results, tasks)])
     publish(text, "measured-data.md", {"results": results}, options)
+    if options.docs:
+        _copy_figures(options.results, [name for name, task in tasks.items() if task.way is None], options.docs)
     return 0
 
 
@@ -115,7 +125,23 @@ class _Searched:
         finding = discover(videos, seed=0, processes=1, checkpoint=self.folder / "steps" / task.name)
         seconds = time.process_time() - begin
         write_finding(finding, self.folder / task.name)
+        for title in finding.figures.keys() & set(DRAWN):
+            figure = finding.figures[title].replace(">", f">{WHITE}", 1)
+            figure_file(self.folder / task.name, title).write_text(figure, encoding="utf-8")
         return {"name": task.name, "videos": len(videos), "seconds": seconds, **_summary(finding)}
+
+
+def figure_file(folder: Path, title: str) -> Path:
+    """Where a figure of a finding is kept."""
+    return folder / f"{title.lower().replace(' ', '-')}.svg"
+
+
+def _copy_figures(folder: Path, names: Sequence[str], docs: Path) -> None:
+    """Figures of findings to the documentation, as far as they are there; others stay as they are."""
+    for name in names:
+        for title in DRAWN:
+            if (kept := figure_file(folder / name, title)).exists():
+                shutil.copyfile(kept, docs / "figures" / f"measured-{name}-{kept.name}")
 
 
 def _summary(finding: Finding) -> Result:

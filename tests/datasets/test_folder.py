@@ -136,6 +136,20 @@ def test_times_long_after_their_zero_are_told_apart(tmp_path: Path) -> None:
     np.testing.assert_allclose(np.diff(load(tmp_path).times), 0.04, atol=1e-6)
 
 
+def test_dialects_of_tables(folder: Path) -> None:
+    text = (folder / "tracks.csv").read_text()
+    (folder / "tracks.csv").write_text(text.replace(",", ";"))
+    with pytest.raises(
+        InputError, match=r"tracks\.csv: columns .* missing; cells are parted by ';', part them by commas"
+    ):
+        read_folder(folder)
+    (folder / "tracks.csv").write_text(text.replace("time,x", "time,time,x", 1))
+    with pytest.raises(InputError, match=r"tracks\.csv: the column time is there twice; keep one"):
+        read_folder(folder)
+    (folder / "tracks.csv").write_text(text + "," * text.splitlines()[0].count(",") + "\n")
+    assert len(read_folder(folder)) == 2
+
+
 def test_videos_of_one_name_are_told_apart(tmp_path: Path) -> None:
     for suffix in ("avi", "mp4"):
         (tmp_path / f"clip.{suffix}").write_bytes(b"")

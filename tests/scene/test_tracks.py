@@ -34,3 +34,42 @@ def test_a_body_that_begins_in_a_wall_is_refused(wall: Wall, distance: float | N
         return
     with pytest.raises(InputError, match=rf"v: object a overlaps the wall .* \(centre {distance:g} m from it"):
         Tracks.from_arrays(*arguments, walls=(wall,))
+
+
+def test_noise_of_half_a_radius_is_no_overlap() -> None:
+    generator = np.random.default_rng(0)
+    bodies = (Body("a", Shape.CYLINDER, 0.025), Body("b", Shape.CYLINDER, 0.025))
+    for _ in range(100):
+        positions = np.zeros((30, 2, 2)) + np.array([[0.0, 0.0], [0.05, 0.0]]) + generator.normal(0, 0.0125, (30, 2, 2))
+        assert Tracks.from_arrays("v", bodies, np.arange(30) / 25, positions).bodies
+    with pytest.raises(InputError, match="objects a and b overlap at 0 s"):
+        Tracks.from_arrays("v", bodies, np.arange(30) / 25, np.zeros((30, 2, 2)))
+
+
+@pytest.mark.parametrize("low", [-np.pi, 0.0])
+def test_angles_that_wrap_are_refused(low: float) -> None:
+    angles = 0.3 * np.arange(60.0)[:, None]
+    wrapped = np.mod(angles - low, 2 * np.pi) + low
+    arguments = ("v", (Body("a", Shape.CUBE, 0.1),), np.arange(60) / 25, np.zeros((60, 1, 2)))
+    with pytest.raises(
+        InputError, match=r"the angle of object a jumps by 5\.98 rad at .* s; give angles in rad that do not wrap"
+    ):
+        Tracks.from_arrays(*arguments, angles=wrapped)
+    assert Tracks.from_arrays(*arguments, angles=np.unwrap(wrapped, axis=0)).angles is not None
+
+
+def test_fast_turning_and_gross_errors_of_angles_are_none_that_wrap() -> None:
+    arguments = ("v", (Body("a", Shape.CUBE, 0.1),), np.arange(60) / 25, np.zeros((60, 1, 2)))
+    angles = 4.0 * np.arange(60.0)[:, None]
+    assert Tracks.from_arrays(*arguments, angles=angles).angles is not None
+    angles = 0.1 * np.arange(60.0)[:, None]
+    angles[30] += 5.0
+    assert Tracks.from_arrays(*arguments, angles=angles).angles is not None
+
+
+def test_times_of_day_are_counted_from_the_first_frame() -> None:
+    arguments = ("v", (Body("a", Shape.CYLINDER, 0.1),))
+    tracks = Tracks.from_arrays(*arguments, 1.7e9 + np.arange(5) / 25, np.zeros((5, 1, 2)))
+    np.testing.assert_allclose(tracks.times, np.arange(5) / 25, atol=1e-6)
+    assert tracks.until(0.1).data.attrs["time_origin"] == 1.7e9
+    assert Tracks.from_arrays(*arguments, 3.0 + np.arange(5) / 25, np.zeros((5, 1, 2))).times[0] == 3.0

@@ -76,11 +76,13 @@ def read_rows(path: Path, required: Sequence[str]) -> Iterator[Row]:
                 raise InputError(f"{path}: the file is empty; it needs a header with {', '.join(required)}.")
             missing = [name for name in required if name not in header]
             if missing:
-                raise InputError(
-                    f"{path}: column{'s' * (len(missing) > 1)} {', '.join(missing)} missing; add to the header."
-                )
+                other = next((one for one in (";", "\t") if any(one in name for name in header)), None)
+                remedy = "add to the header" if other is None else f"cells are parted by {other!r}, part them by commas"
+                raise InputError(f"{path}: column{'s' * (len(missing) > 1)} {', '.join(missing)} missing; {remedy}.")
+            if twice := [name for name in header if name and header.count(name) > 1]:
+                raise InputError(f"{path}: the column {twice[0]} is there twice; keep one.")
             for cells in reader:
-                if not cells:
+                if not any(cell.strip() for cell in cells):
                     continue
                 if len(cells) != len(header):
                     raise InputError(

@@ -18,6 +18,7 @@ from vrdp_prob.discovery.selection.mimics import Unlisted
 from vrdp_prob.discovery.selection.search import Search
 from vrdp_prob.discovery.selection.tried import tried_causes
 from vrdp_prob.inference import default_model
+from vrdp_prob.inference.assembly import limits_of_tracks
 from vrdp_prob.inference.infer import check_model
 from vrdp_prob.inference.runs.checkpoint import Checkpoint, model_facts, program_facts, videos_facts
 from vrdp_prob.inference.runs.journal import journal
@@ -101,6 +102,7 @@ def discover(
         notes=(
             *_notes(found, outcome.reasons, outcome.unlisted, doubtful=doubtful and bool(causes)),
             *mass_scale_notes(_told(found, causes), videos),
+            *_limits(videos),
         ),
         figures=residual_figures(
             found.base.fit,
@@ -111,6 +113,17 @@ def discover(
         left_out=models_of_the_others(found.base, found.best, found.overdispersion),
         tried=tuple(tried),
     )
+
+
+def _limits(videos: Sequence[Tracks]) -> list[str]:
+    """What limits any result from these tracks, with the videos of which it is true where it is not true of all."""
+    told: dict[str, list[str]] = {}
+    for tracks in videos:
+        for sentence in limits_of_tracks(tracks):
+            told.setdefault(sentence, []).append(tracks.video)
+    return [
+        sentence if len(names) == len(videos) else f"{', '.join(names)}: {sentence}" for sentence, names in told.items()
+    ]
 
 
 def _facts(videos: Sequence[Tracks], model: PhysicsModel, catalogue: Sequence[Effect], seed: int) -> dict[str, str]:

@@ -14,11 +14,13 @@ from vrdp_prob.inference.identified import identified
 from vrdp_prob.inference.map_fit import MapFit
 from vrdp_prob.inference.posterior import Posterior
 from vrdp_prob.inference.search.events import collision_sequences
+from vrdp_prob.inference.search.free_flight import SPAN
 from vrdp_prob.inference.tree import posterior_tree
 from vrdp_prob.models.parameters import MASS, RESTITUTION
 from vrdp_prob.models.roughness import untold_noise
 from vrdp_prob.models.unknowns import mass_prior, prior_restitutions
 from vrdp_prob.scene import Tracks
+from vrdp_prob.scene.tracks import ORIGIN
 
 FEWEST_FRAMES = 5
 """Frames below which a video hardly shows a motion."""
@@ -115,7 +117,7 @@ def _warnings(fit: MapFit, convergence: Convergence, status: dict[str, BodyStatu
         sentences.append("The search for the most probable values ended before it had converged.")
     if fit.search.sentence:
         sentences.append(fit.search.sentence)
-    sentences += _of_tracks(fit.likelihood.tracks)
+    sentences += limits_of_tracks(fit.likelihood.tracks)
     found = {frozenset(pair) for pair in fit.contacts}
     seen = {(contact.first, contact.second) for contact in fit.clues.contacts}
     missed = {pair for pair in seen if frozenset(pair) not in found}
@@ -131,8 +133,15 @@ def _warnings(fit: MapFit, convergence: Convergence, status: dict[str, BodyStatu
     return [*sentences, *_untold(fit, status, drawn=drawn)]
 
 
-def _of_tracks(tracks: Tracks) -> Iterator[str]:
-    """What limits any result from some tracks."""
+def limits_of_tracks(tracks: Tracks) -> Iterator[str]:
+    """What limits any result from some tracks, in sentences."""
+    if (origin := tracks.data.attrs.get(ORIGIN)) is not None:
+        yield f"Times are counted from the first frame, which is at {origin:.10g} s."
+    if (step := float(np.median(np.diff(tracks.times)))) > SPAN:
+        yield (
+            f"Frames are {step:.3g} s apart, and contacts are told by what is seen within {SPAN:g} s of them: see "
+            "whether times are in s."
+        )
     if len(tracks.times) < FEWEST_FRAMES:
         yield f"The video has {len(tracks.times)} frames: next to everything rests on what was believed beforehand."
     if (speed := _fastest(tracks)) > FASTEST:

@@ -6,6 +6,7 @@ it with its own inflate (`assets/worlds.js`).
 """
 
 import base64
+import math
 import zlib
 from typing import Any
 
@@ -48,7 +49,7 @@ def player_data(content: ReportContent) -> dict[str, Any]:
         else {"projection": camera.projection.tolist(), "width": camera.width, "height": camera.height},
         "frameRate": round(tracks.frame_rate, 6),
         "seenUntil": round(float(tracks.times[-1]), 6),
-        "tracks": {"times": _rounded(tracks.times), "positions": _measured(tracks.positions)},
+        "tracks": {"times": _rounded(tracks.times), "positions": _measured(tracks.positions, _digits(reach))},
         "walls": [[[wall.x1, wall.y1], [wall.x2, wall.y2]] for wall in tracks.walls],
         "view": _view(content),
         "pictureEdge": None if camera is None else _picture_edge(camera),
@@ -111,7 +112,7 @@ def _world(world: WorldContent, content: ReportContent, reach: float) -> dict[st
             "draw": collisions.draw[order].tolist(),
             "time": _rounded(collisions.time[order]),
             "bodies": np.sort(collisions.bodies[order], axis=1).tolist(),
-            "point": np.round(collisions.point[order], 3).tolist(),
+            "point": np.round(collisions.point[order], _digits(reach)).tolist(),
         },
     }
 
@@ -135,7 +136,7 @@ def _view(content: ReportContent) -> list[float]:
         if len(drawn):
             inner, outer = np.quantile(drawn, [0.005, 0.995], axis=0)
             low, high = np.minimum(low, np.maximum(inner, low - room)), np.maximum(high, np.minimum(outer, high + room))
-    return [round(float(value), 3) for value in (*low, *high)]
+    return [round(float(value), _digits(_reach(content))) for value in (*low, *high)]
 
 
 def _picture_edge(camera: Camera) -> list[list[float]] | None:
@@ -148,12 +149,18 @@ def _picture_edge(camera: Camera) -> list[list[float]] | None:
     return np.round(corners, 3).tolist()
 
 
-def _measured(positions: Float[np.ndarray, "time body 2"]) -> list[list[list[float] | None]]:
+def _digits(reach: float) -> int:
+    """Decimals in m that show what a scene of some size holds: a millimetre, less in small scenes."""
+    return max(3, 4 - math.ceil(math.log10(reach)))
+
+
+def _measured(positions: Float[np.ndarray, "time body 2"], digits: int) -> list[list[list[float] | None]]:
     """Per body and frame the measured position in m, None where it was not seen."""
     seen = np.isfinite(positions).all(axis=-1)
+    places = np.round(positions, digits)
     return [
-        [[round(float(x), 3), round(float(y), 3)] if here else None for (x, y), here in zip(*column, strict=True)]
-        for column in zip(positions.transpose(1, 0, 2), seen.T, strict=True)
+        [place if here else None for place, here in zip(path.tolist(), there, strict=True)]
+        for path, there in zip(places.transpose(1, 0, 2), seen.T, strict=True)
     ]
 
 

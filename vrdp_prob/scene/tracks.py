@@ -8,13 +8,22 @@ from jaxtyping import Bool, Float
 from numpy.typing import ArrayLike
 
 from vrdp_prob.errors import InputError
-from vrdp_prob.scene.body import Body, Wall
+from vrdp_prob.scene.body import Body, Shape, Wall
 from vrdp_prob.scene.camera import Camera
 
 FARTHEST = 1e6
 """Coordinate in m beyond which a position is no position; trackers mark with such numbers what they did not see."""
-OVERLAP_TOLERANCE = 0.25
-"""Share of the contact distance by which measured centres may be too near before the tracks are refused."""
+OVERLAP_TOLERANCE, OVERLAP_NOISE = 0.25, 4.0
+"""Share of the contact distance, and number of standard deviations of the noise, by which measured centres may be too
+near before the tracks are refused."""
+LATEST_START = 1e6
+"""Time in s of the first frame beyond which times are counted from it: what is left of their digits is too little."""
+FEWEST_FOR_NOISE = 8
+"""Positions from which the roughness of a track is told."""
+THIRD_DIFFERENCES = 0.6745 * 20**0.5
+"""Median size of the third differences of white noise, in its standard deviations."""
+ORIGIN = "time_origin"
+"""Attribute of the data that says when that was."""
 
 
 @dataclass(frozen=True)
@@ -43,8 +52,8 @@ class Tracks:
     ------
     InputError
         If there is no object or no position, times are not finite and strictly increasing, a position is infinite or
-        farther off than 1000 km, an object was seen fewer than two times, two bodies overlap where they are first seen
-        together, or a body overlaps a wall where it is first seen.
+        farther off than 1000 km, an object was seen fewer than two times, an angle jumps as wrapped ones do, or two
+        bodies, or a body and a wall, overlap where they are first seen together by more than the noise explains.
     """
 
     video: str
@@ -74,6 +83,9 @@ class Tracks:
     ) -> "Tracks":
         """Tracks from arrays: times in s, positions in m (NaN where not seen), angles in rad, covariance in m^2.
 
+        Times of day (seconds since 1970, say) are counted from the first frame; `data.attrs["time_origin"]` says when
+        that was.
+
         Raises
         ------
         InputError
@@ -98,8 +110,12 @@ class Tracks:
         if position_covariance is not None:
             axes = ("time", "body", "axis", "axis_other")
             variables["position_covariance"] = (axes, position_covariance, {"units": "m^2"})
+        attributes = {}
+        if frames and LATEST_START < abs(times[0]) < np.inf:
+            attributes[ORIGIN] = float(times[0])
+            times = times - times[0]
         coordinates = {"time": ("time", times, {"units": "s"}), "body": ("body", [body.id for body in bodies])}
-        return cls(video, bodies, xr.Dataset(variables, coordinates), walls, camera)
+        return cls(video, bodies, xr.Dataset(variables, coordinates, attributes), walls, camera)
 
     @property
     def times(self) -> Float[np.ndarray, "time"]:
@@ -115,6 +131,18 @@ class Tracks:
     def angles(self) -> Float[np.ndarray, "time body"] | None:
         """Measured angles in rad, NaN where not measured; None where no angle was."""
         return np.asarray(self.data["angle"].values, dtype=float) if "angle" in self.data else None
+
+    @property
+    def angles_told(self) -> Bool[np.ndarray, "body"]:
+        """Whether an angle of each object was measured."""
+        angles = self.angles
+        return np.zeros(len(self.bodies), dtype=bool) if angles is None else np.isfinite(angles).any(axis=0)
+
+    @property
+    def turning_told(self) -> bool:
+        """Whether angles of all objects whose turning can be seen were measured, and there are angles at all."""
+        spheres = np.array([body.shape is Shape.SPHERE for body in self.bodies])
+        return self.angles is not None and bool((self.angles_told | spheres).all())
 
     @property
     def position_covariance(self) -> Float[np.ndarray, "time body 2 2"] | None:
@@ -210,6 +238,29 @@ class Tracks:
                     f"{self.video}: object {body.id} was seen in {count} frame{'s' * (count != 1)}; "
                     "at least two are needed to tell its motion."
                 )
+        self._check_angles()
+
+    def _check_angles(self) -> None:
+        """A jump by more than half a turn, between two steps of less than a quarter, is that of a wrapped angle."""
+        if (angles := self.angles) is None:
+            return
+        for body in range(len(self.bodies)):
+            there = np.flatnonzero(np.isfinite(angles[:, body]))
+            steps = np.abs(np.diff(angles[there, body]))
+            calm = np.concatenate([[True], steps < np.pi / 2, [True]])
+            wrapped = (steps > np.pi) & calm[:-2] & calm[2:]
+            if len(steps) > 1 and wrapped.any():
+                where = int(wrapped.argmax())
+                raise InputError(
+                    f"{self.video}: the angle of object {self.bodies[body].id} jumps by {steps[where]:.3g} rad at "
+                    f"{self.times[there[where + 1]]:g} s; give angles in rad that do not wrap (numpy.unwrap)."
+                )
+
+    def _noise(self, body: int) -> float:
+        """Roughness (m) of the track of a body, by third differences; 0 where they are none."""
+        path = self.positions[self.seen[:, body], body]
+        differences = np.abs(np.diff(path, 3, axis=0)) if len(path) >= FEWEST_FOR_NOISE else np.zeros((0, 2))
+        return float(np.median(differences)) / THIRD_DIFFERENCES if differences.size else 0.0
 
     def _check_overlap(self) -> None:
         seen, positions = self.seen, self.positions
@@ -221,7 +272,8 @@ class Tracks:
                     continue
                 frame = int(together.argmax())
                 distance = float(np.linalg.norm(positions[frame, i] - positions[frame, j]))
-                if distance < (1 - OVERLAP_TOLERANCE) * (first.radius + second.radius):
+                noise = OVERLAP_NOISE * float(np.hypot(self._noise(i), self._noise(j)))
+                if distance < (1 - OVERLAP_TOLERANCE) * (first.radius + second.radius) - noise:
                     raise InputError(
                         f"{self.video}: objects {first.id} and {second.id} overlap at {self.times[frame]:g} s "
                         f"(centres {distance:.3g} m apart, radii {first.radius:g} and {second.radius:g} m); "
@@ -233,14 +285,14 @@ class Tracks:
             if body.radius is None:
                 continue
             frame = int(self.seen[:, index].argmax())
-            place = self.positions[frame, index]
+            noise = OVERLAP_NOISE * self._noise(index) if self.walls else 0.0
             for wall in self.walls:
-                distance = wall.distance(place)
-                if distance < (1 - OVERLAP_TOLERANCE) * body.radius:
+                distance = wall.distance(self.positions[frame, index])
+                if distance < (1 - OVERLAP_TOLERANCE) * body.radius - noise:
                     raise InputError(
                         f"{self.video}: object {body.id} overlaps the wall from ({wall.x1:g}, {wall.y1:g}) to "
-                        f"({wall.x2:g}, {wall.y2:g}) m at {self.times[frame]:g} s (centre {distance:.3g} m from it, "
-                        f"radius {body.radius:g} m); check positions, radii and walls."
+                        f"({wall.x2:g}, {wall.y2:g}) m at {self.times[frame]:g} s (centre {distance:.3g} m from "
+                        f"it, radius {body.radius:g} m); check positions, radii and walls."
                     )
 
 

@@ -18,6 +18,8 @@ from vrdp_prob.models.parameters import Transform
 
 STEP = 1e-4
 """Size of a probe in standard deviations of the strength's prior."""
+AT_ONCE = 1024
+"""Worlds that are simulated side by side."""
 JUMP = 1.5
 """Ratio of the changes to both sides from which on one of them has met another course of events."""
 FAINT = 1e-5
@@ -88,7 +90,9 @@ def probes(
             moved = np.tile(base, (3, 1))
             moved[:, place] = strength.coordinates
             batch.append(moved)
-    residuals = noise.linear(likelihood.discrepancies(torch.from_numpy(np.concatenate(batch))))
+    worlds = torch.from_numpy(np.concatenate(batch))
+    parts = [worlds[first : first + AT_ONCE] for first in range(0, len(worlds), AT_ONCE)]
+    residuals = np.concatenate([noise.linear(likelihood.discrepancies(part)) for part in parts])
     residuals = residuals.reshape(len(points), len(strengths), 3, -1)
     found = []
     for number, (place, strength) in enumerate(strengths.items()):

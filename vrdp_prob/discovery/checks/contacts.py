@@ -90,7 +90,7 @@ def _patterns(
     def part(name: str, *given: str) -> Score:
         return score.of(places[name], columns(*(f"anything {where}" for where in contacts), *given))
 
-    turning = all(motion.tracks.angles is not None for motion in motions)
+    turning = all(motion.tracks.turning_told for motion in motions)
     rub = [f"rub {where}" for where in contacts]
     for where in contacts:
         beside = ("grow", *(f"{'slip' if turning else 'rub'} {other}" for other in contacts if other != where))

@@ -50,7 +50,7 @@ class FittedContacts:
     def known_normal(self) -> Bool[np.ndarray, "contact"]:
         """Whether the direction of the normal is known by where the bodies are, and how they are turned."""
         cubes = np.array([body.shape is Shape.CUBE for body in self.motion.tracks.bodies])
-        return ~cubes[self.bodies].any(axis=1) | (self.motion.tracks.angles is not None)
+        return ~(cubes & ~self.motion.tracks.angles_told)[self.bodies].any(axis=1)
 
     def __len__(self) -> int:
         return len(self.events)

@@ -115,7 +115,7 @@ class Scales:
             tuple(sorted({body.material for body in bodies if body.material is not None})),
             frozenset(body.shape for body in bodies),
             all(body.mass is not None for body in bodies),
-            all(motion.tracks.angles is not None for motion in motions),
+            all(motion.tracks.turning_told for motion in motions),
             max(float(motion.times[-1] - motion.times[0]) for motion in motions),
             float(np.median(np.concatenate([np.diff(motion.times) for motion in motions]))),
             own_friction,

@@ -97,9 +97,11 @@ class Clues:
     def acceleration(self) -> float:
         """Typical acceleration (m/s^2) of what moves, over stretches in which hardly any contact falls."""
         found = []
-        half = ACCELERATION_SPAN / 2
+        half, times = ACCELERATION_SPAN / 2, self.clean.times
+        passed = np.floor((times - times[0]) / half)
+        middles = times[0] + half + half * np.unique(np.concatenate([passed - 1, passed]))
         for body in range(len(self.clean.bodies)):
-            for middle in np.arange(self.clean.times[0] + half, self.clean.times[-1], half):
+            for middle in middles[(middles > times[0]) & (middles < times[-1])]:
                 stretch = {"start": middle - half, "stop": middle + half, "noise": self.noise}
                 fit = local_fit(self.clean, body, middle, **stretch)
                 if fit is not None and np.linalg.norm(fit.velocity) > SIGNIFICANT * fit.velocity_sd:

@@ -5,6 +5,7 @@ not lost (restricted likelihood). Source: Rasmussen and Williams, Gaussian Proce
 section 2.7; Kennedy and O'Hagan, Journal of the Royal Statistical Society B 63 (2001), section 4.4.
 """
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
@@ -221,7 +222,10 @@ class _Search:
 
     def _cost(self, linear: _Linear, log_scale: float, size: float = 0.0, duration: float = 1.0) -> float:
         prior = ((log_scale - self.log_noise) / self.noise_log_sd) ** 2 / 2
-        return linear.cost(float(np.exp(log_scale)), size, duration) + float(prior)
+        try:
+            return linear.cost(float(np.exp(log_scale)), size, duration) + float(prior)
+        except np.linalg.LinAlgError:  # an error so large and lasting that its covariance loses all digits
+            return math.inf
 
     def _size(self, values: Float[np.ndarray, "3"]) -> float:
         return float(np.exp(min(values[1], np.log(LARGEST_SHARE) + self.log_acceleration)))

@@ -185,10 +185,15 @@ def _told(
     *,
     islands: bool,
 ) -> PhysicsModel:
-    """The model with what those videos that are asked, and trusted, say of shared parameters as their prior."""
+    """The model with what those videos that are asked, and trusted, say of shared parameters as their prior.
+
+    Where none of them is trusted it stays as it is.
+    """
     numbers, videos = link_fits(fits, model, shared)
     points = [starts[0] for starts in carried_starts(fits, videos)]
     believed = [bool(one) and index in asked for index, one in enumerate(trusted(fits))]
+    if not any(believed):
+        return model
     found = consensus(numbers, videos, points, believed, islands=islands)
     known = dict(zip(numbers.keys, zip(found.mean, found.sd, strict=True), strict=True))
     beliefs = {}

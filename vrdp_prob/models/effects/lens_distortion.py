@@ -1,6 +1,7 @@
 """A lens that bends straight lines."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import ClassVar
 
 import torch
@@ -27,6 +28,9 @@ LENS_Y = Parameter("lens_y", "m", "y of the picture's centre", Transform.IDENTIT
 SEARCH_SHARES = (-0.4, -0.2, 0.0, 0.2, 0.4)
 """Where the centre is looked for, in half widths of the region where bodies were seen."""
 
+AT_THE_EDGE, SMALLEST = 0.02, 1e-3
+"""Relative displacement at the edge of the region where bodies were seen, as it is expected at least, and half width
+in m below which a region counts as so wide."""
 REACH = 0.25
 """Standard deviation of each coordinate of its place, in half widths of the region where bodies were seen."""
 
@@ -46,8 +50,11 @@ class LensDistortion(Effect):
     vanishes_at: ClassVar = {"distortion": 0.0}
 
     def expected(self, videos: Sequence[Tracks]) -> Mapping[str, Parameter]:
-        """The picture's centre is in the middle of what was seen, about."""
-        return Region.of(videos).expected(LENS_X, LENS_Y, REACH)
+        """The picture's centre is in the middle of what was seen, about; on small tables lenses bend as much."""
+        region = Region.of(videos)
+        sd = max(DISTORTION.prior.sd, AT_THE_EDGE / max(region.half_width, SMALLEST) ** 2)
+        bent = replace(DISTORTION, prior=replace(DISTORTION.prior, sd=sd))
+        return {DISTORTION.name: bent, **region.expected(LENS_X, LENS_Y, REACH)}
 
     def search_points(self, videos: Sequence[Tracks]) -> Sequence[Mapping[str, float]]:
         """Centres in the inner part of the region where bodies were seen."""

@@ -8,6 +8,7 @@ import pytest
 from scipy.stats import chi2
 
 from tests.discovery.fitted import fitted
+from vrdp_prob.discovery.candidates import probes
 from vrdp_prob.discovery.candidates.scores import (
     CauseScore,
     Largest,
@@ -50,6 +51,14 @@ def test_a_null_gives_no_cause_a_small_p_value() -> None:
     assert len(found) >= 15
     assert min(one.p_value for one in found.values()) > 0.05 / 20 / 10  # false alarm of one seed in 200
     assert not any(one.sites for one in found.values())
+
+
+def test_a_score_does_not_hang_on_how_many_worlds_are_simulated_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    names = ("friction_patch", "surface_tilt")
+    whole = scored(None, seed=1, names=names)
+    monkeypatch.setattr(probes, "AT_ONCE", 7)
+    parts = scored(None, seed=1, names=names)
+    assert [parts[name].chi_square for name in names] == [whole[name].chi_square for name in names]
 
 
 def test_a_hidden_slope_has_the_largest_score_and_the_right_size() -> None:

@@ -13,7 +13,7 @@ from vrdp_prob.discovery.checks.bodies import REBOUND
 from vrdp_prob.discovery.checks.contacts import AT_WALLS, KICK, REBOUND_AT_WALLS
 from vrdp_prob.discovery.describe import describe
 from vrdp_prob.discovery.finding import Check, Verdict
-from vrdp_prob.discovery.selection.doubts import OWN_CHECKS, Doubt, doubts, with_doubts
+from vrdp_prob.discovery.selection.doubts import OWN_CHECKS, Doubt, causes_with_own_check_failing, doubts, with_doubts
 from vrdp_prob.discovery.selection.trials import Trial
 from vrdp_prob.inference.several_videos.fitting import SharedFit
 from vrdp_prob.models.effects.effect import Effect
@@ -119,3 +119,12 @@ def test_what_a_doubted_rival_loses_the_others_have(
 ) -> None:
     reasons = {number: [Doubt(credible, "")] for number, credible in doubted.items()}
     assert with_doubts(np.array([0.6, 0.1, 0.3]), reasons) == pytest.approx(probabilities)
+
+
+def test_causes_whose_own_checks_fail() -> None:
+    checks = [
+        Check("friction of the bodies against mass", 0.07, 1e-9, True, ""),
+        Check("friction of the bodies against material", 0.0, 0.5, False, ""),
+        Check("acceleration along the velocity against speed", 3.0, 1e-9, True, ""),
+    ]
+    assert causes_with_own_check_failing(checks) == {"mass_dependent_friction"}

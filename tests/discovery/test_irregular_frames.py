@@ -87,6 +87,19 @@ def test_frames_that_are_on_time_have_none() -> None:
     assert sum(one is not None and one.p_value < 0.1 for one in nulls) <= 7  # 2.5 expected, more in one of 200 at most
 
 
+def test_what_is_left_against_beliefs_is_no_noise_of_less_than_nothing() -> None:
+    _, fit = fitted(None, seed=1)
+    model = ResidualModel.of(fit)
+    against = [replace(video.linear, residuals=video.linear.residuals.copy()) for video in model.videos]
+    for linear in against:
+        linear.residuals[linear.data :] += 100.0
+    videos = tuple(replace(video, linear=one) for video, one in zip(model.videos, against, strict=True))
+    with np.errstate(all="raise"):
+        found = jitter(ResidualModel(replace(model.linear, videos=tuple(against)), videos))
+    assert found is not None
+    assert np.isfinite([found.value, found.chi_square, found.p_value, found.bound]).all()
+
+
 @pytest.mark.parametrize("bodies", [1, 3])
 def test_the_statistic_is_that_of_the_dense_gaussian(bodies: int) -> None:
     """Beside a jitter of six noise sd, where frames taken one by one would leave less than no noise."""

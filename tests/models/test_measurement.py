@@ -8,6 +8,7 @@ import pytest
 import torch
 
 from vrdp_prob.models.effects.effect import Effect
+from vrdp_prob.models.effects.lens_distortion import LensDistortion
 from vrdp_prob.models.likelihood import Likelihood
 from vrdp_prob.models.parameters import Parameter, Prior, Transform
 from vrdp_prob.models.physics import PhysicsModel
@@ -90,3 +91,10 @@ def test_a_clock_that_goes_backward_is_impossible() -> None:
     density = likelihood.log_density(points)
     assert torch.isfinite(density[0])
     assert density[1] == -torch.inf
+
+
+@pytest.mark.parametrize(("half_width", "sd"), [(3.0, 0.02), (0.05, 8.0)])
+def test_a_lens_over_a_small_table_may_bend_as_much(half_width: float, sd: float) -> None:
+    positions = np.linspace(-half_width, half_width, 201)[:, None, None] * np.ones((1, 1, 2))
+    tracks = Tracks.from_arrays("v", (Body("a", Shape.SPHERE, half_width / 50),), np.arange(201.0), positions)
+    assert LensDistortion().expected([tracks])["distortion"].prior.sd == pytest.approx(sd, rel=0.1)

@@ -73,3 +73,16 @@ def test_times_of_day_are_counted_from_the_first_frame() -> None:
     np.testing.assert_allclose(tracks.times, np.arange(5) / 25, atol=1e-6)
     assert tracks.until(0.1).data.attrs["time_origin"] == 1.7e9
     assert Tracks.from_arrays(*arguments, 3.0 + np.arange(5) / 25, np.zeros((5, 1, 2))).times[0] == 3.0
+
+
+def test_whose_turning_is_told() -> None:
+    bodies = (Body("a", Shape.CUBE, 0.1), Body("b", Shape.CUBE, 0.1), Body("c", Shape.SPHERE, 0.1))
+    positions = np.zeros((5, 3, 2)) + np.array([[0.0, 0.0], [1.0, 0.0], [2.0, 0.0]])
+    for told in ([True, True, False], [True, False, True], [False, False, False]):
+        angles = np.where(told, 0.0, np.nan) + np.zeros((5, 3))
+        tracks = Tracks.from_arrays("v", bodies, np.arange(5.0), positions, angles=angles)
+        assert tracks.angles_told.tolist() == told
+        assert tracks.turning_told is (told[0] and told[1])
+    without = Tracks.from_arrays("v", bodies[2:], np.arange(5.0), positions[:, 2:])
+    assert not without.angles_told.any()
+    assert not without.turning_told

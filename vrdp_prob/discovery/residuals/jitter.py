@@ -53,6 +53,8 @@ def jitter(model: ResidualModel) -> Jitter | None:
         return None
     count = float(model.linear.degrees)
     squares = model.dispersion * count
+    if squares <= float((gradient**2 / information).sum()):  # lateness explains what is left against beliefs, too
+        squares = sum(float(left @ left) for left in model.left)
 
     def noise(ratio: float) -> float:
         """Most probable variance of the noise for a ratio of the variance of the lateness to it."""

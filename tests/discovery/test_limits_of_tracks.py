@@ -1,0 +1,28 @@
+"""What limits a finding by the tracks themselves."""
+
+import numpy as np
+
+from vrdp_prob.discovery.discover import _limits
+from vrdp_prob.scene import Body, Shape, Tracks
+
+
+def _tracks(video: str, step: float, *, start: float = 0.0) -> Tracks:
+    times = start + step * np.arange(40.0)
+    places = np.random.default_rng(1).normal(0, 1e-3, (40, 1, 2)) + 0.1 * np.arange(40.0)[:, None, None] * step
+    return Tracks.from_arrays(video, (Body("a", Shape.CYLINDER, 0.1),), times, places)
+
+
+def test_nothing_limits_ordinary_tracks() -> None:
+    assert _limits([_tracks("v", 0.04), _tracks("w", 0.04)]) == []
+
+
+def test_what_is_true_of_some_videos_is_told_of_these() -> None:
+    (sentence,) = _limits([_tracks("v", 0.04), _tracks("w", 33.0)])
+    assert sentence.startswith("w: Frames are 33 s apart")
+    assert "see whether times are in s" in sentence
+
+
+def test_what_is_true_of_all_is_told_once() -> None:
+    assert _limits([_tracks("v", 0.04, start=1.7e9), _tracks("w", 0.04, start=1.7e9)]) == [
+        "Times are counted from the first frame, which is at 1700000000 s."
+    ]

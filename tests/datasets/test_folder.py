@@ -136,6 +136,17 @@ def test_times_long_after_their_zero_are_told_apart(tmp_path: Path) -> None:
     np.testing.assert_allclose(np.diff(load(tmp_path).times), 0.04, atol=1e-6)
 
 
+def test_stamps_that_were_rounded_otherwise_are_one_frame(tmp_path: Path) -> None:
+    rows = ["video,object,time,x,y"]
+    for body, decimals in (("a", 7), ("b", 5)):
+        rows += [f"v,{body},{round(frame / 30, decimals)},{frame},{0 if body == 'a' else 9}" for frame in range(10)]
+    (tmp_path / "tracks.csv").write_text("\n".join(rows) + "\n")
+    (tmp_path / "objects.csv").write_text("video,object,shape,radius\nv,a,sphere,0.1\nv,b,sphere,0.1\n")
+    tracks = load(tmp_path)
+    np.testing.assert_allclose(tracks.times, np.arange(10) / 30, atol=1e-5)
+    np.testing.assert_array_equal(tracks.positions[:, :, 0], np.arange(10.0)[:, None] * np.ones(2))
+
+
 def test_dialects_of_tables(folder: Path) -> None:
     text = (folder / "tracks.csv").read_text()
     (folder / "tracks.csv").write_text(text.replace(",", ";"))

@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
+from jaxtyping import Float
 
 from vrdp_prob.datasets.tables import Row, read_rows
 from vrdp_prob.errors import InputError
@@ -23,6 +24,8 @@ OBJECT_COLUMNS = ("video", "object", "shape", "radius")
 WALL_COLUMNS = ("video", "x1", "y1", "x2", "y2")
 ALL_VIDEOS = "*"
 TIME_DECIMALS = 9
+ROUNDING = 1e-3
+"""Share of the shortest step of any object below which stamps of two objects are those of one frame."""
 
 
 @dataclass
@@ -190,11 +193,11 @@ def _tracks(
                 f"{folder / 'objects.csv'}: object {object_id} of video {video} has tracks but no row; "
                 "add one with its shape."
             )
-    times = np.unique(np.concatenate([measured.times for measured in measurements.values()]))
+    times = _frames([measured.times for measured in measurements.values()])
     positions = np.full((len(times), len(measurements), 2), np.nan)
     angles = np.full((len(times), len(measurements)), np.nan)
     for index, measured in enumerate(measurements.values()):
-        frames = np.searchsorted(times, measured.times)
+        frames = np.searchsorted((times[1:] + times[:-1]) / 2, measured.times)
         positions[frames, index] = measured.positions
         angles[frames, index] = measured.angles
     return Tracks.from_arrays(
@@ -206,6 +209,14 @@ def _tracks(
         walls=walls,
         camera=camera,
     )
+
+
+def _frames(stamps: Sequence[Sequence[float]]) -> Float[np.ndarray, "frame"]:
+    """Times in s of the frames of some objects; stamps that differ by their rounding alone are one frame."""
+    times = np.unique(np.concatenate(stamps))
+    steps = [float(np.diff(one).min()) for one in stamps if len(one) > 1]
+    gaps = np.diff(times, prepend=-np.inf)
+    return times[gaps > ROUNDING * min(steps, default=0.0)]
 
 
 def _track_rows(tracks: Tracks, *, with_angle: bool) -> list[Sequence[object]]:

@@ -196,13 +196,14 @@ def _limits(results: Sequence[Result]) -> str:
     found = bounds(results)
     rows = []
     for name, mine in (*found.items(), ("all", [one for several in found.values() for one in several])):
-        ratios = [one["bound"] / one["truth"] for one in mine if one["bound"] is not None and one["truth"] > 0]
+        stated = [one for one in mine if one["bound"] is not None]
+        ratios = [one["bound"] / one["truth"] for one in stated if one["truth"] > 0]
         rows.append(
             (
                 name,
-                str(Share(mine, below)),
+                str(Share(stated, below)),
                 f"{np.median(ratios):.1f}" if ratios else "-",
-                str(sum(one["bound"] is None for one in mine)),
+                str(len(mine) - len(stated)),
             )
         )
     head = ("parameter", "no more than the bound (95 %)", "bound over what was hidden, median", "no bound")

@@ -139,7 +139,7 @@ def covered(estimate: Result) -> bool:
 
 
 def bounds(results: Sequence[Result]) -> dict[str, list[Result]]:
-    """Upper bounds of what was hidden and is not told of, by the parameter."""
+    """Upper bounds of what was hidden and is not told of, by the parameter; None where the data put none on it."""
     found: dict[str, list[Result]] = {}
     for result in of(results, Kind.ONE, Kind.TWO):
         for bound in result.get("bounds", ()):
@@ -148,8 +148,8 @@ def bounds(results: Sequence[Result]) -> dict[str, list[Result]]:
 
 
 def below(bound: Result) -> bool:
-    """Whether there was no more of it than the bound says; where the data put none on it, that says nothing wrong."""
-    return bound["bound"] is None or bool(bound["truth"] <= bound["bound"])
+    """Whether there was no more of it than the bound says."""
+    return bool(bound["truth"] <= bound["bound"])
 
 
 def checks(results: Sequence[Result]) -> list[dict[str, Any]]:
@@ -176,7 +176,7 @@ def checks(results: Sequence[Result]) -> list[dict[str, Any]]:
         low, high = inside.interval
         coverage = _measured("95 % intervals that hold the truth, within binomial error", inside)
         entries.append({**coverage, "goal": CERTAIN, "ok": low <= CERTAIN <= high})
-    if limits := [bound for mine in bounds(results).values() for bound in mine]:
+    if limits := [bound for mine in bounds(results).values() for bound in mine if bound["bound"] is not None]:
         held = Share(limits, below)
         entry = _measured("95 % upper bounds that hold what was hidden and not named, within binomial error", held)
         entries.append({**entry, "goal": CERTAIN, "ok": held.interval[1] >= CERTAIN})

@@ -23,6 +23,11 @@ def test_what_is_true_of_some_videos_is_told_of_these() -> None:
 
 
 def test_what_is_true_of_all_is_told_once() -> None:
-    assert _limits([_tracks("v", 0.04, start=1.7e9), _tracks("w", 0.04, start=1.7e9)]) == [
-        "Times are counted from the first frame, which is at 1700000000 s."
+    assert _limits([_tracks("v", 0.04, start=1.7e9), _tracks("w", 0.04, start=1.8e9)]) == [
+        "Times are counted from the first frame, since they began long after their zero."
     ]
+
+
+def test_of_a_limit_that_many_videos_have_one_is_told() -> None:
+    (sentence,) = _limits([_tracks("u", 2.0), _tracks("v", 0.04), _tracks("w", 33.0), _tracks("x", 0.5)])
+    assert sentence.startswith("u (and two other videos alike): Frames are 2 s apart")

@@ -6,12 +6,14 @@ import numpy as np
 import pytest
 
 from vrdp_prob.discovery.candidates.scores import CauseScore
+from vrdp_prob.discovery.finding import Check
 from vrdp_prob.discovery.selection import refits, search
 from vrdp_prob.discovery.selection.trials import Trial
 from vrdp_prob.inference.several_videos.ascent import ImpossibleStartError
 from vrdp_prob.models.effects.bowl import Bowl
 from vrdp_prob.models.effects.external_impulse import ExternalImpulse
 from vrdp_prob.models.effects.lens_distortion import LensDistortion
+from vrdp_prob.models.effects.mass_dependent_friction import MassDependentFriction
 from vrdp_prob.models.effects.surface_tilt import SurfaceTilt
 
 
@@ -320,6 +322,37 @@ def test_kicks_are_no_measure_of_laws(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(refits, "happens_once", lambda cause: cause in {"kicks", "a jump of the clock"})
     assert [one.effect for one in refits._shortlist(scores)] == ["kicks", "patch", "drag"]
     assert [one.effect for one in refits._shortlist(scores, 0.8)] == ["kicks", "patch"]
+
+
+@pytest.mark.parametrize(
+    ("before", "brought", "is_tried"),
+    [((), 1.0, True), ((), 9.0, False), (("tilt",), 1.0, False)],
+    ids=["nothing brings enough", "something does", "there is a cause already"],
+)
+def test_a_cause_whose_own_check_fails_is_tried_where_nothing_brings_enough(
+    before: tuple[str, ...], brought: float, *, is_tried: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    trial, other = _refit("nothing", 0.0), _refit("bowl", 1.0)
+    trial.causes, other.causes = before, (Bowl(),)
+    other.brought.return_value = brought
+    clear, faint = (
+        Mock(spec=CauseScore, effect=effect, size=size, p_value=p_value, sites=())
+        for effect, size, p_value in ((Bowl(), 50.0, 1e-9), (MassDependentFriction(), 4.0, 0.04))
+    )
+    scores = (clear, faint)
+    made: list[list[str]] = []
+
+    def made_of(_self: object, _trial: Trial, asked: list[CauseScore], **_beside: object) -> list[Trial]:
+        made.append([one.effect.name for one in asked])
+        return [other] if made[-1] == ["bowl"] else []
+
+    failing = Check("friction of the bodies against mass", 0.07, 1e-9, True, "")
+    monkeypatch.setattr(refits, "run_checks", lambda _fit, *, seed: (failing,))
+    monkeypatch.setattr(refits.Refits, "made_of", made_of)
+    monkeypatch.setattr(refits.Refits, "settled", lambda _self, _trial, _found: True)
+    monkeypatch.setattr(refits.Refits, "left", lambda _self, _trial: refits.Left(scores, scores, np.ones(3)))
+    assert _refits(needed=6.0).of(trial) == [other]
+    assert (["mass_dependent_friction"] in made) is is_tried
 
 
 def test_a_cause_with_which_no_joint_world_can_begin_is_left_out(monkeypatch: pytest.MonkeyPatch) -> None:

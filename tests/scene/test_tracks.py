@@ -58,13 +58,27 @@ def test_angles_that_wrap_are_refused(low: float) -> None:
     assert Tracks.from_arrays(*arguments, angles=np.unwrap(wrapped, axis=0)).angles is not None
 
 
-def test_fast_turning_and_gross_errors_of_angles_are_none_that_wrap() -> None:
-    arguments = ("v", (Body("a", Shape.CUBE, 0.1),), np.arange(60) / 25, np.zeros((60, 1, 2)))
-    angles = 4.0 * np.arange(60.0)[:, None]
-    assert Tracks.from_arrays(*arguments, angles=angles).angles is not None
-    angles = 0.1 * np.arange(60.0)[:, None]
-    angles[30] += 5.0
-    assert Tracks.from_arrays(*arguments, angles=angles).angles is not None
+def _turning(angles: np.ndarray, shown: np.ndarray | slice = slice(None)) -> Tracks:
+    times = np.arange(len(angles))[shown] / 25
+    return Tracks.from_arrays(
+        "v", (Body("a", Shape.CUBE, 0.1),), times, np.zeros((len(times), 1, 2)), angles=angles[shown][:, None]
+    )
+
+
+@pytest.mark.parametrize("frame", [0, 1, 30, 58, 59])
+def test_a_gross_error_of_an_angle_is_no_wrapping(frame: int) -> None:
+    angles = 0.1 * np.arange(60.0)
+    angles[frame] += 5.0
+    tracks = _turning(angles)
+    assert tracks.until(tracks.times[max(frame, 5)]).angles is not None
+
+
+def test_fast_turning_and_gaps_are_no_wrapping() -> None:
+    assert _turning(4.0 * np.arange(60.0)).angles is not None
+    angles = 0.2 * np.arange(90.0)
+    assert _turning(angles, np.r_[0:20, 51:90]).angles is not None
+    angles[20:51] = np.nan
+    assert _turning(angles).angles is not None
 
 
 def test_times_of_day_are_counted_from_the_first_frame() -> None:
@@ -73,6 +87,15 @@ def test_times_of_day_are_counted_from_the_first_frame() -> None:
     np.testing.assert_allclose(tracks.times, np.arange(5) / 25, atol=1e-6)
     assert tracks.until(0.1).data.attrs["time_origin"] == 1.7e9
     assert Tracks.from_arrays(*arguments, 3.0 + np.arange(5) / 25, np.zeros((5, 1, 2))).times[0] == 3.0
+
+
+def test_noise_along_a_line_is_no_overlap() -> None:
+    generator = np.random.default_rng(1)
+    bodies = (Body("a", Shape.CYLINDER, 0.025), Body("b", Shape.CYLINDER, 0.025))
+    for _ in range(100):
+        positions = np.zeros((30, 2, 2)) + np.array([[0.0, 0.0], [0.05, 0.0]])
+        positions[..., 0] += generator.normal(0, 0.0125, (30, 2))
+        assert Tracks.from_arrays("v", bodies, np.arange(30) / 25, positions).bodies
 
 
 def test_whose_turning_is_told() -> None:

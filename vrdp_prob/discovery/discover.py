@@ -30,7 +30,7 @@ from vrdp_prob.models.model_file import known_effects
 from vrdp_prob.models.physics import PhysicsModel
 from vrdp_prob.models.simulator.rollout import compile_model
 from vrdp_prob.progress import ProgressDisplay
-from vrdp_prob.report.wording import listed
+from vrdp_prob.report.wording import counted, listed
 from vrdp_prob.scene import Tracks
 
 TELLING = 2.0
@@ -116,14 +116,19 @@ def discover(
 
 
 def _limits(videos: Sequence[Tracks]) -> list[str]:
-    """What limits any result from these tracks, with the videos of which it is true where it is not true of all."""
-    told: dict[str, list[str]] = {}
+    """What limits any result from these tracks: of each kind of limit what is said of the first video that has it."""
+    told: dict[str, list[tuple[str, str]]] = {}
     for tracks in videos:
-        for sentence in limits_of_tracks(tracks):
-            told.setdefault(sentence, []).append(tracks.video)
-    return [
-        sentence if len(names) == len(videos) else f"{', '.join(names)}: {sentence}" for sentence, names in told.items()
-    ]
+        for kind, sentence in limits_of_tracks(tracks).items():
+            told.setdefault(kind, []).append((tracks.video, sentence))
+    limits = []
+    for some in told.values():
+        video, sentence = some[0]
+        if len({one for _, one in some}) > 1 or len(some) < len(videos):
+            others = f" (and {counted(len(some) - 1, 'other video')} alike)" if len(some) > 1 else ""
+            sentence = f"{video}{others}: {sentence}"
+        limits.append(sentence)
+    return limits
 
 
 def _facts(videos: Sequence[Tracks], model: PhysicsModel, catalogue: Sequence[Effect], seed: int) -> dict[str, str]:

@@ -24,6 +24,8 @@ from vrdp_prob.scene.tracks import ORIGIN
 
 FEWEST_FRAMES = 5
 """Frames below which a video hardly shows a motion."""
+FRAMES_IN_SPAN = 3
+"""Frames in the span by which contacts are told, below which that is said."""
 FASTEST = 100.0
 """Speed in m/s that nothing on a table has: positions are in other units."""
 BATCH = 500
@@ -117,7 +119,7 @@ def _warnings(fit: MapFit, convergence: Convergence, status: dict[str, BodyStatu
         sentences.append("The search for the most probable values ended before it had converged.")
     if fit.search.sentence:
         sentences.append(fit.search.sentence)
-    sentences += limits_of_tracks(fit.likelihood.tracks)
+    sentences += limits_of_tracks(fit.likelihood.tracks).values()
     found = {frozenset(pair) for pair in fit.contacts}
     seen = {(contact.first, contact.second) for contact in fit.clues.contacts}
     missed = {pair for pair in seen if frozenset(pair) not in found}
@@ -133,27 +135,33 @@ def _warnings(fit: MapFit, convergence: Convergence, status: dict[str, BodyStatu
     return [*sentences, *_untold(fit, status, drawn=drawn)]
 
 
-def limits_of_tracks(tracks: Tracks) -> Iterator[str]:
-    """What limits any result from some tracks, in sentences."""
-    if (origin := tracks.data.attrs.get(ORIGIN)) is not None:
-        yield f"Times are counted from the first frame, which is at {origin:.10g} s."
-    if (step := float(np.median(np.diff(tracks.times)))) > SPAN:
-        yield (
+def limits_of_tracks(tracks: Tracks) -> dict[str, str]:
+    """What limits any result from some tracks: sentences, by what they are about."""
+    limits = {}
+    if ORIGIN in tracks.data.attrs:
+        limits["times"] = "Times are counted from the first frame, since they began long after their zero."
+    if len(tracks.times) < FEWEST_FRAMES:
+        limits["length"] = (
+            f"The video has {len(tracks.times)} frames: next to everything rests on what was believed beforehand."
+        )
+    if FRAMES_IN_SPAN * (step := float(np.median(np.diff(tracks.times)))) > SPAN:
+        limits["frames"] = (
             f"Frames are {step:.3g} s apart, and contacts are told by what is seen within {SPAN:g} s of them: see "
             "whether times are in s."
         )
-    if len(tracks.times) < FEWEST_FRAMES:
-        yield f"The video has {len(tracks.times)} frames: next to everything rests on what was believed beforehand."
     if (speed := _fastest(tracks)) > FASTEST:
-        yield f"Objects move at {speed:.3g} m/s: see whether positions are in m and times in s."
+        limits["speed"] = f"Objects move at {speed:.3g} m/s: see whether positions are in m and times in s."
     if (noise := untold_noise(tracks)) is not None:
-        yield (
+        limits["noise"] = (
             f"The positions do not tell their noise (they are computed, rounded, or all on a line): {noise:.2g} m is "
             "taken."
         )
     if unsized := [body.id for body in tracks.bodies if body.radius is None]:
         subject = _named(unsized, "has", "have")
-        yield f"{subject} no radius and so cannot meet anything: state radii, and collisions are looked for."
+        limits["radius"] = (
+            f"{subject} no radius and so cannot meet anything: state radii, and collisions are looked for."
+        )
+    return limits
 
 
 def _named(objects: Sequence[str], one_does: str, several_do: str) -> str:

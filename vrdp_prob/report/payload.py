@@ -51,7 +51,7 @@ def player_data(content: ReportContent) -> dict[str, Any]:
         "seenUntil": round(float(tracks.times[-1]), 6),
         "tracks": {"times": _rounded(tracks.times), "positions": _measured(tracks.positions, _digits(reach))},
         "walls": [[[wall.x1, wall.y1], [wall.x2, wall.y2]] for wall in tracks.walls],
-        "view": _view(content),
+        "view": _view(content, _digits(reach)),
         "pictureEdge": None if camera is None else _picture_edge(camera),
         "film": None if content.footage is None or camera is None else film_data(content.footage),
         "worlds": [_world(world, content, reach) for world in content.worlds],
@@ -124,7 +124,7 @@ def _reach(content: ReportContent) -> float:
     return float(max([1.5 * seen, *rolled, 1e-3]))
 
 
-def _view(content: ReportContent) -> list[float]:
+def _view(content: ReportContent, digits: int) -> list[float]:
     """Rectangle (x1, y1, x2, y2) in m that the bird's-eye view shows: what was seen, and nearly all that was drawn."""
     positions = content.tracks.positions.reshape(-1, 2)
     walls = np.array([(x, y) for wall in content.tracks.walls for x, y in ((wall.x1, wall.y1), (wall.x2, wall.y2))])
@@ -136,7 +136,7 @@ def _view(content: ReportContent) -> list[float]:
         if len(drawn):
             inner, outer = np.quantile(drawn, [0.005, 0.995], axis=0)
             low, high = np.minimum(low, np.maximum(inner, low - room)), np.maximum(high, np.minimum(outer, high + room))
-    return [round(float(value), _digits(_reach(content))) for value in (*low, *high)]
+    return [round(float(value), digits) for value in (*low, *high)]
 
 
 def _picture_edge(camera: Camera) -> list[list[float]] | None:

@@ -16,14 +16,17 @@ FARTHEST = 1e6
 OVERLAP_TOLERANCE, OVERLAP_NOISE = 0.25, 4.0
 """Share of the contact distance, and number of standard deviations of the noise, by which measured centres may be too
 near before the tracks are refused."""
+WHOLE, FRAME, FEWEST_STEPS = 0.125, 1.5, 3
+"""How near a jump of an angle is to whole turns, and how near two frames in median steps, for it to be one of wrapping;
+steps from which that is told."""
 LATEST_START = 1e6
 """Time in s of the first frame beyond which times are counted from it: what is left of their digits is too little."""
+ORIGIN = "time_origin"
+"""Attribute of the data that says when that was."""
 FEWEST_FOR_NOISE = 8
 """Positions from which the roughness of a track is told."""
 THIRD_DIFFERENCES = 0.6745 * 20**0.5
 """Median size of the third differences of white noise, in its standard deviations."""
-ORIGIN = "time_origin"
-"""Attribute of the data that says when that was."""
 
 
 @dataclass(frozen=True)
@@ -136,13 +139,15 @@ class Tracks:
     def angles_told(self) -> Bool[np.ndarray, "body"]:
         """Whether an angle of each object was measured."""
         angles = self.angles
-        return np.zeros(len(self.bodies), dtype=bool) if angles is None else np.isfinite(angles).any(axis=0)
+        return (
+            np.zeros(len(self.bodies), dtype=bool) if angles is None else (np.isfinite(angles) & self.seen).any(axis=0)
+        )
 
     @property
     def turning_told(self) -> bool:
         """Whether angles of all objects whose turning can be seen were measured, and there are angles at all."""
         spheres = np.array([body.shape is Shape.SPHERE for body in self.bodies])
-        return self.angles is not None and bool((self.angles_told | spheres).all())
+        return bool(self.angles_told.any() and (self.angles_told | spheres).all())
 
     @property
     def position_covariance(self) -> Float[np.ndarray, "time body 2 2"] | None:
@@ -199,7 +204,13 @@ class Tracks:
         )
 
     def until(self, time: float) -> "Tracks":
-        """The same tracks up to and including a time (s); objects not seen twice by then are left out."""
+        """The same tracks up to and including a time (s); objects not seen twice by then are left out.
+
+        Raises
+        ------
+        InputError
+            If what is left is refused: of a few frames the noise is not told, by which bodies may overlap.
+        """
         data = self.data.sel(time=slice(None, time + 1e-9))
         keep = np.isfinite(data["x"].values).sum(axis=0) >= 2
         bodies = tuple(body for body, kept in zip(self.bodies, keep, strict=True) if kept)
@@ -241,26 +252,33 @@ class Tracks:
         self._check_angles()
 
     def _check_angles(self) -> None:
-        """A jump by more than half a turn, between two steps of less than a quarter, is that of a wrapped angle."""
+        """A jump by whole turns from one frame to the next, beside steps of less than a quarter, is one of wrapping."""
         if (angles := self.angles) is None:
             return
-        for body in range(len(self.bodies)):
-            there = np.flatnonzero(np.isfinite(angles[:, body]))
-            steps = np.abs(np.diff(angles[there, body]))
-            calm = np.concatenate([[True], steps < np.pi / 2, [True]])
-            wrapped = (steps > np.pi) & calm[:-2] & calm[2:]
-            if len(steps) > 1 and wrapped.any():
-                where = int(wrapped.argmax())
+        for index, body in enumerate(self.bodies):
+            there = np.flatnonzero(np.isfinite(angles[:, index]))
+            if len(there) < FEWEST_STEPS + 1 or body.shape is Shape.SPHERE:
+                continue
+            spans, steps = np.diff(self.times[there]), np.diff(angles[there, index])
+            rates = np.pad(steps / spans, 1, mode="edge")
+            slower = np.where(np.abs(rates[:-2]) < np.abs(rates[2:]), rates[:-2], rates[2:])
+            turns = (steps - slower * spans) / (2 * np.pi)
+            calm = (np.abs(rates[:-2]) * spans < np.pi / 2) & (np.abs(rates[2:]) * spans < np.pi / 2)
+            whole = (np.rint(turns) != 0) & (np.abs(turns - np.rint(turns)) < WHOLE)
+            wrapped = whole & calm & (spans < FRAME * np.median(spans))
+            if wrapped[1:-1].any():
+                where = int(wrapped[1:-1].argmax()) + 1
                 raise InputError(
-                    f"{self.video}: the angle of object {self.bodies[body].id} jumps by {steps[where]:.3g} rad at "
+                    f"{self.video}: the angle of object {body.id} jumps by {abs(steps[where]):.3g} rad at "
                     f"{self.times[there[where + 1]]:g} s; give angles in rad that do not wrap (numpy.unwrap)."
                 )
 
     def _noise(self, body: int) -> float:
-        """Roughness (m) of the track of a body, by third differences; 0 where they are none."""
+        """Roughness (m) of the track of a body, by third differences; 0 where there are too few positions."""
         path = self.positions[self.seen[:, body], body]
-        differences = np.abs(np.diff(path, 3, axis=0)) if len(path) >= FEWEST_FOR_NOISE else np.zeros((0, 2))
-        return float(np.median(differences)) / THIRD_DIFFERENCES if differences.size else 0.0
+        if len(path) < FEWEST_FOR_NOISE:
+            return 0.0
+        return float(np.median(np.abs(np.diff(path, 3, axis=0)), axis=0).max()) / THIRD_DIFFERENCES
 
     def _check_overlap(self) -> None:
         seen, positions = self.seen, self.positions
@@ -272,8 +290,8 @@ class Tracks:
                     continue
                 frame = int(together.argmax())
                 distance = float(np.linalg.norm(positions[frame, i] - positions[frame, j]))
-                noise = OVERLAP_NOISE * float(np.hypot(self._noise(i), self._noise(j)))
-                if distance < (1 - OVERLAP_TOLERANCE) * (first.radius + second.radius) - noise:
+                missing = (1 - OVERLAP_TOLERANCE) * (first.radius + second.radius) - distance
+                if missing > 0 and missing > OVERLAP_NOISE * np.hypot(self._noise(i), self._noise(j)):
                     raise InputError(
                         f"{self.video}: objects {first.id} and {second.id} overlap at {self.times[frame]:g} s "
                         f"(centres {distance:.3g} m apart, radii {first.radius:g} and {second.radius:g} m); "
@@ -285,10 +303,10 @@ class Tracks:
             if body.radius is None:
                 continue
             frame = int(self.seen[:, index].argmax())
-            noise = OVERLAP_NOISE * self._noise(index) if self.walls else 0.0
             for wall in self.walls:
                 distance = wall.distance(self.positions[frame, index])
-                if distance < (1 - OVERLAP_TOLERANCE) * body.radius - noise:
+                missing = (1 - OVERLAP_TOLERANCE) * body.radius - distance
+                if missing > 0 and missing > OVERLAP_NOISE * self._noise(index):
                     raise InputError(
                         f"{self.video}: object {body.id} overlaps the wall from ({wall.x1:g}, {wall.y1:g}) to "
                         f"({wall.x2:g}, {wall.y2:g}) m at {self.times[frame]:g} s (centre {distance:.3g} m from "

@@ -28,7 +28,7 @@ LENS_Y = Parameter("lens_y", "m", "y of the picture's centre", Transform.IDENTIT
 SEARCH_SHARES = (-0.4, -0.2, 0.0, 0.2, 0.4)
 """Where the centre is looked for, in half widths of the region where bodies were seen."""
 
-AT_THE_EDGE, SMALLEST = 0.02, 1e-3
+AT_THE_EDGE, SMALLEST = 0.004, 1e-3
 """Relative displacement at the edge of the region where bodies were seen, as it is expected at least, and half width
 in m below which a region counts as so wide."""
 REACH = 0.25

@@ -163,23 +163,13 @@ def checks(results: dict[str, list[Result]]) -> list[Check]:
     for name, mine in results.items():
         median = float(np.median([abs(result["error"]) for result in mine])) if mine else None
         coverage = float(np.mean([result["inside"][str(SHOWN)] for result in mine])) if mine else None
-        title = f"mass ratio, contacts: {name}"
-        entries.append(
-            {
-                "name": f"{title}: median relative error",
-                "value": median,
-                "goal": LARGEST_MEDIAN,
-                "ok": median is not None and median <= LARGEST_MEDIAN,
-            }
-        )
-        entries.append(
-            {
-                "name": f"{title}: coverage of {100 * SHOWN:.0f} % intervals",
-                "value": coverage,
-                "goal": LEAST_COVERAGE,
-                "ok": coverage is not None and coverage >= LEAST_COVERAGE,
-            }
-        )
+        small = median is not None and median <= LARGEST_MEDIAN
+        covers = coverage is not None and coverage >= LEAST_COVERAGE
+        for title, value, goal, met in (
+            ("median relative error", median, LARGEST_MEDIAN, small),
+            (f"coverage of {100 * SHOWN:.0f} % intervals", coverage, LEAST_COVERAGE, covers),
+        ):
+            entries.append({"name": f"mass ratio, contacts: {name}: {title}", "value": value, "goal": goal, "ok": met})
     return entries
 
 

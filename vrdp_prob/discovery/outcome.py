@@ -6,7 +6,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Float
 
-from vrdp_prob.discovery.checks.battery import run_checks
 from vrdp_prob.discovery.finding import Check, FoundCause, Gain, Verdict
 from vrdp_prob.discovery.selection.doubts import Doubt, doubts, with_doubts
 from vrdp_prob.discovery.selection.estimates import cause_sentence, estimates
@@ -58,8 +57,8 @@ class Outcome:
 def outcome_of(fit: SharedFit, catalogue: Sequence[Effect], *, seed: int, progress: ProgressDisplay | None) -> Outcome:
     """Search for causes, and put those that are found in doubt."""
     found = search(fit, catalogue, seed=seed, progress=progress)
-    checks = run_checks(found.base.fit, seed=seed)
-    found, after, unlisted = _without_mimics(found, checks, seed=seed, progress=progress)
+    checks = found.refits.checks(found.base)
+    found, after, unlisted = _without_mimics(found, seed=seed, progress=progress)
     not_named: list[FoundCause] = []
     reasons: list[Doubt] = []
     while doubted := _doubted(found, after):
@@ -68,7 +67,7 @@ def outcome_of(fit: SharedFit, catalogue: Sequence[Effect], *, seed: int, progre
         if other is None:
             reasons += [one for some in doubted.values() for one in some]
         found = found.without(list(doubted)) if other is None else other
-        found, after, further = _without_mimics(found, checks, seed=seed, progress=progress)
+        found, after, further = _without_mimics(found, seed=seed, progress=progress)
         unlisted += further
     verdict = Verdict.UNKNOWN if unlisted or reasons else _verdict(found, checks, after)
     causes = _in_order([*_causes(found, {}, seed), *not_named])
@@ -77,22 +76,22 @@ def outcome_of(fit: SharedFit, catalogue: Sequence[Effect], *, seed: int, progre
     return Outcome(found, checks, after, verdict, tuple(causes), tuple(reasons), unlisted)
 
 
-def _checks_after(found: Search, checks: tuple[Check, ...], seed: int) -> tuple[Check, ...]:
+def _checks_after(found: Search) -> tuple[Check, ...]:
     """The checks of the best model; those of the base model where it has no causes."""
-    return run_checks(found.best.fit, seed=seed) if found.best.causes else checks
+    return found.refits.checks(found.best if found.best.causes else found.base)
 
 
 def _without_mimics(
-    found: Search, before: tuple[Check, ...], *, seed: int, progress: ProgressDisplay | None
+    found: Search, *, seed: int, progress: ProgressDisplay | None
 ) -> tuple[Search, tuple[Check, ...], tuple[Unlisted, ...]]:
     """A search without the causes that a law of no particular cause explains away, its checks, and what that does."""
-    after = _checks_after(found, before, seed)
+    after = _checks_after(found)
     laws = laws_of(after)
     if not found.best.causes or not laws:
         return found, after, ()
     left, unlisted = without_mimics(found, laws, seed=seed, progress=progress)
     told = () if unlisted is None else (unlisted,)
-    return left, after if left is found else _checks_after(left, before, seed), told
+    return left, after if left is found else _checks_after(left), told
 
 
 def _doubted(found: Search, after: Sequence[Check]) -> dict[Effect, tuple[Doubt, ...]]:

@@ -5,13 +5,8 @@ from jaxtyping import Bool, Float
 
 from vrdp_prob.models.observation import SMALLEST_SHARE, prior_noise, stated_reference
 from vrdp_prob.scene import Tracks
+from vrdp_prob.scene.third_differences import FEWEST, NORMAL_MAD, WINDOW, third_difference
 
-FEWEST = 8
-"""Third differences below which nothing is said."""
-WINDOW = 4
-"""Frames of a third difference."""
-NORMAL_MAD = 0.6745
-"""Median of the absolute value of a standard normal number."""
 SHARPEST = 1e-3
 """Noise, as a share of what is expected beforehand, that tracks are taken to have at least: computed positions have
 none, and no simulation agrees with them to their last digit."""
@@ -33,7 +28,7 @@ def noise_scale(tracks: Tracks) -> float:
         return float("nan")
     sd, reference = _stated_sd(tracks) or (np.ones(tracks.seen.shape), 1.0)
     windows = np.arange(count)[:, None] + np.arange(WINDOW)
-    weights = _third_difference(tracks.times[windows])
+    weights = third_difference(tracks.times[windows])
     spread = np.sqrt(np.einsum("wf,wfb->wb", weights**2, sd[windows] ** 2))
     differences = np.einsum("wf,wfba->wba", weights, positions[windows]) / spread[..., None]
     told = differences[:, ~_kept(positions)]
@@ -58,14 +53,6 @@ def untold_noise(tracks: Tracks) -> float | None:
     kept = _kept(tracks.positions)
     moving = ~kept.all(axis=1)
     return noise if moving.any() and kept[moving].any(axis=1).all() else None
-
-
-def _third_difference(times: Float[np.ndarray, "window frame"]) -> Float[np.ndarray, "window frame"]:
-    """Weights of the frames of each window in their third divided difference, up to a factor."""
-    apart = times[:, :, None] - times[:, None, :]
-    apart[:, np.arange(WINDOW), np.arange(WINDOW)] = 1.0
-    weights = 1 / apart.prod(axis=-1)
-    return np.asarray(weights / np.linalg.norm(weights, axis=-1, keepdims=True))
 
 
 def position_sd(tracks: Tracks, noise: float) -> Float[np.ndarray, "time body"]:

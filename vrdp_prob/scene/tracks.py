@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 from vrdp_prob.errors import InputError
 from vrdp_prob.scene.body import Body, Shape, Wall
 from vrdp_prob.scene.camera import Camera
+from vrdp_prob.scene.third_differences import FEWEST, NORMAL_MAD, WINDOW, third_difference
 
 FARTHEST = 1e6
 """Coordinate in m beyond which a position is no position; trackers mark with such numbers what they did not see."""
@@ -23,10 +24,6 @@ LATEST_START = 1e6
 """Time in s of the first frame beyond which times are counted from it: what is left of their digits is too little."""
 ORIGIN = "time_origin"
 """Attribute of the data that says when that was."""
-FEWEST_FOR_NOISE = 8
-"""Positions from which the roughness of a track is told."""
-THIRD_DIFFERENCES = 0.6745 * 20**0.5
-"""Median size of the third differences of white noise, in its standard deviations."""
 
 
 @dataclass(frozen=True)
@@ -68,6 +65,7 @@ class Tracks:
     def __post_init__(self) -> None:
         self._check_names()
         self._check_values()
+        self._check_angles()
         self._check_overlap()
         self._check_walls()
 
@@ -249,7 +247,6 @@ class Tracks:
                     f"{self.video}: object {body.id} was seen in {count} frame{'s' * (count != 1)}; "
                     "at least two are needed to tell its motion."
                 )
-        self._check_angles()
 
     def _check_angles(self) -> None:
         """A jump by whole turns from one frame to the next, beside steps of less than a quarter, is one of wrapping."""
@@ -274,11 +271,13 @@ class Tracks:
                 )
 
     def _noise(self, body: int) -> float:
-        """Roughness (m) of the track of a body, by third differences; 0 where there are too few positions."""
-        path = self.positions[self.seen[:, body], body]
-        if len(path) < FEWEST_FOR_NOISE:
+        """Roughness (m) of the track of a body along its rougher axis; 0 where there are too few positions."""
+        seen = np.flatnonzero(self.seen[:, body])
+        windows = seen[np.arange(max(len(seen) - WINDOW + 1, 0))[:, None] + np.arange(WINDOW)]
+        if len(windows) < FEWEST:
             return 0.0
-        return float(np.median(np.abs(np.diff(path, 3, axis=0)), axis=0).max()) / THIRD_DIFFERENCES
+        differences = np.einsum("wf,wfa->wa", third_difference(self.times[windows]), self.positions[windows, body])
+        return float(np.median(np.abs(differences), axis=0).max()) / NORMAL_MAD
 
     def _check_overlap(self) -> None:
         seen, positions = self.seen, self.positions

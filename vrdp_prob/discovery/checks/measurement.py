@@ -13,7 +13,7 @@ from vrdp_prob.discovery.residuals.fitted_motion import FittedMotion
 from vrdp_prob.discovery.residuals.free_flight import NORMAL_95, FreeFlight
 from vrdp_prob.discovery.residuals.residual_model import ResidualModel, VideoResiduals
 from vrdp_prob.discovery.words import number, opposite
-from vrdp_prob.models.roughness import NORMAL_MAD
+from vrdp_prob.scene.third_differences import NORMAL_MAD
 
 LOST, SINGLE, OUTLIERS = "time stamps: lost frames", "time stamps: single frames", "outliers"
 MEMORY, SIZE = GENERAL = ("memory of the residuals", "size of the residuals")

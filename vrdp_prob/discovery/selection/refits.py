@@ -11,6 +11,7 @@ from vrdp_prob.discovery.candidates.proposals import hidden_things
 from vrdp_prob.discovery.candidates.scores import CauseScore, happens_once, score_causes
 from vrdp_prob.discovery.candidates.single_videos import causes_of_lost_videos, lost_videos
 from vrdp_prob.discovery.checks.battery import run_checks
+from vrdp_prob.discovery.finding import Check
 from vrdp_prob.discovery.residuals.overdispersion import overdispersion
 from vrdp_prob.discovery.selection.doubts import causes_with_own_check_failing
 from vrdp_prob.discovery.selection.trials import Trial, gain
@@ -77,6 +78,7 @@ class Refits:
     needed: float
     advance: Advance
     _left: dict[Trial, Left] = field(default_factory=dict)
+    _checks: dict[Trial, tuple[Check, ...]] = field(default_factory=dict)
     _made: dict[Trial, list[Trial]] = field(default_factory=dict)
     _searched: set[Trial] = field(default_factory=set)
     _anew: dict[Trial, tuple[frozenset[int], int]] = field(default_factory=dict)
@@ -91,6 +93,12 @@ class Refits:
                 beside = score_causes(trial.fit, found.model, further, seed=self.seed)
             self._left[trial] = Left(tuple(scores), tuple(beside), overdispersion(found.model, seed=self.seed))
         return self._left[trial]
+
+    def checks(self, trial: Trial) -> tuple[Check, ...]:
+        """Checks of what a model leaves."""
+        if trial not in self._checks:
+            self._checks[trial] = run_checks(trial.fit, seed=self.seed)
+        return self._checks[trial]
 
     def of(self, trial: Trial) -> list[Trial]:
         """Refits of a model, the best first."""
@@ -120,7 +128,7 @@ class Refits:
             found.sort(key=merit, reverse=True)
         if not trial.causes and (not found or found[0].brought(trial) < self.needed):
             tried = {one.causes[-1].name for one in found}
-            seen = causes_with_own_check_failing(run_checks(trial.fit, seed=self.seed)) - tried
+            seen = causes_with_own_check_failing(self.checks(trial)) - tried
             found += self.made_of(trial, [one for one in scores if one.effect.name in seen], beside=found)
             found.sort(key=merit, reverse=True)
         kicks = next((one for one in scores if _kicks(one) and one.sites), None)

@@ -24,10 +24,8 @@ DISTORTION = Parameter(
 LENS_X = Parameter("lens_x", "m", "x of the picture's centre", Transform.IDENTITY, Prior(0.0, 0.5), 0.0)
 LENS_Y = Parameter("lens_y", "m", "y of the picture's centre", Transform.IDENTITY, Prior(0.0, 0.5), 0.0)
 
-
 SEARCH_SHARES = (-0.4, -0.2, 0.0, 0.2, 0.4)
 """Where the centre is looked for, in half widths of the region where bodies were seen."""
-
 AT_THE_EDGE, SMALLEST = 0.004, 1e-3
 """Relative displacement at the edge of the region where bodies were seen, as it is expected at least, and half width
 in m below which a region counts as so wide."""

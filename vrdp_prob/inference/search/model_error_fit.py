@@ -7,7 +7,8 @@ section 2.7; Kennedy and O'Hagan, Journal of the Royal Statistical Society B 63 
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 import torch
@@ -69,23 +70,42 @@ class _Linear:
 
     def cost(self, scale: float, size: float, duration: float) -> float:
         """Negative log probability (nats, up to a constant) of the residuals, the unknowns integrated out."""
-        squares = float(self.prior_residuals @ self.prior_residuals)
-        curvature = self.prior_derivative.T @ self.prior_derivative
-        gradient = self.prior_derivative.T @ self.prior_residuals
-        log_volume = 0.0
+        values, slopes, log_volume = self._whitened(scale, size, duration)
+        squares = float(values @ values + self.prior_residuals @ self.prior_residuals)
+        curvature = slopes.T @ slopes + self._prior_curvature
+        gradient = slopes.T @ values + self.prior_derivative.T @ self.prior_residuals
+        factor = np.linalg.cholesky(curvature + 1e-12 * np.trace(curvature) * np.eye(len(curvature)))
+        absorbed = solve_triangular(factor, gradient, lower=True)
+        return log_volume + float(np.log(np.diag(factor)).sum()) + (squares - float(absorbed @ absorbed)) / 2
+
+    def beside(self, other: "_Linear", scale: float, size: float, duration: float) -> "_Linear":
+        """The same residuals where what others, of known error, say of the unknowns is known beforehand."""
+        values, slopes, _ = other._whitened(scale, size, duration)
+        return replace(
+            self,
+            prior_residuals=np.concatenate([self.prior_residuals, values]),
+            prior_derivative=np.concatenate([self.prior_derivative, slopes]),
+        )
+
+    @cached_property
+    def _prior_curvature(self) -> Float[np.ndarray, "dimension dimension"]:
+        curvature: np.ndarray = self.prior_derivative.T @ self.prior_derivative
+        return curvature
+
+    def _whitened(
+        self, scale: float, size: float, duration: float
+    ) -> tuple[Float[np.ndarray, "number"], Float[np.ndarray, "number dimension"], float]:
+        """Independent residuals of unit variance, their derivative, and by how much logarithms of volumes shrank."""
+        values, slopes, log_volume = [], [], 0.0
         for alike in self.strands:
             root = scale * np.linalg.cholesky(alike[0].covariance(size, duration, self.variance))
             places = np.column_stack([strand.places for strand in alike])
             both = np.concatenate([self.residuals[places][..., None], self.derivative[places]], axis=-1)
             whitened = solve_triangular(root, both.reshape(len(root), -1), lower=True).reshape(places.size, -1)
-            values, slopes = whitened[:, 0], whitened[:, 1:]
-            squares += float(values @ values)
-            curvature += slopes.T @ slopes
-            gradient += slopes.T @ values
+            values.append(whitened[:, 0])
+            slopes.append(whitened[:, 1:])
             log_volume += len(alike) * float(np.log(np.diag(root)).sum())
-        factor = np.linalg.cholesky(curvature + 1e-12 * np.trace(curvature) * np.eye(len(curvature)))
-        absorbed = solve_triangular(factor, gradient, lower=True)
-        return log_volume + float(np.log(np.diag(factor)).sum()) + (squares - float(absorbed @ absorbed)) / 2
+        return np.concatenate(values), np.concatenate(slopes), log_volume
 
 
 def next_model_error(
@@ -154,6 +174,8 @@ def fit_model_error(likelihood: Likelihood, point: Float[np.ndarray, "dimension"
     scale, size, duration = found
     angle_scale, angle_size = 1.0, 0.0
     if len(angles.residuals):
+        # what positions say of the unknowns is not up to the angles: else all that derivatives promise were explained
+        angles = angles.beside(positions, *found)
         angle_scale, angle_size = _spread(angles), 0.0
         turning = _Search(np.log(angle_scale), 10.0, np.log(clues.acceleration / clues.noise), (duration, duration))
         angle_scale, angle_size, _ = turning.run(angles) or (angle_scale, angle_size, duration)

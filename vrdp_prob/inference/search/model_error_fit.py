@@ -6,23 +6,22 @@ section 2.7; Kennedy and O'Hagan, Journal of the Royal Statistical Society B 63 
 """
 
 import math
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
-from functools import cached_property
+from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 import torch
 from jaxtyping import Float
-from scipy.linalg import solve_triangular
 from scipy.optimize import OptimizeResult, minimize
 
 from vrdp_prob.inference.search.clues import Clues
 from vrdp_prob.inference.search.least_squares import jacobian
+from vrdp_prob.inference.search.linear_residuals import LinearResiduals
 from vrdp_prob.inference.search.misfit import Misfit, isolated
 from vrdp_prob.inference.search.noise_fit import NOISE_FIELDS
 from vrdp_prob.models.likelihood import Likelihood
 from vrdp_prob.models.measurement import jitters
-from vrdp_prob.models.model_error import ModelError, Strand, by_law
+from vrdp_prob.models.model_error import ModelError, by_law
 from vrdp_prob.models.roughness import untold_noise
 from vrdp_prob.models.unknowns import ANGLE_NOISE
 
@@ -43,69 +42,6 @@ STARTS = ((0.1, 0.2), (0.1, 2.0), (1.0, 0.2))
 EVALUATIONS = 100
 LARGEST_VARIANCE = 1e8
 """Variance factor of the worst outlier."""
-
-
-@dataclass(frozen=True)
-class _Linear:
-    """Residuals at noise scale 1 near a fit, as a linear function of the unknowns, with their prior.
-
-    Parameters
-    ----------
-    strands
-        The numbers that stray together, those side by side that do so by one law (the two axes of a body).
-    residuals, derivative
-        Values and derivative by the unknowns of all numbers.
-    variance
-        Variance factor of each number.
-    prior_residuals, prior_derivative
-        Those of the prior.
-    """
-
-    strands: Sequence[Sequence[Strand]]
-    residuals: Float[np.ndarray, "number"]
-    derivative: Float[np.ndarray, "number dimension"]
-    variance: Float[np.ndarray, "number"]
-    prior_residuals: Float[np.ndarray, "prior"]
-    prior_derivative: Float[np.ndarray, "prior dimension"]
-
-    def cost(self, scale: float, size: float, duration: float) -> float:
-        """Negative log probability (nats, up to a constant) of the residuals, the unknowns integrated out."""
-        values, slopes, log_volume = self._whitened(scale, size, duration)
-        squares = float(values @ values + self.prior_residuals @ self.prior_residuals)
-        curvature = slopes.T @ slopes + self._prior_curvature
-        gradient = slopes.T @ values + self.prior_derivative.T @ self.prior_residuals
-        factor = np.linalg.cholesky(curvature + 1e-12 * np.trace(curvature) * np.eye(len(curvature)))
-        absorbed = solve_triangular(factor, gradient, lower=True)
-        return log_volume + float(np.log(np.diag(factor)).sum()) + (squares - float(absorbed @ absorbed)) / 2
-
-    def beside(self, other: "_Linear", scale: float, size: float, duration: float) -> "_Linear":
-        """The same residuals where what others, of known error, say of the unknowns is known beforehand."""
-        values, slopes, _ = other._whitened(scale, size, duration)
-        return replace(
-            self,
-            prior_residuals=np.concatenate([self.prior_residuals, values]),
-            prior_derivative=np.concatenate([self.prior_derivative, slopes]),
-        )
-
-    @cached_property
-    def _prior_curvature(self) -> Float[np.ndarray, "dimension dimension"]:
-        curvature: np.ndarray = self.prior_derivative.T @ self.prior_derivative
-        return curvature
-
-    def _whitened(
-        self, scale: float, size: float, duration: float
-    ) -> tuple[Float[np.ndarray, "number"], Float[np.ndarray, "number dimension"], float]:
-        """Independent residuals of unit variance, their derivative, and by how much logarithms of volumes shrank."""
-        values, slopes, log_volume = [], [], 0.0
-        for alike in self.strands:
-            root = scale * np.linalg.cholesky(alike[0].covariance(size, duration, self.variance))
-            places = np.column_stack([strand.places for strand in alike])
-            both = np.concatenate([self.residuals[places][..., None], self.derivative[places]], axis=-1)
-            whitened = solve_triangular(root, both.reshape(len(root), -1), lower=True).reshape(places.size, -1)
-            values.append(whitened[:, 0])
-            slopes.append(whitened[:, 1:])
-            log_volume += len(alike) * float(np.log(np.diag(root)).sum())
-        return np.concatenate(values), np.concatenate(slopes), log_volume
 
 
 def next_model_error(
@@ -213,7 +149,7 @@ class _Search:
     log_acceleration: float
     durations: tuple[float, float]
 
-    def run(self, linear: _Linear) -> tuple[float, float, float] | None:
+    def run(self, linear: LinearResiduals) -> tuple[float, float, float] | None:
         """Most probable scale of the noise, size and duration; None where noise explains the residuals as well."""
         starts = self._starts
         costs = [self._with_error(linear, np.array(start)) for start in starts]
@@ -227,7 +163,7 @@ class _Search:
         """First guesses: log noise scale, log size, log duration."""
         return [[self.log_noise, np.log(share) + self.log_acceleration, np.log(lasting)] for share, lasting in STARTS]
 
-    def _plain(self, linear: _Linear) -> float:
+    def _plain(self, linear: LinearResiduals) -> float:
         """Cost without a model error, at the best scale of the noise."""
         return float(self._minimum(lambda values: self._cost(linear, values[0]), [np.log(_spread(linear))]).fun)
 
@@ -235,14 +171,14 @@ class _Search:
         options = {"maxfev": EVALUATIONS, "xatol": 0.03, "fatol": 0.03}
         return minimize(cost, start, method="Nelder-Mead", options=options)
 
-    def _with_error(self, linear: _Linear, values: Float[np.ndarray, "3"]) -> float:
+    def _with_error(self, linear: LinearResiduals, values: Float[np.ndarray, "3"]) -> float:
         size, duration = self._size(values), self._duration(values)
         expected = np.log(EXPECTED_SHARE) + self.log_acceleration
         prior = ((np.log(size) - expected) / SHARE_LOG_SD) ** 2 / 2
         outside = (values[1:] - np.log([size, duration])) ** 2
         return self._cost(linear, values[0], size, duration) + prior + float(outside.sum())
 
-    def _cost(self, linear: _Linear, log_scale: float, size: float = 0.0, duration: float = 1.0) -> float:
+    def _cost(self, linear: LinearResiduals, log_scale: float, size: float = 0.0, duration: float = 1.0) -> float:
         prior = ((log_scale - self.log_noise) / self.noise_log_sd) ** 2 / 2
         try:
             return linear.cost(float(np.exp(log_scale)), size, duration) + float(prior)
@@ -256,12 +192,14 @@ class _Search:
         return float(np.clip(np.exp(np.clip(values[2], -10, 10)), *self.durations))
 
 
-def _spread(linear: _Linear) -> float:
+def _spread(linear: LinearResiduals) -> float:
     """Root mean square of the residuals, outliers discounted."""
     return float(np.sqrt(np.mean(linear.residuals**2 / linear.variance)))
 
 
-def _linear(likelihood: Likelihood, point: Float[np.ndarray, "dimension"], clues: Clues) -> tuple[_Linear, _Linear]:
+def _linear(
+    likelihood: Likelihood, point: Float[np.ndarray, "dimension"], clues: Clues
+) -> tuple[LinearResiduals, LinearResiduals]:
     """The residuals of positions and of angles as functions of what the worlds depend on."""
     coordinates = likelihood.coordinates
     free = ~coordinates.mask(NOISE_FIELDS)
@@ -280,7 +218,7 @@ def _linear(likelihood: Likelihood, point: Float[np.ndarray, "dimension"], clues
     count = 2 * len(position)
     strands = likelihood.strands
     return (
-        _Linear(
+        LinearResiduals(
             by_law(strands.positions, np.repeat(position, 2)),
             values[:count],
             derivative[:count][:, free],
@@ -288,7 +226,7 @@ def _linear(likelihood: Likelihood, point: Float[np.ndarray, "dimension"], clues
             prior_values,
             prior_derivative[:, free],
         ),
-        _Linear(
+        LinearResiduals(
             by_law(strands.angles, angle),
             values[count:],
             derivative[count:][:, free],

@@ -17,6 +17,7 @@ from vrdp_prob.inference.draws.mode import Mode
 from vrdp_prob.inference.search.at_rest import Explained, with_bodies_at_rest
 from vrdp_prob.inference.search.clues import Clues
 from vrdp_prob.inference.search.descent import Descent
+from vrdp_prob.inference.search.event_orders import with_other_orders
 from vrdp_prob.inference.search.events import Pairs, first_contacts
 from vrdp_prob.inference.search.growing_fit import GrowingFit, merged
 from vrdp_prob.inference.search.misfit import Misfit, judge, shows_outliers, with_outliers
@@ -175,6 +176,15 @@ def fit_map(
         # A model error may explain what another yaw explains, too; so both are candidates under one.
         found = turned.found
         evaluations += turned.evaluations
+    if stages.alternatives:
+        reordered = with_other_orders(
+            likelihood,
+            found,
+            lambda starts: _refined(likelihood, starts, likelihood, stages),
+            optimiser=stages.optimiser,
+        )
+        found = reordered.found
+        evaluations += reordered.evaluations
     explained = with_bodies_at_rest(
         Explained(likelihood, structure, found, evaluations),
         lambda source, starts, other: _refined(source, starts, other, stages),

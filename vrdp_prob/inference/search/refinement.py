@@ -1,6 +1,6 @@
 """The last steps to a maximum of the log posterior, on all frames and with the noise scale."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -48,6 +48,26 @@ class Refined:
     point: Float[np.ndarray, "dimension"]
     log_density: float
     converged: bool
+    evaluations: int
+
+
+Refine = Callable[[Sequence[Float[np.ndarray, "dimension"]]], list[Refined]]
+"""Refines starts, the best first."""
+
+
+@dataclass(frozen=True)
+class Searched:
+    """Maxima among which there are now others than before.
+
+    Parameters
+    ----------
+    found
+        The maxima, those from which the others were found among them, best first.
+    evaluations
+        Worlds simulated on the way.
+    """
+
+    found: list[Refined]
     evaluations: int
 
 

@@ -7,7 +7,6 @@ contact is kept, and the spin is changed by as little as turns the cube otherwis
 """
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
@@ -27,7 +26,7 @@ from vrdp_prob.inference.search.hypothesis import (
 from vrdp_prob.inference.search.least_squares import Minimum
 from vrdp_prob.inference.search.noise_fit import NOISE_FIELDS
 from vrdp_prob.inference.search.plan import Optimiser
-from vrdp_prob.inference.search.refinement import Refined
+from vrdp_prob.inference.search.refinement import Refine, Refined, Searched
 from vrdp_prob.models.likelihood import Likelihood
 from vrdp_prob.models.parameters import ANGULAR_DRAG
 from vrdp_prob.models.simulator.events import CONTACTS
@@ -55,25 +54,6 @@ MOST_LOOKS = 6
 ENOUGH = 1.0
 """...or two in a row bring less than so many nats."""
 
-Refine = Callable[[Sequence[Float[np.ndarray, "dimension"]]], list[Refined]]
-"""Refines starts, the best first."""
-
-
-@dataclass(frozen=True)
-class Turned:
-    """Maxima with other yaws.
-
-    Parameters
-    ----------
-    found
-        The maxima, those from which they were found among them, best first.
-    evaluations
-        Worlds simulated on the way.
-    """
-
-    found: list[Refined]
-    evaluations: int
-
 
 def with_other_yaws(
     likelihood: Likelihood,
@@ -82,7 +62,7 @@ def with_other_yaws(
     explained: Callable[[Refined], bool],
     *,
     optimiser: Optimiser,
-) -> Turned:
+) -> Searched:
     """Maxima with those of other yaws and spins of cubes, looked for at least once.
 
     Parameters
@@ -110,7 +90,7 @@ def with_other_yaws(
         idle = 0 if gain > ENOUGH else idle + 1
         if idle > 1 or explained(best[0]):
             break
-    return Turned(best, evaluations)
+    return Searched(best, evaluations)
 
 
 def other_yaws(descent: Descent, point: Float[np.ndarray, "dimension"]) -> list[Minimum]:

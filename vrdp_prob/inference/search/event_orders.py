@@ -1,0 +1,283 @@
+"""Other orders of contacts that follow one another so closely that the tracks leave open which came first.
+
+A body that meets two others at nearly the same time meets the second one with what the first one left it. In the other
+order the same motion takes other masses and restitutions: another mode, which no descent reaches, since motion and
+masses would have to change at once. So the motion is moved, by as little as the tracks allow, to where the order is the
+other one; there masses and restitutions follow; then all is refined.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+import torch
+from jaxtyping import Float
+
+from vrdp_prob.inference.draws.samples import Gaussian
+from vrdp_prob.inference.search.descent import Descent
+from vrdp_prob.inference.search.events import courses_at
+from vrdp_prob.inference.search.least_squares import jacobian, minimise
+from vrdp_prob.inference.search.noise_fit import NOISE_FIELDS
+from vrdp_prob.inference.search.plan import Optimiser
+from vrdp_prob.inference.search.refinement import Refine, Refined, Searched
+from vrdp_prob.models.likelihood import Likelihood
+from vrdp_prob.models.simulator.events import CONTACTS, EventTable, RolloutEventKind
+
+CLOSE = 0.25
+"""Contacts (s) of one body further apart than this are not looked at."""
+REACH = 3.5
+"""An order is tried if the tracks contradict it by at most so many standard deviations of the time between contacts."""
+BEYOND = (0.3, 1.0, 2.0)
+"""Standard deviations past simultaneity at which the order is the other one, the first that makes it so."""
+AT_THE_EDGE, JUST_BESIDE = 1.0, 0.02
+"""Standard deviations between contacts below which a maximum may be at the edge, and at which it is sought there."""
+STEP = 0.05
+"""Step for derivatives, in standard deviations."""
+MOST_ORDERS = 6
+"""Orders that are tried from one maximum: those that the tracks contradict least."""
+MOST_LOOKS = 4
+"""Maxima from which other orders are looked for at most."""
+NEARLY = 15.0
+"""Nats that a maximum may be below the best one for others to be looked for from it."""
+BETTER = 0.5
+"""Nats that an order that was looked for before has to gain to be looked from again."""
+AFTER = 16
+"""Frames from the contacts on that masses and restitutions follow at first; later contacts need these right."""
+FIRST_ITERATIONS, THEN_ITERATIONS = 6, 4
+"""Steps of masses and restitutions on these frames, and on all."""
+EDGE_ROUNDS, EDGE_ITERATIONS = 2, 6
+"""Turns of a descent along the edge between two orders, and steps of each."""
+MATTER = ("mass", "restitution", "wall_restitution")
+"""What follows."""
+
+Contact = tuple[int, int, int, int]
+"""Kind, first and second of a contact, and which one of its kind between these two it is."""
+
+
+@dataclass(frozen=True)
+class _Gap:
+    """The time between two contacts of a body, as the tracks know it.
+
+    Parameters
+    ----------
+    early, late
+        The contacts.
+    time
+        Time (s) of the first.
+    seconds
+        Time (s) between them.
+    slopes
+        Its derivative by the whitened coordinates.
+    """
+
+    early: Contact
+    late: Contact
+    time: float
+    seconds: float
+    slopes: Float[np.ndarray, "whitened"]
+
+    @property
+    def sd(self) -> float:
+        """Standard deviation (s)."""
+        return float(np.linalg.norm(self.slopes))
+
+    @property
+    def size(self) -> float:
+        """Standard deviations between the contacts."""
+        return self.seconds / self.sd
+
+    def move_to(self, size: float) -> Float[np.ndarray, "whitened"]:
+        """The least change, in whitened coordinates, to so many standard deviations between the contacts."""
+        return (size - self.size) * self.slopes / self.sd
+
+
+@dataclass(frozen=True)
+class _Neighbourhood:
+    """A point with the Gaussian around it, in all coordinates but the noise.
+
+    Parameters
+    ----------
+    likelihood
+        The density.
+    point
+        The point.
+    root
+        Change of the coordinates per whitened coordinate.
+    """
+
+    likelihood: Likelihood
+    point: Float[np.ndarray, "dimension"]
+    root: Float[np.ndarray, "dimension whitened"]
+
+    @classmethod
+    def of(cls, likelihood: Likelihood, point: Float[np.ndarray, "dimension"]) -> "_Neighbourhood":
+        """That of a point."""
+        free = ~likelihood.coordinates.mask(NOISE_FIELDS)
+        _, derivative = jacobian(likelihood.residuals, point, likelihood.coordinates.scale, active=free, central=True)
+        gaussian = Gaussian.from_precision(point[free], derivative[:, free].T @ derivative[:, free])
+        root = np.zeros((len(point), len(gaussian.mean)))
+        root[free] = gaussian.root
+        return cls(likelihood, point, root)
+
+    def moved(self, whitened: Float[np.ndarray, "*batch whitened"]) -> Float[np.ndarray, "*batch dimension"]:
+        """Points around."""
+        return self.point + whitened @ self.root.T
+
+    def gaps(self, pairs: Sequence[tuple[Contact, Contact]]) -> list[_Gap]:
+        """The times between pairs of contacts, those that may be none first; without such as nothing here changes."""
+        count = self.root.shape[1]
+        steps = STEP * np.concatenate([np.zeros((1, count)), np.eye(count), -np.eye(count)])
+        with torch.no_grad():
+            events = self.likelihood.rollout(torch.from_numpy(self.moved(steps))).events
+        worlds = [_contacts(events.of_world(world)) for world in range(len(steps))]
+        found = []
+        for early, late in pairs:
+            between = np.array([one.get(late, np.nan) - one.get(early, np.nan) for one in worlds])
+            sides = np.stack([between[1 : count + 1] - between[0], between[0] - between[count + 1 :]]) / STEP
+            known = np.isfinite(sides)
+            slopes = np.where(known, sides, 0.0).sum(axis=0) / np.maximum(known.sum(axis=0), 1)
+            if slopes.any():
+                found.append(_Gap(early, late, worlds[0][early], float(between[0]), slopes))
+        return sorted(found, key=lambda gap: abs(gap.size))
+
+
+def with_other_orders(
+    likelihood: Likelihood, found: Sequence[Refined], refined: Refine, *, optimiser: Optimiser
+) -> Searched:
+    """Maxima with those in which close contacts have come in another order.
+
+    Parameters
+    ----------
+    likelihood
+        The density.
+    found
+        Its maxima, best first.
+    refined
+        How what may be near other maxima is refined.
+    optimiser
+        How masses and restitutions follow before that.
+    """
+    descent = Descent(likelihood, optimiser)
+    best, evaluations = sorted(found, key=lambda one: -one.log_density), 0
+    looked: dict[tuple[tuple[int, int], ...], float] = {}
+    for _ in range(MOST_LOOKS):
+        hopeful = [one for one in best if one.log_density > best[0].log_density - NEARLY]
+        orders = courses_at(likelihood, torch.from_numpy(np.array([one.point for one in hopeful])))
+        new = (
+            (order, one)
+            for order, one in zip(orders, hopeful, strict=True)
+            if one.log_density > looked.get(order, -np.inf) + BETTER
+        )
+        order, start = next(new, (None, None))
+        if order is None or start is None:
+            break
+        looked[order] = start.log_density
+        starts, spent = other_orders(descent, start.point)
+        others = refined(starts) if starts else []
+        evaluations += spent + sum(one.evaluations for one in others)
+        best = sorted([*best, *others], key=lambda one: -one.log_density)
+    return Searched(best, evaluations)
+
+
+def other_orders(
+    descent: Descent, point: Float[np.ndarray, "dimension"]
+) -> tuple[list[Float[np.ndarray, "dimension"]], int]:
+    """What is near other maxima of the log posterior, in which close contacts have come in another order.
+
+    Parameters
+    ----------
+    descent
+        Refines worlds of the density.
+    point
+        A maximum, from which is looked.
+
+    Returns
+    -------
+    Points, and the number of worlds simulated.
+    """
+    likelihood = descent.likelihood
+    with torch.no_grad():
+        close = list(_close(_contacts(likelihood.rollout(torch.from_numpy(point[None])).events)))
+    if not close:
+        return [], 1
+    around = _Neighbourhood.of(likelihood, point)
+    matter = likelihood.coordinates.mask(MATTER)
+    last = len(likelihood.tracks.times)
+    found, evaluations = [], 1 + 4 * around.root.shape[1]
+    for gap in [gap for gap in around.gaps(close) if gap.size < REACH][:MOST_ORDERS]:
+        if gap.size < AT_THE_EDGE:
+            along, spent = _along_the_edge(likelihood, point, gap.early, gap.late)
+            found.append(along)
+            evaluations += spent
+        moved = around.moved(np.array([gap.move_to(-beyond) for beyond in BEYOND]))
+        own, *others = courses_at(likelihood, torch.from_numpy(np.concatenate([point[None], moved])))
+        evaluations += len(moved) + 1
+        other = next((start for start, order in zip(moved, others, strict=True) if order != own), None)
+        if other is None:
+            continue
+        until = min(int(np.searchsorted(likelihood.tracks.times, gap.time)) + AFTER, last)
+        (first,) = descent(other[None], matter, frame_count=until, iterations=FIRST_ITERATIONS)
+        (then,) = descent(first.point[None], matter, iterations=THEN_ITERATIONS)
+        along, spent = _along_the_edge(likelihood, then.point, gap.late, gap.early)
+        found += [then.point, along]
+        evaluations += first.evaluations + then.evaluations + spent
+    return found, evaluations
+
+
+def _along_the_edge(
+    likelihood: Likelihood, point: Float[np.ndarray, "dimension"], early: Contact, late: Contact
+) -> tuple[Float[np.ndarray, "dimension"], int]:
+    """The most probable point at which two contacts come in an order and nearly at once, and the worlds simulated.
+
+    Where each order is the more probable the closer the contacts are, descents in all directions stop at the edge
+    between them, while the density still rises along it.
+    """
+    evaluations = 0
+    for _ in range(EDGE_ROUNDS):
+        around = _Neighbourhood.of(likelihood, point)
+        evaluations += 4 * around.root.shape[1]
+        gaps = around.gaps([(early, late)])
+        if not gaps:
+            break
+        edge = gaps[0].move_to(JUST_BESIDE)
+        along = np.linalg.svd(gaps[0].slopes[None])[2][1:]
+
+        def residuals(
+            moves: Float[np.ndarray, "point direction"],
+            around: _Neighbourhood = around,
+            edge: Float[np.ndarray, "whitened"] = edge,
+            along: Float[np.ndarray, "direction whitened"] = along,
+        ) -> Float[np.ndarray, "point residual"]:
+            return likelihood.residuals(around.moved(edge + moves @ along))
+
+        minimum = minimise(residuals, np.zeros(len(along)), np.ones(len(along)), iterations=EDGE_ITERATIONS)
+        evaluations += minimum.evaluations
+        if not np.isfinite(minimum.cost):
+            break
+        point = around.moved(edge + minimum.point @ along)
+    return point, evaluations
+
+
+def _contacts(events: EventTable) -> dict[Contact, float]:
+    """Times (s) of the contacts of a world."""
+    found: dict[Contact, float] = {}
+    events = events.where(np.isin(events.kind, CONTACTS))
+    for kind, first, second, time in zip(
+        events.kind.tolist(), events.first.tolist(), events.second.tolist(), events.time.tolist(), strict=True
+    ):
+        before = sum(known[:3] == (kind, first, second) for known in found)
+        found[kind, first, second, before] = time
+    return found
+
+
+def _close(contacts: dict[Contact, float]) -> Iterator[tuple[Contact, Contact]]:
+    """Contacts of one body with different partners that follow one another closely."""
+    for (early, before), (late, after) in combinations(contacts.items(), 2):
+        if early[:3] != late[:3] and _bodies(early) & _bodies(late) and after - before < CLOSE:
+            yield early, late
+
+
+def _bodies(contact: Contact) -> set[int]:
+    kind, first, second, _ = contact
+    return {first, second} if kind == RolloutEventKind.COLLISION else {first}

@@ -32,7 +32,7 @@ from vrdp_prob.inference.search.modes import (
     without_idle,
 )
 from vrdp_prob.inference.search.plan import FitPlan
-from vrdp_prob.inference.search.refinement import Refined, at_the_top, climb, refine
+from vrdp_prob.inference.search.refinement import Refined, Searched, at_the_top, climb, refine
 from vrdp_prob.inference.search.yaw_search import with_other_yaws
 from vrdp_prob.models.likelihood import Likelihood
 from vrdp_prob.models.noise import NoiseFamily
@@ -176,15 +176,9 @@ def fit_map(
         # A model error may explain what another yaw explains, too; so both are candidates under one.
         found = turned.found
         evaluations += turned.evaluations
-    if stages.alternatives:
-        reordered = with_other_orders(
-            likelihood,
-            found,
-            lambda starts: _refined(likelihood, starts, likelihood, stages),
-            optimiser=stages.optimiser,
-        )
-        found = reordered.found
-        evaluations += reordered.evaluations
+    reordered = _reordered(likelihood, found, stages)
+    found = reordered.found
+    evaluations += reordered.evaluations
     explained = with_bodies_at_rest(
         Explained(likelihood, structure, found, evaluations),
         lambda source, starts, other: _refined(source, starts, other, stages),
@@ -200,15 +194,10 @@ def fit_map(
         if (further := with_outliers(clues, heavy, tempered[0].point)) is not clues:
             clues, likelihood, found = further, heavy, tempered
     misfit = judge(likelihood, found[0].point, clues)
-    for _ in range(TURNS if model_error else 0):
-        error = next_model_error(likelihood, found[0].point, clues, misfit)
-        if error is None or error is likelihood.model_error:
-            break
-        widened = Likelihood(tracks, model, unknowns(tracks, model, structure, model_error=error), model_error=error)
-        found = _refined(likelihood, [one.point for one in found], widened, stages)
-        likelihood = widened
-        evaluations += sum(one.evaluations for one in found)
-        misfit = misfit.with_error(error, likelihood.observations.position_reference)
+    if model_error:
+        explained = Explained(likelihood, structure, found, evaluations)
+        explained, misfit = _with_model_error(explained, model, clues, misfit, stages)
+        likelihood, found, evaluations = explained.likelihood, explained.found, explained.evaluations
     climbed = _climbed(likelihood, _best(found))
     while (wider := with_all_that_meet(likelihood, structure, [one.point for one in climbed])) is not None:
         structure, widened = wider
@@ -229,6 +218,38 @@ def _refined(
     descent = Descent(likelihood, plan.optimiser)
     carried = [source.coordinates.carried(point, likelihood.coordinates) for point in starts]
     return _best(refine(descent, carried, hopeless=HOPELESS + MAY_CATCH_UP))
+
+
+def _with_model_error(
+    explained: Explained, model: PhysicsModel, clues: Clues, misfit: Misfit, plan: FitPlan
+) -> tuple[Explained, Misfit]:
+    """The explanation under a density that allows for what the model lacks, where it lacks something."""
+    likelihood, structure, found = explained.likelihood, explained.structure, explained.found
+    evaluations = explained.evaluations
+    for _ in range(TURNS):
+        error = next_model_error(likelihood, found[0].point, clues, misfit)
+        if error is None or error is likelihood.model_error:
+            break
+        tracks = likelihood.tracks
+        widened = Likelihood(tracks, model, unknowns(tracks, model, structure, model_error=error), model_error=error)
+        found = _refined(likelihood, [one.point for one in found], widened, plan)
+        likelihood = widened
+        evaluations += sum(one.evaluations for one in found)
+        misfit = misfit.with_error(error, likelihood.observations.position_reference)
+    if likelihood.model_error is not None:  # it leaves open more orders of contacts than noise does
+        reordered = _reordered(likelihood, found, plan)
+        found = reordered.found
+        evaluations += reordered.evaluations
+    return Explained(likelihood, structure, found, evaluations), misfit
+
+
+def _reordered(likelihood: Likelihood, found: Sequence[Refined], plan: FitPlan) -> Searched:
+    """Maxima with those in which close contacts have come in another order, where a plan has several starts."""
+    if not plan.alternatives:
+        return Searched(list(found), 0)
+    return with_other_orders(
+        likelihood, found, lambda starts: _refined(likelihood, starts, likelihood, plan), optimiser=plan.optimiser
+    )
 
 
 def _best(found: Sequence[Refined]) -> list[Refined]:

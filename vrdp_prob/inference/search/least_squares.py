@@ -18,6 +18,8 @@ DAMPINGS = 10.0 ** np.array([-3.0, -2.0, -1.0, 0.0, 1.0, 2.0, 3.0])
 SMALLEST_DAMPING, LARGEST_DAMPING = 1e-9, 1e9
 STEP = 1e-5
 """Finite-difference step in units of the coordinates' scale: large against the simulator's error of 1e-11."""
+JUMP = 10.0
+"""Ratio of the differences on both sides from which on the larger one is a jump."""
 
 
 @dataclass(frozen=True)
@@ -65,7 +67,10 @@ def jacobian(
     active: np.ndarray | None = None,
     central: bool = False,
 ) -> tuple[Float[np.ndarray, "residual"], Float[np.ndarray, "residual dimension"]]:
-    """Residuals and their derivative at a point by differences in one batch; columns of inactive coordinates are 0."""
+    """Residuals and their derivative at a point by differences in one batch; columns of inactive coordinates are 0.
+
+    Central ones are one-sided where a step to one side leads past an edge, beyond which residuals are quite other ones.
+    """
     columns = np.flatnonzero(np.ones(len(point), bool) if active is None else active)
     steps = STEP * scale[columns]
     moves = np.zeros((len(columns), len(point)))
@@ -75,7 +80,12 @@ def jacobian(
     base, forward = values[0], values[1 : 1 + len(columns)]
     derivative = np.zeros((len(base), len(point)))
     if central:
-        difference = (forward - values[1 + len(columns) :]) / (2 * steps[:, None])
+        ahead, behind = forward - base, base - values[1 + len(columns) :]
+        sizes = np.stack([np.linalg.norm(side, axis=1) for side in (ahead, behind)])
+        sizes = np.where(np.isfinite(sizes), sizes, np.inf)
+        jumps = sizes > JUMP * sizes[::-1]
+        difference = np.where(jumps[0, :, None], behind, np.where(jumps[1, :, None], ahead, (ahead + behind) / 2))
+        difference = difference / steps[:, None]
     else:
         difference = (forward - base) / steps[:, None]
     derivative[:, columns] = np.where(np.isfinite(difference), difference, 0.0).T

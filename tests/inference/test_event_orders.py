@@ -55,7 +55,7 @@ def orders(fit: MapFit) -> dict[tuple[tuple[int, int], ...], float]:
     return found
 
 
-@pytest.mark.parametrize("seed", [1, 2, 3])
+@pytest.mark.parametrize("seed", [pytest.param(1, marks=pytest.mark.slow), 2, pytest.param(3, marks=pytest.mark.slow)])
 def test_both_orders_are_modes_and_a_mirror_swaps_them(seed: int) -> None:
     tracks = between_two(0.0, seed)
     found, other = orders(fitted(tracks)), orders(fitted(mirrored(tracks)))
@@ -80,6 +80,7 @@ def share_of_the_rarer_order(tracks: Tracks, sampler: str = "laplace") -> tuple[
     return share, float(np.sqrt(share * (1 - share) / min(posterior.convergence.ess_bulk, 2000)))
 
 
+@pytest.mark.slow
 def test_a_mirror_does_not_change_the_probability_of_an_order() -> None:
     tracks = between_two(0.0, seed=3)
     share, error = share_of_the_rarer_order(tracks)

@@ -196,7 +196,7 @@ def fit_map(
     misfit = judge(likelihood, found[0].point, clues)
     if model_error:
         explained = Explained(likelihood, structure, found, evaluations)
-        explained, misfit = _with_model_error(explained, model, clues, misfit, stages)
+        explained, misfit = _with_model_error(explained, clues, misfit, stages)
         likelihood, found, evaluations = explained.likelihood, explained.found, explained.evaluations
     climbed = _climbed(likelihood, _best(found))
     while (wider := with_all_that_meet(likelihood, structure, [one.point for one in climbed])) is not None:
@@ -220,9 +220,7 @@ def _refined(
     return _best(refine(descent, carried, hopeless=HOPELESS + MAY_CATCH_UP))
 
 
-def _with_model_error(
-    explained: Explained, model: PhysicsModel, clues: Clues, misfit: Misfit, plan: FitPlan
-) -> tuple[Explained, Misfit]:
+def _with_model_error(explained: Explained, clues: Clues, misfit: Misfit, plan: FitPlan) -> tuple[Explained, Misfit]:
     """The explanation under a density that allows for what the model lacks, where it lacks something."""
     likelihood, structure, found = explained.likelihood, explained.structure, explained.found
     evaluations = explained.evaluations
@@ -230,7 +228,7 @@ def _with_model_error(
         error = next_model_error(likelihood, found[0].point, clues, misfit)
         if error is None or error is likelihood.model_error:
             break
-        tracks = likelihood.tracks
+        tracks, model = likelihood.tracks, likelihood.model
         widened = Likelihood(tracks, model, unknowns(tracks, model, structure, model_error=error), model_error=error)
         found = _refined(likelihood, [one.point for one in found], widened, plan)
         likelihood = widened
@@ -247,9 +245,10 @@ def _reordered(likelihood: Likelihood, found: Sequence[Refined], plan: FitPlan) 
     """Maxima with those in which close contacts have come in another order, where a plan has several starts."""
     if not plan.alternatives:
         return Searched(list(found), 0)
-    return with_other_orders(
+    searched = with_other_orders(
         likelihood, found, lambda starts: _refined(likelihood, starts, likelihood, plan), optimiser=plan.optimiser
     )
+    return replace(searched, found=_best(searched.found))
 
 
 def _best(found: Sequence[Refined]) -> list[Refined]:

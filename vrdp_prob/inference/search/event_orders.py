@@ -1,12 +1,12 @@
 """Other orders of contacts that follow one another so closely that the tracks leave open which came first.
 
-A body that meets two others at nearly the same time meets the second one with what the first one left it. In the other
-order the same motion takes other masses and restitutions: another mode, which no descent reaches, since motion and
-masses would have to change at once. So the motion is moved, by as little as the tracks allow, to where the order is the
-other one; there masses and restitutions follow; then all is refined.
+A body that meets two others, or one and a wall, at nearly the same time meets the second one with what the first left
+it. In the other order the same motion takes other masses and restitutions: another mode, which no descent reaches,
+since motion and masses would have to change at once. So the motion is moved, by as little as the tracks allow, to where
+the order is the other one; there masses and restitutions follow; then all is refined.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import combinations
 
@@ -16,7 +16,6 @@ from jaxtyping import Float
 
 from vrdp_prob.inference.draws.samples import Gaussian
 from vrdp_prob.inference.search.descent import Descent
-from vrdp_prob.inference.search.events import courses_at
 from vrdp_prob.inference.search.least_squares import jacobian, minimise
 from vrdp_prob.inference.search.noise_fit import NOISE_FIELDS
 from vrdp_prob.inference.search.plan import Optimiser
@@ -34,6 +33,8 @@ AT_THE_EDGE, JUST_BESIDE = 1.0, 0.02
 """Standard deviations between contacts below which a maximum may be at the edge, and at which it is sought there."""
 STEP = 0.05
 """Step for derivatives, in standard deviations."""
+ALIKE = 10.0
+"""Ratio of the changes on both sides of a step from which on the larger one is a jump, past another order."""
 MOST_ORDERS = 6
 """Orders that are tried from one maximum: those that the tracks contradict least."""
 MOST_LOOKS = 4
@@ -41,9 +42,9 @@ MOST_LOOKS = 4
 NEARLY = 15.0
 """Nats that a maximum may be below the best one for others to be looked for from it."""
 BETTER = 0.5
-"""Nats that an order that was looked for before has to gain to be looked from again."""
+"""Nats that an order that was looked from before has to gain to be looked from again."""
 AFTER = 16
-"""Frames from the contacts on that masses and restitutions follow at first; later contacts need these right."""
+"""Frames from both contacts on that masses and restitutions follow at first; later contacts need these right."""
 FIRST_ITERATIONS, THEN_ITERATIONS = 6, 4
 """Steps of masses and restitutions on these frames, and on all."""
 EDGE_ROUNDS, EDGE_ITERATIONS = 2, 6
@@ -51,8 +52,8 @@ EDGE_ROUNDS, EDGE_ITERATIONS = 2, 6
 MATTER = ("mass", "restitution", "wall_restitution")
 """What follows."""
 
-Contact = tuple[int, int, int, int]
-"""Kind, first and second of a contact, and which one of its kind between these two it is."""
+Contact = tuple[int, int, int]
+"""Kind, first and second of the first contact between these two."""
 
 
 @dataclass(frozen=True)
@@ -128,13 +129,13 @@ class _Neighbourhood:
         """The times between pairs of contacts, those that may be none first; without such as nothing here changes."""
         count = self.root.shape[1]
         steps = STEP * np.concatenate([np.zeros((1, count)), np.eye(count), -np.eye(count)])
-        with torch.no_grad():
-            events = self.likelihood.rollout(torch.from_numpy(self.moved(steps))).events
-        worlds = [_contacts(events.of_world(world)) for world in range(len(steps))]
+        worlds = _contacts_at(self.likelihood, self.moved(steps))
         found = []
         for early, late in pairs:
             between = np.array([one.get(late, np.nan) - one.get(early, np.nan) for one in worlds])
+            between[between * between[0] < 0] = np.nan  # in the other order it passes at another rate
             sides = np.stack([between[1 : count + 1] - between[0], between[0] - between[count + 1 :]]) / STEP
+            sides[np.abs(sides) > ALIKE * np.abs(sides[::-1])] = np.nan
             known = np.isfinite(sides)
             slopes = np.where(known, sides, 0.0).sum(axis=0) / np.maximum(known.sum(axis=0), 1)
             if slopes.any():
@@ -160,20 +161,20 @@ def with_other_orders(
     """
     descent = Descent(likelihood, optimiser)
     best, evaluations = sorted(found, key=lambda one: -one.log_density), 0
-    looked: dict[tuple[tuple[int, int], ...], float] = {}
+    looked: dict[tuple[Contact, ...], float] = {}
     for _ in range(MOST_LOOKS):
         hopeful = [one for one in best if one.log_density > best[0].log_density - NEARLY]
-        orders = courses_at(likelihood, torch.from_numpy(np.array([one.point for one in hopeful])))
-        new = (
-            (order, one)
+        orders = [tuple(one) for one in _contacts_at(likelihood, [one.point for one in hopeful])]
+        evaluations += len(hopeful)
+        new = [
+            (order, one.point, one.log_density)
             for order, one in zip(orders, hopeful, strict=True)
             if one.log_density > looked.get(order, -np.inf) + BETTER
-        )
-        order, start = next(new, (None, None))
-        if order is None or start is None:
+        ]
+        if not new:
             break
-        looked[order] = start.log_density
-        starts, spent = other_orders(descent, start.point)
+        order, point, looked[order] = new[0]
+        starts, spent = other_orders(descent, point, frozenset(looked))
         others = refined(starts) if starts else []
         evaluations += spent + sum(one.evaluations for one in others)
         best = sorted([*best, *others], key=lambda one: -one.log_density)
@@ -181,7 +182,7 @@ def with_other_orders(
 
 
 def other_orders(
-    descent: Descent, point: Float[np.ndarray, "dimension"]
+    descent: Descent, point: Float[np.ndarray, "dimension"], known: frozenset[tuple[Contact, ...]] = frozenset()
 ) -> tuple[list[Float[np.ndarray, "dimension"]], int]:
     """What is near other maxima of the log posterior, in which close contacts have come in another order.
 
@@ -191,49 +192,65 @@ def other_orders(
         Refines worlds of the density.
     point
         A maximum, from which is looked.
+    known
+        Orders that need not be looked for.
 
     Returns
     -------
     Points, and the number of worlds simulated.
     """
     likelihood = descent.likelihood
-    with torch.no_grad():
-        close = list(_close(_contacts(likelihood.rollout(torch.from_numpy(point[None])).events)))
-    if not close:
+    matter = likelihood.coordinates.mask(MATTER)
+    (contacts,) = _contacts_at(likelihood, [point]) or [{}]
+    close = _close(contacts)
+    if not close or not matter.any():
         return [], 1
     around = _Neighbourhood.of(likelihood, point)
-    matter = likelihood.coordinates.mask(MATTER)
-    last = len(likelihood.tracks.times)
-    found, evaluations = [], 1 + 4 * around.root.shape[1]
-    for gap in [gap for gap in around.gaps(close) if gap.size < REACH][:MOST_ORDERS]:
-        if gap.size < AT_THE_EDGE:
-            along, spent = _along_the_edge(likelihood, point, gap.early, gap.late)
-            found.append(along)
+    evaluations = 1 + 4 * around.root.shape[1]
+    found: list[Float[np.ndarray, "dimension"]] = []
+    for gap in [gap for gap in around.gaps(close) if abs(gap.size) < REACH][:MOST_ORDERS]:
+        edges = [(point, gap.early, gap.late)] if abs(gap.size) < AT_THE_EDGE else []
+        other = _swapped(around, gap, known)
+        evaluations += len(BEYOND)
+        if other is not None:
+            until = int(np.searchsorted(likelihood.tracks.times, gap.time + max(gap.seconds, 0.0))) + AFTER
+            until = min(until, len(likelihood.tracks.times))
+            (first,) = descent(other[None], matter, frame_count=until, iterations=FIRST_ITERATIONS)
+            (then,) = descent(first.point[None], matter, iterations=THEN_ITERATIONS)
+            evaluations += first.evaluations + then.evaluations
+            if np.isfinite(then.cost):
+                found.append(then.point)
+                edges.append((then.point, gap.late, gap.early))
+        for start, early, late in edges:
+            along, spent = _along_the_edge(likelihood, start, early, late)
             evaluations += spent
-        moved = around.moved(np.array([gap.move_to(-beyond) for beyond in BEYOND]))
-        own, *others = courses_at(likelihood, torch.from_numpy(np.concatenate([point[None], moved])))
-        evaluations += len(moved) + 1
-        other = next((start for start, order in zip(moved, others, strict=True) if order != own), None)
-        if other is None:
-            continue
-        until = min(int(np.searchsorted(likelihood.tracks.times, gap.time)) + AFTER, last)
-        (first,) = descent(other[None], matter, frame_count=until, iterations=FIRST_ITERATIONS)
-        (then,) = descent(first.point[None], matter, iterations=THEN_ITERATIONS)
-        along, spent = _along_the_edge(likelihood, then.point, gap.late, gap.early)
-        found += [then.point, along]
-        evaluations += first.evaluations + then.evaluations + spent
+            if along is not None:
+                found.append(along)
     return found, evaluations
+
+
+def _swapped(
+    around: _Neighbourhood, gap: _Gap, known: frozenset[tuple[Contact, ...]]
+) -> Float[np.ndarray, "dimension"] | None:
+    """The nearest point at which two contacts have come in the other order; None where that order is known."""
+    moved = around.moved(np.array([gap.move_to(-beyond) for beyond in BEYOND]))
+    for point, contacts in zip(moved, _contacts_at(around.likelihood, moved), strict=True):
+        if contacts.get(gap.late, np.inf) < contacts.get(gap.early, -np.inf):
+            return None if tuple(contacts) in known else point
+    return None
 
 
 def _along_the_edge(
     likelihood: Likelihood, point: Float[np.ndarray, "dimension"], early: Contact, late: Contact
-) -> tuple[Float[np.ndarray, "dimension"], int]:
+) -> tuple[Float[np.ndarray, "dimension"] | None, int]:
     """The most probable point at which two contacts come in an order and nearly at once, and the worlds simulated.
+
+    None where they do not come in that order.
 
     Where each order is the more probable the closer the contacts are, descents in all directions stop at the edge
     between them, while the density still rises along it.
     """
-    evaluations = 0
+    evaluations, best = 0, None
     for _ in range(EDGE_ROUNDS):
         around = _Neighbourhood.of(likelihood, point)
         evaluations += 4 * around.root.shape[1]
@@ -255,29 +272,42 @@ def _along_the_edge(
         evaluations += minimum.evaluations
         if not np.isfinite(minimum.cost):
             break
-        point = around.moved(edge + minimum.point @ along)
-    return point, evaluations
+        best = point = around.moved(edge + minimum.point @ along)
+    return best, evaluations
+
+
+def _contacts_at(
+    likelihood: Likelihood, points: Sequence[Float[np.ndarray, "dimension"]] | Float[np.ndarray, "point dimension"]
+) -> list[dict[Contact, float]]:
+    """Times (s) of the first contacts of every two in the worlds of some points; none where a world failed."""
+    if not len(points):
+        return []
+    with torch.no_grad():
+        rollout = likelihood.rollout(torch.from_numpy(np.array(points)))
+    fine = rollout.fine.tolist()
+    return [_contacts(rollout.events.of_world(world)) if fine[world] else {} for world in range(len(points))]
 
 
 def _contacts(events: EventTable) -> dict[Contact, float]:
-    """Times (s) of the contacts of a world."""
-    found: dict[Contact, float] = {}
+    """Times (s) of the first contacts of every two in a world, in their order."""
     events = events.where(np.isin(events.kind, CONTACTS))
+    found: dict[Contact, float] = {}
     for kind, first, second, time in zip(
         events.kind.tolist(), events.first.tolist(), events.second.tolist(), events.time.tolist(), strict=True
     ):
-        before = sum(known[:3] == (kind, first, second) for known in found)
-        found[kind, first, second, before] = time
+        found.setdefault((kind, first, second), time)
     return found
 
 
-def _close(contacts: dict[Contact, float]) -> Iterator[tuple[Contact, Contact]]:
-    """Contacts of one body with different partners that follow one another closely."""
-    for (early, before), (late, after) in combinations(contacts.items(), 2):
-        if early[:3] != late[:3] and _bodies(early) & _bodies(late) and after - before < CLOSE:
-            yield early, late
+def _close(contacts: dict[Contact, float]) -> list[tuple[Contact, Contact]]:
+    """First contacts of one body with different partners that follow one another closely."""
+    return [
+        (early, late)
+        for (early, before), (late, after) in combinations(contacts.items(), 2)
+        if _bodies(early) & _bodies(late) and after - before < CLOSE
+    ]
 
 
 def _bodies(contact: Contact) -> set[int]:
-    kind, first, second, _ = contact
+    kind, first, second = contact
     return {first, second} if kind == RolloutEventKind.COLLISION else {first}

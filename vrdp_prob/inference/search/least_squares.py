@@ -18,8 +18,8 @@ DAMPINGS = 10.0 ** np.array([-3.0, -2.0, -1.0, 0.0, 1.0, 2.0, 3.0])
 SMALLEST_DAMPING, LARGEST_DAMPING = 1e-9, 1e9
 STEP = 1e-5
 """Finite-difference step in units of the coordinates' scale: large against the simulator's error of 1e-11."""
-JUMP = 10.0
-"""Ratio of the differences on both sides from which on the larger one is a jump."""
+JUMP, LEAST_JUMP = 10.0, 1.0
+"""A difference is a jump where it is so many times that on the other side, and so large (in standard deviations)."""
 
 
 @dataclass(frozen=True)
@@ -83,7 +83,7 @@ def jacobian(
         ahead, behind = forward - base, base - values[1 + len(columns) :]
         sizes = np.stack([np.linalg.norm(side, axis=1) for side in (ahead, behind)])
         sizes = np.where(np.isfinite(sizes), sizes, np.inf)
-        jumps = sizes > JUMP * sizes[::-1]
+        jumps = (sizes > JUMP * sizes[::-1]) & (sizes > LEAST_JUMP)
         difference = np.where(jumps[0, :, None], behind, np.where(jumps[1, :, None], ahead, (ahead + behind) / 2))
         difference = difference / steps[:, None]
     else:

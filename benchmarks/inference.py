@@ -11,9 +11,12 @@ many as NUTS needs on our simulator for the same posterior. Whether samplers agr
 
 import argparse
 import json
+import os
 import sys
 from collections.abc import Sequence
 from pathlib import Path
+
+os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 import numpy as np
 import torch

@@ -19,6 +19,7 @@ from vrdp_prob.inference.nuts_sampler import sample_nuts
 from vrdp_prob.inference.posterior import Posterior
 from vrdp_prob.inference.runs.checkpoint import Checkpoint, model_facts, program_facts, videos_facts
 from vrdp_prob.inference.runs.journal import journal
+from vrdp_prob.inference.runs.parallel import linear_algebra_in_one_thread
 from vrdp_prob.inference.samplers.mode_weights import UNSURE, doubts
 from vrdp_prob.inference.samplers.proposals import proposals
 from vrdp_prob.inference.samplers.rate_steps import RateSteps
@@ -49,6 +50,7 @@ class _Drawn:
     log_evidence: float
 
 
+@linear_algebra_in_one_thread
 def infer_together(
     videos: Sequence[Tracks],
     *,

@@ -16,7 +16,7 @@ help:
 	@echo "make test-discovery  hide effects in data and require finding them, tables to docs/ (hours; goes on where it was)"
 	@echo "make lint       format and lint"
 	@echo "make types      types"
-	@echo "make calibrate  simulation-based calibration of every sampler, figures to docs/ (hours; goes on where it was)"
+	@echo "make calibrate  simulation-based calibration of every sampler, figures to docs/ (a day; goes on where it was)"
 	@echo "make bench      every benchmark but the long ones ($(LONG)), tables to the terminal and JSON to $(OUT)/"
 	@echo "make clean      remove the environment and caches; $(OUT)/ stays"
 

@@ -67,8 +67,15 @@ def test_both_orders_are_modes_and_a_mirror_swaps_them(seed: int) -> None:
 def test_contacts_that_are_clearly_apart_have_one_order() -> None:
     fit = fitted(between_two(0.08, seed=1))
     assert orders(fit).keys() == {UPPER_FIRST}
-    starts, _ = other_orders(Descent(fit.likelihood, Optimiser.GAUSS_NEWTON), fit.point)
-    assert not starts
+    starts = other_orders(Descent(fit.likelihood, Optimiser.GAUSS_NEWTON), fit.point)
+    assert not starts.points
+    assert not fit.search.sentence
+
+
+def test_more_orders_than_are_tried_are_told_of(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("vrdp_prob.inference.search.event_orders.MOST_ORDERS", 0)
+    fit = fitted(between_two(0.0, seed=2))
+    assert "not all orders in which they may have come were tried" in fit.search.sentence
 
 
 def share_of_the_rarer_order(tracks: Tracks, sampler: str = "laplace") -> tuple[float, float]:

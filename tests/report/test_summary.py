@@ -2,7 +2,10 @@
 
 from dataclasses import replace
 
+import pytest
+
 from vrdp_prob.inference.draws.samples import Convergence
+from vrdp_prob.inference.search.misfit import Misfit
 from vrdp_prob.report.summary import answer_words, by_doubt, is_doubtful, summary
 
 
@@ -12,6 +15,21 @@ def test_paragraph_says_what_there_is_and_what_happened(content):
     assert "Two collisions happened: the gray cylinder with the cyan sphere at 2.4 s" in text
     assert "The fit has converged; two things limit what it can say" in text
     assert text.endswith("Of 10 questions, four are doubtful.")
+
+
+@pytest.mark.parametrize(
+    ("residual_sd", "acceleration", "start"),
+    [
+        (0.03, 0.2, "The model does not explain this motion"),
+        (0.012, 0.2, "The model may not quite explain this motion"),
+        (0.01, None, "Five objects appear"),
+    ],
+)
+def test_a_misfit_is_told_before_any_number(content, residual_sd, acceleration, start):
+    misfit = Misfit(residual_sd, 0.01, False, 0.3, "0", 0.02, error_acceleration=acceleration, error_duration=0.2)
+    first, *_ = summary(replace(content, misfit=misfit))
+    assert first.startswith(start)
+    assert (start == "Five objects appear") or not any(letter.isdigit() for letter in first)
 
 
 def test_paragraph_does_not_trust_a_fit_that_has_not_converged(content):

@@ -179,6 +179,7 @@ def fit_map(
     reordered = _reordered(likelihood, found, stages)
     found = reordered.found
     evaluations += reordered.evaluations
+    all_orders = reordered.complete
     explained = with_bodies_at_rest(
         Explained(likelihood, structure, found, evaluations),
         lambda source, starts, other: _refined(source, starts, other, stages),
@@ -207,7 +208,7 @@ def fit_map(
         evaluations += sum(one.evaluations for one in climbed)
     likelihood, modes = without_idle(likelihood, distinct_modes(likelihood, climbed), structure.moving)
     converged = at_the_top(found, climbed)
-    search = ModeSearch(stages.alternatives, len(attempts), not _in_doubt(attempts))
+    search = ModeSearch(stages.alternatives, len(attempts), not _in_doubt(attempts), all_orders)
     return MapFit(likelihood, modes, converged, search, clues, misfit, evaluations, believed_at_rest)
 
 

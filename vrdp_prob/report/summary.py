@@ -32,8 +32,18 @@ def by_doubt(answers: tuple[AnswerContent, ...]) -> list[AnswerContent]:
 
 def summary(content: ReportContent) -> list[str]:
     """Sentences of the opening paragraph."""
-    parts = [_objects(content), *_collisions(content), _trust(content), _answers(content)]
+    parts = [_misfit(content), _objects(content), *_collisions(content), _trust(content), _answers(content)]
     return [part for part in parts if part]
+
+
+def _misfit(content: ReportContent) -> str:
+    if content.misfit is None or content.misfit.fits:
+        return ""
+    if content.misfit.large:
+        return (
+            "The model does not explain this motion, as is told below: take every number here as that of a wrong model."
+        )
+    return "The model may not quite explain this motion, as is told below."
 
 
 def _objects(content: ReportContent) -> str:

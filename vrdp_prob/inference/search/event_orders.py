@@ -162,7 +162,8 @@ def with_other_orders(
     descent = Descent(likelihood, optimiser)
     best, evaluations = sorted(found, key=lambda one: -one.log_density), 0
     looked: dict[tuple[Contact, ...], float] = {}
-    for _ in range(MOST_LOOKS):
+    complete = True
+    for look in range(MOST_LOOKS + 1):
         hopeful = [one for one in best if one.log_density > best[0].log_density - NEARLY]
         orders = [tuple(one) for one in _contacts_at(likelihood, [one.point for one in hopeful])]
         evaluations += len(hopeful)
@@ -171,19 +172,40 @@ def with_other_orders(
             for order, one in zip(orders, hopeful, strict=True)
             if one.log_density > looked.get(order, -np.inf) + BETTER
         ]
-        if not new:
+        if not new or look == MOST_LOOKS:
+            complete &= not new
             break
         order, point, looked[order] = new[0]
-        starts, spent = other_orders(descent, point, frozenset(looked))
-        others = refined(starts) if starts else []
-        evaluations += spent + sum(one.evaluations for one in others)
+        starts = other_orders(descent, point, frozenset(looked))
+        others = refined(starts.points) if starts.points else []
+        evaluations += starts.evaluations + sum(one.evaluations for one in others)
+        complete &= starts.complete
         best = sorted([*best, *others], key=lambda one: -one.log_density)
-    return Searched(best, evaluations)
+    return Searched(best, evaluations, complete)
+
+
+@dataclass(frozen=True)
+class Starts:
+    """What is near other maxima.
+
+    Parameters
+    ----------
+    points
+        The points.
+    evaluations
+        Worlds simulated on the way.
+    complete
+        Whether there are no more orders than were tried.
+    """
+
+    points: list[Float[np.ndarray, "dimension"]]
+    evaluations: int
+    complete: bool
 
 
 def other_orders(
     descent: Descent, point: Float[np.ndarray, "dimension"], known: frozenset[tuple[Contact, ...]] = frozenset()
-) -> tuple[list[Float[np.ndarray, "dimension"]], int]:
+) -> Starts:
     """What is near other maxima of the log posterior, in which close contacts have come in another order.
 
     Parameters
@@ -194,21 +216,18 @@ def other_orders(
         A maximum, from which is looked.
     known
         Orders that need not be looked for.
-
-    Returns
-    -------
-    Points, and the number of worlds simulated.
     """
     likelihood = descent.likelihood
     matter = likelihood.coordinates.mask(MATTER)
     (contacts,) = _contacts_at(likelihood, [point]) or [{}]
     close = _close(contacts)
     if not close or not matter.any():
-        return [], 1
+        return Starts([], 1, True)
     around = _Neighbourhood.of(likelihood, point)
     evaluations = 1 + 4 * around.root.shape[1]
     found: list[Float[np.ndarray, "dimension"]] = []
-    for gap in [gap for gap in around.gaps(close) if abs(gap.size) < REACH][:MOST_ORDERS]:
+    open_gaps = [gap for gap in around.gaps(close) if abs(gap.size) < REACH]
+    for gap in open_gaps[:MOST_ORDERS]:
         edges = [(point, gap.early, gap.late)] if abs(gap.size) < AT_THE_EDGE else []
         other = _swapped(around, gap, known)
         evaluations += len(BEYOND)
@@ -226,7 +245,7 @@ def other_orders(
             evaluations += spent
             if along is not None:
                 found.append(along)
-    return found, evaluations
+    return Starts(found, evaluations, len(open_gaps) <= MOST_ORDERS)
 
 
 def _swapped(

@@ -15,17 +15,25 @@ class ModeSearch:
         Fits that were grown from scratch.
     agreed
         Whether there was no reason to doubt the best explanation, or two of the fits found it.
+    all_orders
+        Whether all orders of close contacts were tried that the tracks leave open.
     """
 
     done: bool
     attempts: int
     agreed: bool
+    all_orders: bool = True
 
     @property
     def sentence(self) -> str:
         """What the search does not cover, in plain words; empty where there is nothing to add."""
         if not self.done:
             return "Other explanations of the motion were not looked for."
+        if self.agreed and not self.all_orders:
+            return (
+                "Contacts follow one another so closely that not all orders in which they may have come were tried: "
+                "there may be other explanations as good."
+            )
         if not self.agreed and self.attempts == 1:
             return (
                 "The contacts of this video are hard to explain, and it was searched once: there may be a better "

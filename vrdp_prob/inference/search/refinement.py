@@ -65,10 +65,13 @@ class Searched:
         The maxima, those from which the others were found among them, best first.
     evaluations
         Worlds simulated on the way.
+    complete
+        Whether all was looked at that might lead to others.
     """
 
     found: list[Refined]
     evaluations: int
+    complete: bool = True
 
 
 def refine(descent: Descent, starts: Sequence[Float[np.ndarray, "dimension"]], *, hopeless: float) -> list[Refined]:

@@ -115,7 +115,9 @@ class _Neighbourhood:
     def of(cls, likelihood: Likelihood, point: Float[np.ndarray, "dimension"]) -> "_Neighbourhood":
         """That of a point."""
         free = ~likelihood.coordinates.mask(NOISE_FIELDS)
-        _, derivative = jacobian(likelihood.residuals, point, likelihood.coordinates.scale, active=free, central=True)
+        _, derivative = jacobian(
+            likelihood.residuals, point, likelihood.coordinates.scale, active=free, central=True, own_side=True
+        )
         gaussian = Gaussian.from_precision(point[free], derivative[:, free].T @ derivative[:, free])
         root = np.zeros((len(point), len(gaussian.mean)))
         root[free] = gaussian.root

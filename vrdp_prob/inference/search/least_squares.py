@@ -66,10 +66,12 @@ def jacobian(
     *,
     active: np.ndarray | None = None,
     central: bool = False,
+    own_side: bool = False,
 ) -> tuple[Float[np.ndarray, "residual"], Float[np.ndarray, "residual dimension"]]:
     """Residuals and their derivative at a point by differences in one batch; columns of inactive coordinates are 0.
 
-    Central ones are one-sided where a step to one side leads past an edge, beyond which residuals are quite other ones.
+    Central ones are one-sided, where asked for, if a step to one side leads past an edge, beyond which residuals are
+    quite other ones. Without that a derivative there is so large that it shows the edge.
     """
     columns = np.flatnonzero(np.ones(len(point), bool) if active is None else active)
     steps = STEP * scale[columns]
@@ -83,7 +85,7 @@ def jacobian(
         ahead, behind = forward - base, base - values[1 + len(columns) :]
         sizes = np.stack([np.linalg.norm(side, axis=1) for side in (ahead, behind)])
         sizes = np.where(np.isfinite(sizes), sizes, np.inf)
-        jumps = (sizes > JUMP * sizes[::-1]) & (sizes > LEAST_JUMP)
+        jumps = own_side & (sizes > JUMP * sizes[::-1]) & (sizes > LEAST_JUMP)
         difference = np.where(jumps[0, :, None], behind, np.where(jumps[1, :, None], ahead, (ahead + behind) / 2))
         difference = difference / steps[:, None]
     else:

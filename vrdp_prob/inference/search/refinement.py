@@ -162,7 +162,9 @@ def at_the_top(found: Sequence[Refined], climbed: Sequence[Refined]) -> bool:
 
 def mode_at(likelihood: Likelihood, refined: Refined) -> Mode:
     """The mode of a maximum, with the curvature around it."""
-    _, derivative = jacobian(likelihood.residuals, refined.point, likelihood.coordinates.scale, central=True)
+    _, derivative = jacobian(
+        likelihood.residuals, refined.point, likelihood.coordinates.scale, central=True, own_side=True
+    )
     return Mode(refined.point, with_noise(likelihood, refined.point, derivative), refined.log_density)
 
 

@@ -20,7 +20,7 @@ def with_a_jump(at: float) -> Residuals:
 
 @pytest.mark.parametrize("at", [1.0 + 1e-9, 1.0 - 1e-9, 5.0])
 def test_a_derivative_is_that_of_the_side_a_point_is_on(at: float) -> None:
-    _, derivative = jacobian(with_a_jump(at), np.array([1.0, 0.0]), np.ones(2), central=True)
+    _, derivative = jacobian(with_a_jump(at), np.array([1.0, 0.0]), np.ones(2), central=True, own_side=True)
     np.testing.assert_allclose(derivative, [[SLOPE, 0.0], [2.0, 1.0]], atol=1e-4)
 
 
@@ -28,7 +28,7 @@ def test_a_side_on_which_the_world_fails_says_nothing() -> None:
     def residuals(points: np.ndarray) -> np.ndarray:
         return np.where(points > 1.0, np.nan, SLOPE * points)
 
-    _, derivative = jacobian(residuals, np.ones(1), np.ones(1), central=True)
+    _, derivative = jacobian(residuals, np.ones(1), np.ones(1), central=True, own_side=True)
     np.testing.assert_allclose(derivative, [[SLOPE]])
 
 
@@ -36,5 +36,5 @@ def test_what_sets_in_without_a_jump_counts_half() -> None:
     def residuals(points: np.ndarray) -> np.ndarray:
         return SLOPE * np.maximum(points, 0.0)
 
-    _, derivative = jacobian(residuals, np.zeros(1), np.ones(1), central=True)
+    _, derivative = jacobian(residuals, np.zeros(1), np.ones(1), central=True, own_side=True)
     np.testing.assert_allclose(derivative, [[SLOPE / 2]])

@@ -32,6 +32,7 @@ def test_a_turning_body_has_another_course_of_events(seconds: float, turns: bool
     assert (fit.misfit.ratio > 20) == turns  # friction stops it, and holds it
 
 
+@pytest.mark.slow
 def test_a_fit_finds_that_a_slope_and_not_friction_has_stopped_a_body() -> None:
     fit = fit_map(uphill(0.13, 6.0), TILTED, np.random.default_rng(0), model_error=False)
     assert fit.misfit.ratio < 1.1

@@ -18,7 +18,7 @@ def posterior() -> Posterior:
     return inferred()
 
 
-@pytest.mark.parametrize("own_courses", [True, False])
+@pytest.mark.parametrize("own_courses", [True, pytest.param(False, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("change", [Change.REMOVED, Change.HEAVIER])
 def test_bodies_feel_from_afar_that_another_is_missing_or_has_another_mass(
     posterior: Posterior, change: Change, *, own_courses: bool

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import torch
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from tests.simulator.comparison import scenes
@@ -80,16 +80,17 @@ def test_energy_never_grows(shapes: tuple[Shape, ...], seed: int, coefficient: f
         assert (energy(scene, rollout)[fine].diff(dim=1) <= 1e-10).all()
 
 
-def _of_pair(worlds: Worlds, rollout: Rollout, row: int, pair: list[int]) -> tuple[np.ndarray, np.ndarray]:
-    """Momenta (x, y, about the origin) of each body of a pair at one of the times, and the sizes of their terms."""
-    place, velocity = (values[0, row, pair].numpy() for values in (rollout.trajectory, rollout.velocity))
-    mass, inertia = worlds.mass[0, pair].numpy(), worlds.moment_of_inertia[0, pair].numpy()
+def _momenta(worlds: Worlds, rollout: Rollout, row: int) -> tuple[np.ndarray, np.ndarray]:
+    """Momenta (x, y, about the origin) of each body at one of the times, and the sizes of their terms."""
+    place, velocity = (values[0, row].numpy() for values in (rollout.trajectory, rollout.velocity))
+    mass, inertia = worlds.mass[0].numpy(), worlds.moment_of_inertia[0].numpy()
     x, y = mass * velocity[:, 0], mass * velocity[:, 1]
     terms = np.stack([place[:, 0] * y, -place[:, 1] * x, inertia * velocity[:, 2]])
     return np.stack([x, y, terms.sum(0)]), np.abs(np.concatenate([[x, y], terms])).max(1)
 
 
 @given(shapes=SHAPES, seed=SEEDS, coefficient=st.floats(0, 2))
+@example(shapes=(Shape.CYLINDER, Shape.CUBE, Shape.CUBE, Shape.CUBE), seed=9148605, coefficient=0.0)
 @settings(max_examples=25, deadline=None)
 def test_every_contact_of_a_rollout_keeps_momentum(shapes: tuple[Shape, ...], seed: int, coefficient: float) -> None:
     # Without friction with the table nothing but a contact changes velocities, also shortly before and after it.
@@ -100,10 +101,9 @@ def test_every_contact_of_a_rollout_keeps_momentum(shapes: tuple[Shape, ...], se
             continue
         around = (events.time[:, None] + SHORTLY * np.array([-1, 1])).ravel()
         rollout = simulate(scene, torch.from_numpy(around), model)
-        for row, pair in enumerate(zip(events.first, events.second, strict=True)):
-            (before, size), (after, _) = (
-                _of_pair(scene, rollout, index, list(pair)) for index in (2 * row, 2 * row + 1)
-            )
+        for row in range(len(events)):
+            # Of all bodies: one of the two may lean on a third, which goes on pushing it.
+            (before, size), (after, _) = (_momenta(scene, rollout, index) for index in (2 * row, 2 * row + 1))
             change = np.abs((after - before).sum(1))
             assert (change[:2] <= 1e-12 * size[:2].max()).all()
             assert change[2] <= 1e-12 * size.max()

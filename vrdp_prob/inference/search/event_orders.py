@@ -221,7 +221,7 @@ def other_orders(
     """
     likelihood = descent.likelihood
     matter = likelihood.coordinates.mask(MATTER)
-    (contacts,) = _contacts_at(likelihood, [point]) or [{}]
+    (contacts,) = _contacts_at(likelihood, [point])
     close = _close(contacts)
     if not close or not matter.any():
         return Starts([], 1, True)

@@ -160,12 +160,14 @@ def test_predicted_measurements_stray_as_the_model_error_and_have_the_tails_of_t
 
 def test_the_installed_arviz_takes_the_result() -> None:
     data = posterior().to_arviz()
-    assert set(data.groups()) >= {"posterior", "posterior_predictive", "log_likelihood", "log_prior", "map_estimate"}
+    for group in ("posterior", "posterior_predictive", "log_likelihood", "log_prior", "map_estimate"):
+        assert group in data
     summary = arviz.summary(data, var_names=["mass", "velocity"], kind="stats")
-    assert summary.loc["mass[0]", "mean"] > 0
+    assert float(summary.loc["mass[0]", "mean"]) > 0
     loo = arviz.loo(data, var_name="position", pointwise=True)
-    assert np.isfinite(loo.elpd_loo)
-    assert len(loo.loo_i) == tracks().seen.sum()
+    expected, pointwise = (loo.elpd, loo.elpd_i) if hasattr(loo, "elpd") else (loo.elpd_loo, loo.loo_i)
+    assert np.isfinite(expected)
+    assert pointwise.size == tracks().seen.sum()
 
 
 def test_arviz_from_version_1_takes_the_tree_itself(monkeypatch: pytest.MonkeyPatch) -> None:

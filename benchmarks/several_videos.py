@@ -1,10 +1,12 @@
 """What several videos say together: width and coverage of the shared friction, time and memory against their number.
 
     python benchmarks/several_videos.py [--json FILE] [--videos 1,3,10] [--short 30,100] [--sets 8]
+    python benchmarks/several_videos.py --optimisers 3,10 [--json FILE] [--sets 8]
 
 Videos are of the tests' own generator: three cylinders that hit one another (60 frames), and for many videos single
 cylinders that slide (30 frames). All have the same friction and drag. Coverage is over several sets of fresh videos,
-drawn by importance sampling and by chains; time is that of the processor over all threads.
+drawn by importance sampling and by chains; time is that of the processor over all threads. `--optimisers` draws
+nothing and compares the joint fit by L-BFGS alone with that by Gauss-Newton.
 """
 
 import argparse
@@ -22,7 +24,7 @@ ROOT = Path(__file__).parents[1]
 sys.path.insert(0, str(ROOT))
 
 from tests.inference.generator import Scene, integrate, observe  # noqa: E402 - needs the path above
-from vrdp_prob.inference import SharedPosterior, fit_together, sample_together  # noqa: E402
+from vrdp_prob.inference import FitPlan, Optimiser, SharedPosterior, fit_together, sample_together  # noqa: E402
 from vrdp_prob.models.parameters import GRAVITY  # noqa: E402
 from vrdp_prob.models.physics import PhysicsModel  # noqa: E402
 from vrdp_prob.models.simulator.rollout import compile_model  # noqa: E402
@@ -30,6 +32,8 @@ from vrdp_prob.scene import Shape, Tracks  # noqa: E402
 
 FRICTION, DRAG, NOISE = 0.05, 0.05, 0.005
 LEVEL = 0.9
+NEAR, SHARE = 0.5, 0.9
+"""Nats by which L-BFGS may end below Gauss-Newton, and the share of sets in which it has to end no lower."""
 LARGEST_MEMORY = 1000.0
 """MiB by which the resident memory may rise."""
 STATUS = Path("/proc/self/status")
@@ -60,9 +64,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--short", default="30,100", help="numbers of short videos without")
     parser.add_argument("--sets", type=int, default=8, help="sets of fresh videos for the coverage, for each number")
     parser.add_argument("--gibbs", default="1,3,10", help="numbers of videos that chains are run for as well")
+    parser.add_argument("--optimisers", help="numbers of videos with collisions that are fitted by both optimisers")
     options = parser.parse_args(arguments)
     torch.set_num_threads(1)
     compile_model(PhysicsModel.base())
+    if options.optimisers:
+        checks = [compared(count, options.sets) for count in numbers(options.optimisers)]
+        if options.json:
+            options.json.write_text(json.dumps({"checks": checks}, indent=1) + "\n", encoding="utf-8")
+        return 0
     rows: list[Row] = []
     chained = numbers(options.gibbs)
     print("videos           sampler   sd of log friction  90 % covers  fit s  sampling s  memory MiB  converged")
@@ -122,6 +132,27 @@ def measured(kind: str, count: int, maker: Maker, sampler: str, sets: int) -> Ro
         flush=True,
     )
     return row
+
+
+def compared(count: int, sets: int) -> Check:
+    """Fit some sets of videos by both optimisers, and print how far L-BFGS ends from Gauss-Newton."""
+    gains, seconds, converged = [], dict.fromkeys(Optimiser, 0.0), dict.fromkeys(Optimiser, 0)
+    for number in range(sets):
+        videos = [colliding(1000 * number + index) for index in range(count)]
+        found = {}
+        for optimiser in Optimiser:
+            begin = time.process_time()
+            found[optimiser] = fit_together(
+                videos, model=PhysicsModel.base(), seed=number, model_error=False, plan=FitPlan(optimiser)
+            )
+            seconds[optimiser] += (time.process_time() - begin) / sets
+            converged[optimiser] += found[optimiser].joint.converged
+        gains.append(found[Optimiser.LBFGS].joint.log_density - found[Optimiser.GAUSS_NEWTON].joint.log_density)
+        print(f"{count:3d} videos, set {number}: L-BFGS ends {gains[-1]:+.2f} nats from Gauss-Newton", flush=True)
+    for optimiser in Optimiser:
+        print(f"{count:3d} videos, {optimiser}: {converged[optimiser]} of {sets} converged, {seconds[optimiser]:.1f} s")
+    reached = float(np.mean([gain > -NEAR for gain in gains]))
+    return check(f"{count} videos: share in which L-BFGS ends within {NEAR} nats of Gauss-Newton", reached, SHARE)
 
 
 def friction(posterior: SharedPosterior) -> tuple[float, float, float]:

@@ -38,6 +38,7 @@ EXPECTED = {
     "plan as a text": "plan is 'lbfgs'; give a FitPlan of vrdp_prob.inference.",
     "one video together": f"videos are no list of tracks{OF_SEVERAL}",
     "model of several as a text": "model is 'base'; give a PhysicsModel, which PhysicsModel.read reads from a file.",
+    "plan of several as a text": "plan is 'lbfgs'; give a FitPlan of vrdp_prob.inference.",
     "model to discover as a text": "model is 'base'; give a PhysicsModel, which PhysicsModel.read reads from a file.",
     "a folder together": f"videos are no list of tracks{OF_SEVERAL}",
     "unknown shape": "object a: shape 'pyramid' is not known; use sphere, cube or cylinder.",

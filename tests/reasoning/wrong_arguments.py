@@ -62,6 +62,7 @@ CALLS: dict[str, Callable[[Path], Any]] = {
     "plan as a text": lambda _: vrdp_prob.infer(TRACKS, plan="lbfgs"),  # type: ignore[arg-type]
     "one video together": lambda _: infer_together(TRACKS),
     "model of several as a text": lambda _: infer_together([TRACKS], model="base"),  # type: ignore[arg-type]
+    "plan of several as a text": lambda _: infer_together([TRACKS], plan="lbfgs"),  # type: ignore[arg-type]
     "model to discover as a text": lambda _: discover(3 * [TRACKS], model="base"),  # type: ignore[arg-type]
     "a folder together": lambda _: infer_together("folder"),  # type: ignore[arg-type]
     "unknown shape": lambda _: Body("a", "pyramid"),  # type: ignore[arg-type]

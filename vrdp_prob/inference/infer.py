@@ -119,8 +119,7 @@ def infer(
     check_options(sampler=sampler, noise=noise, defaults=defaults, motion=motion)
     check_counts(draws, seed)
     check_model(model)
-    if not isinstance(plan, FitPlan | None):
-        raise InputError(f"plan is {_given(plan)}; give a FitPlan of vrdp_prob.inference.")
+    check_plan(plan)
     physics = default_model() if model is None else model
     stages = FitPlan() if plan is None else plan
     kept = None
@@ -206,6 +205,18 @@ def check_counts(draws: int, seed: int) -> None:
     for name, value, least in (("draws", draws, FEWEST_DRAWS), ("seed", seed, 0)):
         if not isinstance(value, int | np.integer) or value < least:
             raise InputError(f"{name} is {value!r}; give a whole number of at least {least}.")
+
+
+def check_plan(plan: object) -> None:
+    """Refuse what is no plan of a search.
+
+    Raises
+    ------
+    InputError
+        If it is neither a `FitPlan` nor None.
+    """
+    if not isinstance(plan, FitPlan | None):
+        raise InputError(f"plan is {_given(plan)}; give a FitPlan of vrdp_prob.inference.")
 
 
 def check_model(model: object) -> None:

@@ -14,7 +14,7 @@ import torch
 
 from tests.inference.several_videos.videos import DRAG, FRICTION, NOISE, colliding, sliding
 from vrdp_prob.errors import InputError
-from vrdp_prob.inference import Posterior
+from vrdp_prob.inference import CURRICULUM, FitPlan, Optimiser, Posterior
 from vrdp_prob.inference.draws.diagnostics import Reported, chain_statistics
 from vrdp_prob.inference.draws.samples import Gaussian, evaluate, evaluate_with_gradient
 from vrdp_prob.inference.search.mode_search import ModeSearch
@@ -406,3 +406,17 @@ def test_memory_does_not_grow_with_the_number_of_videos() -> None:
         )
         peaks[count] = float(done.stdout)
     assert peaks[100] < peaks[10] + 150  # MB; the draws of 100 videos take some 40
+
+
+def test_lbfgs_finds_the_joint_fit_of_gauss_newton() -> None:
+    fit = fit_together([colliding(1), sliding(2)], model=BASE, plan=FitPlan(Optimiser.LBFGS))
+    assert fit.joint.converged
+    assert fit.joint.log_density == pytest.approx(two().joint.log_density, abs=0.2)
+    distance = np.linalg.solve(two().joint.gaussian.root, fit.joint.gaussian.mean - two().joint.gaussian.mean)
+    assert np.linalg.norm(distance) < 0.5
+
+
+def test_the_paper_stages_start_a_joint_fit() -> None:
+    fit = fit_together([sliding(1), sliding(2)], model=BASE, plan=replace(CURRICULUM, optimiser=Optimiser.LBFGS))
+    assert fit.joint.converged
+    assert abs(float(np.log(fit.value("sliding_friction") / FRICTION))) < 0.5

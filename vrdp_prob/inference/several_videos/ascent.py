@@ -17,7 +17,7 @@ from vrdp_prob.errors import InputError
 from vrdp_prob.inference.runs.parallel import in_parallel
 from vrdp_prob.inference.search.noise_fit import NOISE_FIELDS, best_noise
 from vrdp_prob.inference.several_videos.arrow import Expansion, Expansions
-from vrdp_prob.inference.several_videos.joint_fit import JointFit, expand, expand_prior, follow_or_settle, settle
+from vrdp_prob.inference.several_videos.joint_fit import JointFit, expand_all, expand_prior, follow_or_settle, settle
 from vrdp_prob.inference.several_videos.linking import LinkedVideo, SharedNumbers
 
 SHARES = (1.0, 0.3, 0.1, 0.02)
@@ -165,11 +165,11 @@ def climb(
     if not state.total(numbers) > (-np.inf if least is None else least):
         values = zip(videos, state.values, strict=True)
         raise ImpossibleStartError(", ".join(video.name for video, value in values if not np.isfinite(value)))
-    slopes = _expanded(numbers, videos, state)
+    slopes = expand_all(numbers, videos, state.shared, state.locals)
     if towards is not None and not np.array_equal(towards, shared):
         settled = _settled(videos, state, slopes.videos)
         state = _improved(numbers, _Ridges(videos), settled, towards - shared)
-        slopes = _expanded(numbers, videos, state)
+        slopes = expand_all(numbers, videos, state.shared, state.locals)
     refused = -np.inf
     for _ in range(effort.rounds):
         inside = _inside(slopes)
@@ -192,7 +192,7 @@ def climb(
         gain = trial.total(numbers) - state.total(numbers)
         if gain > 0:
             state = trial
-            slopes = _expanded(numbers, videos, state)
+            slopes = expand_all(numbers, videos, state.shared, state.locals)
         if gain < effort.enough:
             converged = _smooth(slopes).expected_gain < EXPECTED
             break
@@ -217,13 +217,6 @@ def _smooth(slopes: Expansions) -> Expansions:
 def _gained(trial: _State, state: _State, chosen: Bool[np.ndarray, "video"]) -> float:
     """What some of the videos have gained; as long as those at an edge gain much they would follow no common step."""
     return float((np.array(trial.values) - np.array(state.values))[chosen].sum())
-
-
-def _expanded(numbers: SharedNumbers, videos: Sequence[LinkedVideo], state: _State) -> Expansions:
-    expansions = in_parallel(
-        lambda index: expand(videos[index], state.shared, state.locals[index], central=True), range(len(videos))
-    )
-    return Expansions(expand_prior(numbers, state.shared), tuple(expansions))
 
 
 def _improved(

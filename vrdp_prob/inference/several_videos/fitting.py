@@ -18,7 +18,7 @@ from vrdp_prob.inference.search.model_error_fit import TURNS, next_model_error
 from vrdp_prob.inference.search.plan import IN_DOUBT, FitPlan
 from vrdp_prob.inference.several_videos.agreement import following_ones
 from vrdp_prob.inference.several_videos.ascent import WHOLE, Effort, ImpossibleStartError, NoCommonWorldError, climb
-from vrdp_prob.inference.several_videos.joining import joined
+from vrdp_prob.inference.several_videos.joining import CLIMBS, Climb, joined
 from vrdp_prob.inference.several_videos.joint_fit import JointFit, with_alternatives
 from vrdp_prob.inference.several_videos.linking import check_names, link
 from vrdp_prob.inference.several_videos.parts import carried_starts, fit_alone, link_fits
@@ -231,6 +231,7 @@ def fit_together(
     shared: Sequence[str] | None = None,
     seed: int = 0,
     model_error: bool = True,
+    plan: FitPlan | None = None,
     progress: ProgressDisplay | None = None,
 ) -> SharedFit:
     """Find the most probable values of several videos at once.
@@ -248,6 +249,9 @@ def fit_together(
         Seed of the searches; a video is searched alike whatever the others are.
     model_error
         Whether what the model leaves unexplained in a video is looked for, and widens its part of the density.
+    plan
+        Stages in which each video is fitted by itself, and the optimiser that climbs for each and for all together;
+        the default ones where None.
     progress
         Told how many videos are done.
 
@@ -261,12 +265,13 @@ def fit_together(
     check_videos(videos)
     if shared is not None:
         check_names(shared, model)
-    plan = FitPlan() if model_error else IN_DOUBT
+    if plan is None:
+        plan = FitPlan() if model_error else IN_DOUBT
     with (progress or SilentProgress()).stage("Fitting each video (MAP)", total=len(videos)) as advance:
         fitted = partial(fit_alone, model=model, seed=seed, plan=plan, model_error=model_error)
         alone = in_processes(fitted, videos, advance=advance)
         try:
-            fits, joint = joined(alone, model, shared, seed=seed)
+            fits, joint = joined(alone, model, shared, seed=seed, optimiser=plan.optimiser)
         except ImpossibleStartError as error:
             raise NoCommonWorldError(
                 f"the videos have no common world: {str(error) or 'one of them'} cannot be simulated with what all say "
@@ -274,7 +279,8 @@ def fit_together(
             ) from error
     structures = tuple(structure_of(one.likelihood.coordinates) for one in fits)
     names = None if shared is None else tuple(shared)
-    found = _finished(joint, model, fits, structures, names, model_error=model_error)
+    climbing = CLIMBS[plan.optimiser]
+    found = _finished(joint, model, fits, structures, names, model_error=model_error, climbing=climbing)
     return replace(found, joint=_with_modes(found.joint, fits))
 
 
@@ -311,6 +317,7 @@ def _finished(
     shared: tuple[str, ...] | None,
     *,
     model_error: bool,
+    climbing: Climb = climb,
 ) -> SharedFit:
     """The joint fit with what the model leaves unexplained, and each video's part of it."""
     misfits = [
@@ -337,7 +344,7 @@ def _finished(
             coordinates = unknowns(tracks, model, structure, model_error=error)
             likelihoods.append(Likelihood(tracks, model, coordinates, model_error=error))
             misfits[index] = misfits[index].with_error(error, reference)
-        joint = _again(joint, likelihoods, shared)
+        joint = _again(joint, likelihoods, shared, climbing)
     parts = tuple(
         replace(
             fit,
@@ -351,7 +358,9 @@ def _finished(
     return SharedFit(model, joint, parts, structures, shared)
 
 
-def _again(joint: JointFit, likelihoods: Sequence[Likelihood], shared: tuple[str, ...] | None) -> JointFit:
+def _again(
+    joint: JointFit, likelihoods: Sequence[Likelihood], shared: tuple[str, ...] | None, climbing: Climb
+) -> JointFit:
     """Climb with other densities from where a fit is."""
     numbers, videos = link(likelihoods, shared)
     known = dict(zip(joint.numbers.keys, joint.gaussian.mean, strict=True))
@@ -360,7 +369,7 @@ def _again(joint: JointFit, likelihoods: Sequence[Likelihood], shared: tuple[str
         video.split(old.likelihood.coordinates.carried(joint.point(index), video.likelihood.coordinates))[1]
         for index, (old, video) in enumerate(zip(joint.videos, videos, strict=True))
     ]
-    return climb(numbers, videos, start, locals_)
+    return climbing(numbers, videos, start, locals_)
 
 
 def _mode(joint: JointFit, index: int) -> Mode:

@@ -1,6 +1,6 @@
 """From each video's own fit to a joint one: second looks, what all agree on, and the climb from there."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 
@@ -11,10 +11,11 @@ from vrdp_prob.inference.map_fit import MapFit
 from vrdp_prob.inference.runs.journal import kept
 from vrdp_prob.inference.runs.parallel import in_processes
 from vrdp_prob.inference.search.misfit import judge
-from vrdp_prob.inference.search.plan import TURNING
+from vrdp_prob.inference.search.plan import TURNING, Optimiser
 from vrdp_prob.inference.search.yaw_search import tells_yaws_by_contacts
 from vrdp_prob.inference.several_videos.agreement import first_guess
 from vrdp_prob.inference.several_videos.ascent import ImpossibleStartError, climb
+from vrdp_prob.inference.several_videos.gradient_ascent import climb_by_gradient
 from vrdp_prob.inference.several_videos.joint_fit import JointFit
 from vrdp_prob.inference.several_videos.linking import LinkedVideo, SharedNumbers
 from vrdp_prob.inference.several_videos.parts import carried_starts, fit_alone, link_fits
@@ -29,10 +30,23 @@ from vrdp_prob.inference.several_videos.second_look import (
 )
 from vrdp_prob.models.physics import PhysicsModel
 
+Climb = Callable[
+    [SharedNumbers, Sequence[LinkedVideo], Float[np.ndarray, "shared"], Sequence[Float[np.ndarray, "_"]]], JointFit
+]
+"""A way up the joint log posterior from some start."""
+
+CLIMBS: Mapping[Optimiser, Climb] = {Optimiser.GAUSS_NEWTON: climb, Optimiser.LBFGS: climb_by_gradient}
+"""How the joint log posterior is climbed by each optimiser."""
+
 
 @kept
 def joined(
-    alone: Sequence[MapFit], model: PhysicsModel, shared: Sequence[str] | None, *, seed: int
+    alone: Sequence[MapFit],
+    model: PhysicsModel,
+    shared: Sequence[str] | None,
+    *,
+    seed: int,
+    optimiser: Optimiser = Optimiser.GAUSS_NEWTON,
 ) -> tuple[list[MapFit], JointFit]:
     """The videos' own fits, some of them searched anew, and the joint fit from what they agree on.
 
@@ -46,14 +60,17 @@ def joined(
         The videos' own fits.
     model, shared, seed
         See `fit_together`.
+    optimiser
+        What refines starts, of each video and of all together.
     """
-    found = [_joined(alone, model, shared, seed=seed, islands=False)]
+    join = partial(_joined, model=model, shared=shared, seed=seed, optimiser=optimiser)
+    found = [join(alone, islands=False)]
     if not _strays(*found[0]) or not any(_has_unseen_yaws(fit) for fit in alone):
         return found[0]
-    turned = _turned(alone, model, seed=seed) if explained(alone) else alone
-    found += [_joined(turned, model, shared, seed=seed, islands=False)] if turned is not alone else []
+    turned = _turned(alone, model, seed=seed, optimiser=optimiser) if explained(alone) else alone
+    found += [join(turned, islands=False)] if turned is not alone else []
     if _strays(*found[-1]):
-        found.append(_joined(turned, model, shared, seed=seed, islands=True))
+        found.append(join(turned, islands=True))
     return max(found, key=lambda one: one[1].log_density)
 
 
@@ -69,10 +86,10 @@ def _has_unseen_yaws(fit: MapFit) -> bool:
     return tells_yaws_by_contacts(fit.likelihood, fit.point)
 
 
-def _turned(alone: Sequence[MapFit], model: PhysicsModel, *, seed: int) -> list[MapFit]:
+def _turned(alone: Sequence[MapFit], model: PhysicsModel, *, seed: int, optimiser: Optimiser) -> list[MapFit]:
     """The videos' own fits, with cubes whose yaw nobody measured turned where that explains a video better."""
     chosen = [index for index, fit in enumerate(alone) if _has_unseen_yaws(fit)]
-    turn = partial(fit_alone, model=model, seed=seed, plan=TURNING)
+    turn = partial(fit_alone, model=model, seed=seed, plan=replace(TURNING, optimiser=optimiser))
     again = in_processes(turn, [alone[index].clues.tracks for index in chosen])
     better = {
         index: fit for index, fit in zip(chosen, again, strict=True) if fit.log_density > alone[index].log_density
@@ -81,18 +98,26 @@ def _turned(alone: Sequence[MapFit], model: PhysicsModel, *, seed: int) -> list[
 
 
 def _joined(
-    alone: Sequence[MapFit], model: PhysicsModel, shared: Sequence[str] | None, *, seed: int, islands: bool
+    alone: Sequence[MapFit],
+    *,
+    model: PhysicsModel,
+    shared: Sequence[str] | None,
+    seed: int,
+    optimiser: Optimiser,
+    islands: bool,
 ) -> tuple[list[MapFit], JointFit]:
-    fits = look_again(alone, doubtful(alone), model, shared, seed=seed, islands=islands)
+    look = partial(look_again, model=model, shared=shared, seed=seed, islands=islands, optimiser=optimiser)
+    fits = look(alone, doubtful(alone))
     numbers, linked, guess = _guessed(fits, model, shared, islands=islands)
     seen = [_with_misfit(fit, video, guess[0], own) for fit, video, own in zip(fits, linked, guess[1], strict=True)]
     lost = [k for k, fit in enumerate(fits) if seen[k].misfit.residual_sd > WORSE * fit.misfit.residual_sd]
-    found_again = look_again(seen, doubtful(seen, lost), model, shared, seed=seed, islands=islands)
+    found_again = look(seen, doubtful(seen, lost))
     if any(one is not other for one, other in zip(found_again, seen, strict=True)):
         pairs = zip(found_again, seen, fits, strict=True)
         fits = [fit if one is other else one for one, other, fit in pairs]
         numbers, linked, guess = _guessed(fits, model, shared, islands=islands)
-    return fits, _asking_dissenters(climb(numbers, linked, *guess), fits)
+    climbed = CLIMBS[optimiser](numbers, linked, *guess)
+    return fits, _asking_dissenters(climbed, fits, CLIMBS[optimiser])
 
 
 def _worsened(fits: Sequence[MapFit], joint: JointFit) -> Float[np.ndarray, "video"]:
@@ -119,7 +144,7 @@ def _with_misfit(
     return replace(fit, misfit=judge(video.likelihood, point, fit.clues))
 
 
-def _asking_dissenters(joint: JointFit, fits: Sequence[MapFit]) -> JointFit:
+def _asking_dissenters(joint: JointFit, fits: Sequence[MapFit], climbing: Climb) -> JointFit:
     """The joint fit, or a better one from what the video says alone that is explained far worse among the others.
 
     Several videos that are explained in the same wrong way outvote the one in which that shows.
@@ -133,7 +158,7 @@ def _asking_dissenters(joint: JointFit, fits: Sequence[MapFit]) -> JointFit:
     starts = carried_starts(fits, joint.videos)
     asked = [index == dissenter for index in range(len(fits))]
     try:
-        other = climb(joint.numbers, joint.videos, *first_guess(joint.numbers, joint.videos, starts, asked))
+        other = climbing(joint.numbers, joint.videos, *first_guess(joint.numbers, joint.videos, starts, asked))
     except ImpossibleStartError:  # a video has no world at what the dissenter says
         return joint
     return max(joint, other, key=lambda one: one.log_density)

@@ -18,6 +18,7 @@ from vrdp_prob.inference.several_videos.arrow import (
     LOG_TWO_PI,
     ArrowGaussian,
     Expansion,
+    Expansions,
     LocalGaussian,
     SharedExpansion,
 )
@@ -163,6 +164,17 @@ def expand_prior(numbers: SharedNumbers, shared: Float[np.ndarray, "shared"]) ->
         return SharedExpansion(np.zeros(0), np.zeros((0, 0)))
     residuals, derivative = jacobian(numbers.prior_residuals, shared, numbers.scale, central=True)
     return SharedExpansion(derivative.T @ residuals, derivative)
+
+
+def expand_all(
+    numbers: SharedNumbers,
+    videos: Sequence[LinkedVideo],
+    shared: Float[np.ndarray, "shared"],
+    locals_: Sequence[Float[np.ndarray, "_"]],
+) -> Expansions:
+    """Expand the negative log density of all videos, and the prior of what they share."""
+    found = in_parallel(lambda index: expand(videos[index], shared, locals_[index], central=True), range(len(videos)))
+    return Expansions(expand_prior(numbers, shared), tuple(found))
 
 
 def settle(

@@ -12,7 +12,7 @@ from jaxtyping import Bool
 
 from vrdp_prob.inference.map_fit import MapFit, fit_map
 from vrdp_prob.inference.runs.parallel import in_processes
-from vrdp_prob.inference.search.plan import IN_DOUBT, TURNING, TURNING_ON, FitPlan
+from vrdp_prob.inference.search.plan import IN_DOUBT, TURNING, TURNING_ON, FitPlan, Optimiser
 from vrdp_prob.inference.several_videos.agreement import consensus
 from vrdp_prob.inference.several_videos.parts import carried_starts, link_fits, plain_likelihood, stream
 from vrdp_prob.models.parameters import Prior, Scope
@@ -88,6 +88,7 @@ def look_again(
     islands: bool = False,
     asked: Collection[int] | None = None,
     thorough: bool = False,
+    optimiser: Optimiser = Optimiser.GAUSS_NEWTON,
 ) -> list[MapFit]:
     """The fits of single videos, with some of them searched anew, and improved where that is better.
 
@@ -111,6 +112,8 @@ def look_again(
         Videos that say something of the shared parameters, as far as they are trusted; all where None.
     thorough
         Whether the looks go on where a fit is as good as those of other videos.
+    optimiser
+        What refines starts.
     """
     if not chosen:
         return list(fits)
@@ -118,6 +121,7 @@ def look_again(
     goal = 0.0 if thorough else WORSE * float(np.median([one.misfit.residual_sd for one in fits]))
     turning = TURNING_ON if thorough else TURNING
     ways = [(look % 2 == 0, IN_DOUBT) for look in range(looks)] + ([(True, turning)] if explained(fits) else [])
+    ways = [(believing, replace(plan, optimiser=optimiser)) for believing, plan in ways]
     among = range(len(fits)) if asked is None else asked
     look = _Look(model, _told(fits, model, shared, among, islands=islands), goal, seed, tuple(ways))
     doubted = [(fits[index], bool(excess[index] >= FAR_WORSE)) for index in chosen]

@@ -13,7 +13,7 @@ from vrdp_prob.inference.assembly import posterior_from
 from vrdp_prob.inference.draws.diagnostics import Reported, Statistics
 from vrdp_prob.inference.draws.samples import ESS_GOAL, PARETO_K_GOAL, Convergence, ModeWeight, Samples, assess
 from vrdp_prob.inference.emcee_sampler import sample_emcee
-from vrdp_prob.inference.infer import check_counts, check_model, default_model
+from vrdp_prob.inference.infer import check_counts, check_model, check_plan, default_model
 from vrdp_prob.inference.map_fit import MapFit
 from vrdp_prob.inference.nuts_sampler import sample_nuts
 from vrdp_prob.inference.posterior import Posterior
@@ -23,6 +23,7 @@ from vrdp_prob.inference.runs.parallel import linear_algebra_in_one_thread
 from vrdp_prob.inference.samplers.mode_weights import UNSURE, doubts
 from vrdp_prob.inference.samplers.proposals import proposals
 from vrdp_prob.inference.samplers.rate_steps import RateSteps
+from vrdp_prob.inference.search.plan import FitPlan
 from vrdp_prob.inference.search.yaw_search import unseen_yaws
 from vrdp_prob.inference.several_videos.fitting import SharedFit, check_videos, fit_together
 from vrdp_prob.inference.several_videos.gibbs import sample_gibbs
@@ -61,6 +62,7 @@ def infer_together(
     draws: int = 1000,
     model_error: bool = True,
     hand_on: bool = True,
+    plan: FitPlan | None = None,
     checkpoint: Path | str | None = None,
     progress: ProgressDisplay | None = None,
 ) -> SharedPosterior:
@@ -86,6 +88,8 @@ def infer_together(
         Whether what the model leaves unexplained in a video is looked for, and widens its part of the density.
     hand_on
         Whether `gibbs` goes on where `laplace` finds that it cannot be trusted.
+    plan
+        Stages and optimiser of the fit (see `fit_together`); the default ones where None.
     checkpoint
         Folder that keeps what was done: the fits of the single videos, and what the sampler has drawn. A run that was
         killed and is started again with the same arguments goes on from there and ends with the same numbers. Its files
@@ -97,22 +101,31 @@ def infer_together(
     ------
     InputError
         If there is no video, two have one name, a name is none that videos can share, a video shows no motion, the
-        model is none, the sampler is unknown, fewer than 4 draws are asked for, the seed is negative, the videos
-        have no common world, or the checkpoint belongs to another run.
+        model or the plan is none, the sampler is unknown, fewer than 4 draws are asked for, the seed is negative, the
+        videos have no common world, or the checkpoint belongs to another run.
     """
     _check(sampler, draws, seed)
     check_model(model)
+    check_plan(plan)
     check_videos(videos)
     physics = default_model() if model is None else model
     own = None
     if checkpoint is not None:
         names = None if shared is None else tuple(shared)
-        settings = {"shared": names, "sampler": sampler, "seed": seed, "draws": draws}
+        settings: dict[str, object] = {"shared": names, "sampler": sampler, "seed": seed, "draws": draws, "plan": plan}
         settings |= {"model_error": model_error, "hand_on": hand_on}
         own = Checkpoint(checkpoint, {**videos_facts(videos), **model_facts(physics), **program_facts(**settings)})
         own.claim()
     with journal(own):
-        fit = fit_together(videos, model=physics, shared=shared, seed=seed, model_error=model_error, progress=progress)
+        fit = fit_together(
+            videos,
+            model=physics,
+            shared=shared,
+            seed=seed,
+            model_error=model_error,
+            plan=plan,
+            progress=progress,
+        )
     return _sampled(fit, sampler, seed=seed, draws=draws, hand_on=hand_on, checkpoint=own, progress=progress)
 
 

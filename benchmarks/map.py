@@ -1,25 +1,25 @@
 """How often the search for the most probable values finds them, on random synthetic videos with known truth.
 
-    python benchmarks/map.py [--json FILE] [--scenes 300] [--plan default|lbfgs|...] [--docs DIR]
+    python benchmarks/map.py [--json FILE] [--scenes 300] [--plan default|lbfgs|...] [--docs docs]
 
 The videos come from an integrator of the tests' own (`tests/inference/random_scenes.py`). A fit succeeds if its log
 posterior is at least that of the true values minus 0.5 nats, both under one likelihood that holds all unknowns, and no
 model error whatever the fit found (`tests/inference/map_comparison.py`); fits with one are counted. Times are those of
-the processor, on one core.
+the processor, on one core. Results are written to `--results` as they come, so that a run that was interrupted goes on;
+`--docs` writes the tables into `map.md` there.
 """
 
-import argparse
-import json
 import sys
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass
-from functools import partial
+from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import _project  # noqa: F401  the generator belongs to the tests, which lie beside the package
 import numpy as np
 import torch
+from _page import page_parser, publish, table_row
+from _resumable import Result, measured
 
 from tests.inference.map_comparison import compare
 from tests.inference.random_scenes import random_truth
@@ -33,7 +33,7 @@ from vrdp_prob.inference import (
     default_model,
     fit_map,
 )
-from vrdp_prob.workers import local_workers
+from vrdp_prob.models.simulator.rollout import compile_model
 
 PLANS = {
     "default": FitPlan(),
@@ -44,12 +44,27 @@ PLANS = {
     "growing": GROWING,
 }
 GOAL_RATE, GOAL_SECONDS = 0.99, 2.0
+RESULTS = Path("out") / "map.jsonl"
+
+
+@dataclass(frozen=True)
+class Video:
+    """A video that is fitted in some way."""
+
+    seed: int
+    plan: str
+
+    @property
+    def key(self) -> str:
+        """What tells its result apart."""
+        return f"{self.plan} {self.seed}"
 
 
 @dataclass(frozen=True)
 class Outcome:
     """How one video went."""
 
+    key: str
     seed: int
     succeeded: bool
     seconds: float
@@ -60,69 +75,60 @@ class Outcome:
     modes: int
     strata: tuple[str, ...]
     cause: str
-
-    @property
-    def line(self) -> str:
-        """The outcome in one line."""
-        verdict = "ok" if self.succeeded else f"failed: {self.cause}"
-        ended = ("" if self.converged else ", not converged") + ("" if self.agreed else ", searches did not agree")
-        return (
-            f"seed {self.seed:3d}  {self.seconds:5.1f} s  {self.gain:7.1f} nats  {self.modes} modes  {verdict}{ended}"
-        )
+    version: str = ""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--json", type=Path, help="file for the checks")
+    parser = page_parser(__doc__, RESULTS, document="checks")
     parser.add_argument("--scenes", type=int, default=300, help="how many videos")
     parser.add_argument("--first", type=int, default=0, help="seed of the first video")
     parser.add_argument("--plan", choices=PLANS, default="default")
-    parser.add_argument("--processes", type=int, default=1)
-    parser.add_argument("--docs", type=Path, help="folder for map-table.md, the tables as a page holds them")
     options = parser.parse_args(arguments)
-    seeds = range(options.first, options.first + options.scenes)
-    work = partial(outcome, plan=PLANS[options.plan])
-    outcomes = []
-    with local_workers(options.processes, tasks=len(seeds)) as workers:
-        for one in workers.map(work, seeds):
-            outcomes.append(one)
-            print(one.line, flush=True)
-    text = table(outcomes)
-    print(text)
-    if options.docs is not None:
-        (options.docs / "map-table.md").write_text(text, encoding="utf-8")
-    if options.json is not None:
-        document = {"checks": checks(outcomes), "failed": [one.seed for one in outcomes if not one.succeeded]}
-        options.json.write_text(json.dumps(document, indent=1) + "\n", encoding="utf-8")
+    videos = [Video(seed, options.plan) for seed in range(options.first, options.first + options.scenes)]
+    compile_model(default_model())
+    results = measured(
+        outcome,
+        {one.key: one for one in videos},
+        options.results,
+        field="key",
+        label="Videos",
+        processes=options.processes,
+    )
+    outcomes = [Outcome(**one) for one in results]
+    document = {"checks": checks(outcomes), "failed": [one.seed for one in outcomes if not one.succeeded]}
+    publish(table(outcomes), "map.md", document, options)
     return 0
 
 
-def outcome(seed: int, plan: FitPlan) -> Outcome:
-    """Fit the video of a seed and compare it with the truth."""
+def outcome(video: Video) -> Result:
+    """Fit a video and compare it with the truth."""
     torch.set_num_threads(1)
-    truth = random_truth(seed)
+    truth = random_truth(video.seed)
     begin = time.process_time()
-    fit = fit_map(truth.tracks, default_model(), np.random.default_rng(0), plan=plan)
+    fit = fit_map(truth.tracks, default_model(), np.random.default_rng(0), plan=PLANS[video.plan])
     seconds = time.process_time() - begin
     comparison = compare(truth, fit)
-    return Outcome(
-        seed,
-        comparison.succeeded,
-        seconds,
-        comparison.fitted - comparison.true,
-        fit.converged,
-        fit.search.agreed,
-        fit.likelihood.model_error is not None,
-        len(fit.modes),
-        tuple(sorted(truth.strata)),
-        "" if comparison.succeeded else comparison.cause,
+    return asdict(
+        Outcome(
+            video.key,
+            video.seed,
+            bool(comparison.succeeded),
+            seconds,
+            float(comparison.fitted - comparison.true),
+            bool(fit.converged),
+            bool(fit.search.agreed),
+            fit.likelihood.model_error is not None,
+            len(fit.modes),
+            tuple(sorted(truth.strata)),
+            "" if comparison.succeeded else comparison.cause,
+        )
     )
 
 
 def table(outcomes: Sequence[Outcome]) -> str:
     """Rates by kind of scene as a markdown table, and the failures."""
     strata = sorted({name for one in outcomes for name in one.strata})
-    rows = ["| videos | number | found | seconds, median | mean |", "|---|---|---|---|---|"]
+    rows = [table_row("videos", "number", "found", "seconds, median", "mean"), "|---|---|---|---|---|"]
     kinds = [("all", outcomes), *((name, [one for one in outcomes if name in one.strata]) for name in strata)]
     kinds += [
         ("none of these", [one for one in outcomes if not one.strata]),
@@ -134,16 +140,18 @@ def table(outcomes: Sequence[Outcome]) -> str:
         if chosen:
             found = sum(one.succeeded for one in chosen)
             times = [one.seconds for one in chosen]
-            rows.append(
-                f"| {name} | {len(chosen)} | {found} ({found / len(chosen):.1%}) | {np.median(times):.1f} | "
-                f"{np.mean(times):.1f} |"
-            )
+            share = f"{found} ({found / len(chosen):.1%})"
+            rows.append(table_row(name, str(len(chosen)), share, f"{np.median(times):.1f}", f"{np.mean(times):.1f}"))
     failures = [
-        f"- seed {one.seed} ({', '.join(one.strata) or 'plain'}): {one.gain:.1f} nats; {one.cause}"
+        table_row(f"seed {one.seed} ({', '.join(one.strata) or 'none of these'})", f"{-one.gain:.1f}", one.cause)
         for one in outcomes
         if not one.succeeded
     ]
-    return "\n".join([*rows, "", *(failures or ["No failure."])]) + "\n"
+    missed = (
+        [table_row("missed", "by (nats)", "what is wrong"), "|---|---|---|", *failures] if failures else ["No miss."]
+    )
+    commits = ", ".join(sorted({one.version for one in outcomes}))
+    return "\n".join([*rows, "", *missed, "", f"Of commit {commits}."])
 
 
 def checks(outcomes: Sequence[Outcome]) -> list[dict[str, object]]:

@@ -214,7 +214,8 @@ def ask_question(
         print(json.dumps({**answer.to_document(), **limits, **told}, allow_nan=False))
     else:
         reasons = explanation.sentences if explanation is not None else ()
-        lines = answer_lines(answer, tracks.bodies, posterior.warnings)
+        misfit = () if posterior.misfit is None else posterior.misfit.sentences
+        lines = answer_lines(answer, tracks.bodies, posterior.warnings, misfit=misfit)
         print("\n".join([*lines, *(with_names(reason, tracks.bodies) for reason in reasons)]))
 
 

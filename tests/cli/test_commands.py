@@ -106,11 +106,15 @@ def test_an_answer_is_printed_with_its_error(
     given: Answer,
     lines: list[str],
 ) -> None:
-    posterior = SimpleNamespace(warnings=("The draws have not converged.",))
+    misfit = "The model does not fit."
+    posterior = SimpleNamespace(
+        warnings=(misfit, "The draws have not converged."), misfit=SimpleNamespace(sentences=(misfit,))
+    )
     monkeypatch.setattr(cli, "infer", lambda *_arguments, **_options: posterior)
     monkeypatch.setattr(cli, "ask", lambda *_arguments, **_options: given)
     assert cli.run(["ask", str(folder), given.question]) == 0
-    assert capsys.readouterr().out.splitlines() == [*lines, "note: The draws have not converged."]
+    printed = capsys.readouterr().out.splitlines()
+    assert printed == [f"note: {misfit}", *lines, "note: The draws have not converged."]
 
 
 def test_the_same_seed_gives_the_same_answer(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:

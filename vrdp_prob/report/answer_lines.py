@@ -8,8 +8,10 @@ from vrdp_prob.report.wording import listed, percent, percent_error, rests_on, w
 from vrdp_prob.scene import Body
 
 
-def answer_lines(answer: Answer, bodies: Sequence[Body], limits: Sequence[str] = ()) -> list[str]:
-    """One line for each choice or value, then what limits the answer and the draws that it comes from.
+def answer_lines(
+    answer: Answer, bodies: Sequence[Body], limits: Sequence[str] = (), *, misfit: Sequence[str] = ()
+) -> list[str]:
+    """A misfit of the model, a line for each choice or value, then what limits the answer and its draws.
 
     Parameters
     ----------
@@ -19,6 +21,8 @@ def answer_lines(answer: Answer, bodies: Sequence[Body], limits: Sequence[str] =
         The objects, by whose names sentences call them.
     limits
         What limits the draws.
+    misfit
+        Those of them that tell how the model does not fit; they come before any number.
     """
     if answer.choices:
         shares = [(choice.probability, choice.mc_error, choice.choice) for choice in answer.choices]
@@ -26,11 +30,15 @@ def answer_lines(answer: Answer, bodies: Sequence[Body], limits: Sequence[str] =
         ordered = sorted(answer.distribution.items(), key=lambda item: -item[1])
         shares = [(share, _error_of(share, answer), value) for value, share in ordered]
     lines = [f"{percent(share, error):>6} {percent_error(share, error):<7} {text}" for share, error, text in shares]
-    notes = [*answer.notes, *limits]
+    notes = [*answer.notes, *(limit for limit in limits if limit not in misfit)]
     if answer.relies_on_default:
         who = f"object{'s' * (len(answer.relies_on_default) > 1)} {listed(answer.relies_on_default)}"
         notes.insert(0, rests_on(who))
-    return lines + [f"note: {with_names(note, bodies)}" for note in notes]
+
+    def told(sentences: Sequence[str]) -> list[str]:
+        return [f"note: {with_names(sentence, bodies)}" for sentence in sentences]
+
+    return [*told(misfit), *lines, *told(notes)]
 
 
 def _error_of(share: float, answer: Answer) -> float:

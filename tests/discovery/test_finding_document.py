@@ -46,6 +46,16 @@ def test_a_cause_with_its_gain():
     assert sum(gain["elpd_difference_by_video"].values()) == pytest.approx(231.4)
 
 
+def test_the_gain_of_the_whole_model():
+    gain = to_document(named())["gain"]
+    assert gain["elpd_difference"] == 318.6
+    assert set(gain["error_ratios"]) == {"rmse", "rmse_one_second", "rmse_end"}
+    ratio = gain["error_ratios"]["rmse"]
+    assert ratio["q025"] < ratio["ratio"] < ratio["q975"] < 0.5
+    assert len(gain["after"]["by_video"]) == len(VIDEOS)
+    assert to_document(nothing())["gain"] is None
+
+
 def test_evidence_bounds_and_notes():
     found = to_document(named())
     assert [entry["significant"] for entry in found["evidence"]] == [False, True, True, False, False, False]
@@ -114,6 +124,7 @@ def test_what_is_not_finite_is_null_or_where_a_number_is_required_the_largest_on
         "coverage_50": None,
         "coverage_90": 0.0,
         "pit": [],
+        "by_video": [],
     }
     assert set(gain["elpd_difference_by_video"].values()) == {None}
     assert found["evidence"][0]["p_value"] is None

@@ -1,16 +1,17 @@
 """What leaving a video out says, how models are weighed by it, and how far off forecasts are."""
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import astuple, replace
 
 import numpy as np
 import pytest
 
 from tests.discovery.fitted import fitted
 from vrdp_prob.discovery.candidates.scores import score_causes
+from vrdp_prob.discovery.finding import HeldOut, VideoErrors
 from vrdp_prob.discovery.residuals.held_out import all_but_each, cavities, left_out
 from vrdp_prob.discovery.residuals.residual_model import ResidualModel
-from vrdp_prob.discovery.selection.forecast import SEEN_SHARE, _forecast, held_out
+from vrdp_prob.discovery.selection.forecast import SEEN_SHARE, _forecast, error_ratios, held_out
 from vrdp_prob.discovery.selection.trials import Trial, gain, gains, weights
 from vrdp_prob.inference.map_fit import MapFit
 from vrdp_prob.inference.several_videos import fitting
@@ -91,6 +92,20 @@ def test_forecasts_of_a_null_are_as_far_off_as_they_say() -> None:
     assert sum(found.pit) == pytest.approx(1.0)
     assert len(found.pit) == 10
     assert found.pit[0] + found.pit[-1] < 0.5
+
+
+def test_errors_are_compared_video_by_video() -> None:
+    def predicted(*errors: float | None) -> HeldOut:
+        return HeldOut(1.0, None, None, 0.5, 0.9, (), tuple(VideoErrors(one, None, one) for one in errors))
+
+    halved = error_ratios(predicted(0.1, 4.0, 0.01, None), predicted(0.05, 2.0, 0.005, None))
+    assert set(halved) == {"rmse", "rmse_end"}
+    assert astuple(halved["rmse"]) == pytest.approx((0.5, 0.5, 0.5))
+    mixed = error_ratios(predicted(1, 1, 1, 1, 1), predicted(0.1, 0.4, 0.5, 0.6, 2.0))["rmse"]
+    assert mixed.ratio == pytest.approx(0.5)
+    assert 0.1 <= mixed.q025 < 0.45
+    assert 0.55 < mixed.q975 <= 2.0
+    assert not error_ratios(predicted(1, 1, None), predicted(0.5, 0.5, 0.5))
 
 
 @pytest.mark.slow

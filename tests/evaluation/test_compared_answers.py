@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tests.discovery.findings import named, nothing
-from vrdp_prob.evaluation.compared_answers import compared, with_answers
+from vrdp_prob.evaluation.compared_answers import NOT_ASKED, compared, with_answers
 from vrdp_prob.inference import default_model
 from vrdp_prob.models.effects.surface_tilt import SurfaceTilt
 from vrdp_prob.reasoning import Answer, ChoiceAnswer
@@ -84,4 +84,6 @@ def test_both_models_are_asked_about_the_videos_with_questions() -> None:
 
 def test_nothing_is_asked_where_nothing_is_named() -> None:
     finding = nothing()
-    assert with_answers(finding, [sliding("a")], {"a": [OPEN]}) is finding
+    told = with_answers(finding, [sliding("a")], {"a": [OPEN]})
+    assert told == replace(finding, notes=(*finding.notes, NOT_ASKED))
+    assert with_answers(finding, [sliding("a")], {"a": []}) is finding

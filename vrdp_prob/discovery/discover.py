@@ -112,6 +112,7 @@ def discover(
         fit=found.best.fit,
         left_out=models_of_the_others(found.base, found.best, found.overdispersion),
         tried=tuple(tried),
+        gain=outcome.gain,
     )
 
 

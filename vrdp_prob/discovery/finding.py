@@ -41,6 +41,21 @@ class Estimate:
 
 
 @dataclass(frozen=True)
+class VideoErrors:
+    """Root mean square error (m, per axis) of what is predicted of one video; None where nothing is.
+
+    Parameters
+    ----------
+    rmse, rmse_one_second, rmse_end
+        Over all frames that are predicted, one second after the first of them, and in the last ones.
+    """
+
+    rmse: float | None
+    rmse_one_second: float | None
+    rmse_end: float | None
+
+
+@dataclass(frozen=True)
 class HeldOut:
     """How well a model predicts videos that it was not fitted to.
 
@@ -57,6 +72,8 @@ class HeldOut:
         Shares of the observations (per axis) in the tenths of their predictive distributions, the lowest first: the
         histogram of the probability integral transform, flat where the model is right; empty where nothing is
         predicted.
+    by_video
+        The errors of the single videos.
     """
 
     rmse: float
@@ -65,16 +82,34 @@ class HeldOut:
     coverage_50: float
     coverage_90: float
     pit: tuple[float, ...] = ()
+    by_video: tuple[VideoErrors, ...] = ()
+
+
+@dataclass(frozen=True)
+class ErrorRatio:
+    """An error with a cause as a share of that without it.
+
+    Parameters
+    ----------
+    ratio
+        Of the video in the middle, half of the others being better.
+    q025, q975
+        Ends of its 95 % interval over videos.
+    """
+
+    ratio: float
+    q025: float
+    q975: float
 
 
 @dataclass(frozen=True)
 class Gain:
-    """How much better the extended model predicts whole videos that it was not fitted to.
+    """How much better a model predicts whole videos that it was not fitted to, with a cause or with several.
 
     Parameters
     ----------
     before, after
-        Prediction without and with the cause.
+        Prediction without and with what it is the gain of.
     noise
         Standard deviation (m) of the measurement noise, below which no error can fall.
     elpd_difference, elpd_se
@@ -82,6 +117,9 @@ class Gain:
         videos.
     by_video
         The differences of the single videos.
+    error_ratios
+        By the name of an error (of `HeldOut`): what it is in units of that before; without those of which too few
+        videos tell.
     """
 
     before: HeldOut
@@ -90,6 +128,7 @@ class Gain:
     elpd_difference: float
     elpd_se: float
     by_video: Mapping[str, float]
+    error_ratios: Mapping[str, ErrorRatio] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -330,6 +369,9 @@ class Finding:
         `themed` uses the page's colours (`var(--ink)`, `var(--accent)`, ...); any other stands on white.
     tried
         Further causes that were tried on the extended model and not established.
+    gain
+        What all named causes together add to the prediction of held-out videos, over the model that was given; None
+        where nothing is named.
     answers
         Answers to questions about the videos under both models; None where nothing was asked or nothing is named.
     fit
@@ -354,6 +396,7 @@ class Finding:
     fit: SharedFit | None = None
     left_out: Mapping[str, tuple[PhysicsModel, PhysicsModel]] = field(default_factory=dict)
     tried: tuple[TriedCause, ...] = ()
+    gain: Gain | None = None
 
     @property
     def named(self) -> tuple[FoundCause, ...]:

@@ -9,6 +9,7 @@ from jaxtyping import Float
 from vrdp_prob.discovery.finding import Check, FoundCause, Gain, Verdict
 from vrdp_prob.discovery.selection.doubts import Doubt, doubts, with_doubts
 from vrdp_prob.discovery.selection.estimates import cause_sentence, estimates
+from vrdp_prob.discovery.selection.forecast import error_ratios
 from vrdp_prob.discovery.selection.mimics import Unlisted, laws_of, without_mimics
 from vrdp_prob.discovery.selection.search import Search, search
 from vrdp_prob.discovery.selection.trials import Trial, gain, gains, weights
@@ -41,6 +42,8 @@ class Outcome:
         What is said of the videos.
     causes
         Causes that are told of.
+    gain
+        Of the best model over the one that was given; None where it has no causes.
     reasons, unlisted
         Why causes are doubted, and what outside the catalogue explains others away.
     """
@@ -50,6 +53,7 @@ class Outcome:
     after: tuple[Check, ...]
     verdict: Verdict
     causes: tuple[FoundCause, ...]
+    gain: Gain | None
     reasons: tuple[Doubt, ...]
     unlisted: tuple[Unlisted, ...]
 
@@ -73,7 +77,8 @@ def outcome_of(fit: SharedFit, catalogue: Sequence[Effect], *, seed: int, progre
     causes = _in_order([*_causes(found, {}, seed), *not_named])
     if verdict is Verdict.UNKNOWN:
         causes = [replace(one, probability=(1 - MIMIC) * one.probability) for one in causes]
-    return Outcome(found, checks, after, verdict, tuple(causes), tuple(reasons), unlisted)
+    gained = _gain(found.base, found.best, found.overdispersion) if found.best.causes else None
+    return Outcome(found, checks, after, verdict, tuple(causes), gained, tuple(reasons), unlisted)
 
 
 def _checks_after(found: Search) -> tuple[Check, ...]:
@@ -193,4 +198,5 @@ def _gain(before: Trial, after: Trial, overdispersion: Float[np.ndarray, "video"
         elpd_difference=difference,
         elpd_se=error,
         by_video=dict(zip(videos, gains(after, before, overdispersion).tolist(), strict=True)),
+        error_ratios=error_ratios(before.held_out, after.held_out),
     )

@@ -16,6 +16,7 @@ from vrdp_prob.scene import Question, Tracks
 from vrdp_prob.scene.question import RIGHT
 
 DRAWS = 200
+NOT_ASKED = "The questions were not asked: no cause is named, so there is no second model whose answers could differ."
 
 
 def with_answers(
@@ -33,7 +34,7 @@ def with_answers(
     Each model answers from Laplace draws of each video alone, which are not handed on to emcee where they cannot be
     trusted; what the other videos say is its prior. What happened once in a video, as a kick, is in neither model. A
     question that one of them cannot answer is left out and told of. Where no cause is named there is one model only,
-    and nothing is asked.
+    nothing is asked, and a note says so.
 
     Parameters
     ----------
@@ -53,7 +54,7 @@ def with_answers(
         Who follows the work.
     """
     if not finding.named:
-        return finding
+        return replace(finding, notes=(*finding.notes, NOT_ASKED)) if any(questions.values()) else finding
     asked = [(tracks, tuple(questions[tracks.video])) for tracks in videos if questions.get(tracks.video)]
     compile_model(finding.extended)
     work = _Comparison(finding, tuple(words), seed)

@@ -43,6 +43,7 @@ def to_document(finding: Finding, *, model: Path | None = None) -> dict[str, Any
         "verdict": str(finding.verdict),
         "sentence": verdict_sentence(finding),
         "causes": [_cause(cause) for cause in finding.causes],
+        "gain": None if finding.gain is None else _gain(finding.gain),
         "tried": [_of_effect(one) for one in finding.tried],
         "evidence": _evidence(finding.checks),
         "evidence_after": _evidence(finding.checks_after),
@@ -119,6 +120,7 @@ def _gain(gain: Gain) -> dict[str, Any]:
         "noise_sd": gain.noise,
         "before": asdict(gain.before),
         "after": asdict(gain.after),
+        "error_ratios": {name: asdict(ratio) for name, ratio in gain.error_ratios.items()},
         "elpd_difference_by_video": dict(gain.by_video),
     }
 

@@ -10,9 +10,9 @@ from typing import Any
 from markupsafe import Markup
 
 from vrdp_prob.datasets.folder import some
-from vrdp_prob.discovery.finding import Check, Description, Finding, FoundCause, UpperBound, Verdict
+from vrdp_prob.discovery.finding import Check, Description, Finding, FoundCause, Gain, UpperBound, Verdict
 from vrdp_prob.discovery.page.changed_answers import rows
-from vrdp_prob.discovery.page.gain_figure import error_figure, video_figure
+from vrdp_prob.discovery.page.gain_figure import STRETCHES, error_figure, video_figure
 from vrdp_prob.discovery.page.summary import POSSIBLE, possible, summary, verdict_sentence
 from vrdp_prob.discovery.page.wording import (
     UNDEFINED,
@@ -25,7 +25,9 @@ from vrdp_prob.discovery.page.wording import (
     number,
     p_words,
     parameter_words,
+    ratio_words,
     title,
+    told_gains,
     tried_words,
     typeset,
     with_unit,
@@ -47,20 +49,22 @@ NOT_EXCLUDED = "The likeliest causes of the catalogue. None of them explains the
 
 def render(finding: Finding) -> str:
     """The page as HTML text; the same finding gives the same text."""
-    named = finding.named
+    named, gains = finding.named, told_gains(finding)
     values = {
         "css": asset("page.css"),
         "verdict": typeset(verdict_sentence(finding)),
         "summary": [typeset(one) for one in summary(finding)],
         "notes": [typeset(note) for note in finding.notes],
         "video_count": counted(len(finding.videos), "video"),
-        "errors": error_figure(named) if named else None,
+        "errors": error_figure(gains) if gains else None,
         "description": None if finding.description is None else _description(finding.description),
         "causes": [{**_cause(cause, finding), "videos": video_figure(cause.gain)} for cause in named],
         "answers": None if finding.answers is None else rows(finding.answers),
         **_others(finding),
         "tried": _tried(finding),
-        "coverage": _coverage(named),
+        "coverage": _coverage(gains),
+        "ratios": _ratios(gains),
+        "stretches": list(STRETCHES.values()),
         "even": EVEN_BAR,
         "even_tenths": [EVEN_BAR] * TENTHS,
         "checks": _checks(finding),
@@ -127,18 +131,33 @@ def _tried(finding: Finding) -> dict[str, Any] | None:
     }
 
 
-def _coverage(causes: Sequence[FoundCause]) -> list[dict[str, Any]]:
+def _ratios(gains: Sequence[tuple[str, Gain]]) -> list[dict[str, Any]]:
+    """Errors with each cause as shares of those without."""
+    return [
+        {
+            "words": f"with {words}",
+            "shares": [
+                UNDEFINED if (ratio := gain.error_ratios.get(name)) is None else ratio_words(ratio)
+                for name in STRETCHES
+            ],
+        }
+        for words, gain in gains
+        if gain.error_ratios
+    ]
+
+
+def _coverage(gains: Sequence[tuple[str, Gain]]) -> list[dict[str, Any]]:
     """Calibration of the predictions, without and with each cause."""
     return [
         {
-            "words": f"{word} {cause_title(cause)}",
+            "words": f"{word} {words}",
             "half": _percent(held.coverage_50),
             "most": _percent(held.coverage_90),
             "tenths": _bars(held.pit),
             "tenths_words": ", ".join(_percent(share) for share in held.pit),
         }
-        for cause in causes
-        for word, held in (("without", cause.gain.before), ("with", cause.gain.after))
+        for words, gain in gains
+        for word, held in (("without", gain.before), ("with", gain.after))
     ]
 
 

@@ -5,8 +5,8 @@ from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
-from vrdp_prob.discovery.finding import FoundCause, Gain
-from vrdp_prob.discovery.page.wording import cause_title, length_unit, number, signed
+from vrdp_prob.discovery.finding import Gain
+from vrdp_prob.discovery.page.wording import length_unit, number, signed
 from vrdp_prob.report.axes import Axis, linear_axis, size_axis
 
 STRETCHES = {"rmse": "all frames", "rmse_one_second": "1 s ahead", "rmse_end": "last frames"}
@@ -43,13 +43,13 @@ class Change:
 
 @dataclass(frozen=True)
 class ErrorFigure:
-    """Errors before and after, for every cause; `noise` is the place of the measurement noise, None where not known."""
+    """Errors before and after, of every gain; `noise` is the place of the measurement noise, None where not known."""
 
     axis: Axis
     unit: str
     noise: float | None
     noise_words: str
-    causes: list[tuple[str, list[Change]]]
+    gains: list[tuple[str, list[Change]]]
 
 
 @dataclass(frozen=True)
@@ -76,18 +76,18 @@ class VideoFigure:
     label: str
 
 
-def error_figure(causes: Sequence[FoundCause]) -> ErrorFigure:
-    """Held-out errors with and without each cause, on one axis."""
-    lengths = [length for cause in causes for length in (*_errors(cause.gain), cause.gain.noise) if _is_size(length)]
+def error_figure(gains: Sequence[tuple[str, Gain]]) -> ErrorFigure:
+    """Held-out errors with and without what some gains are of, on one axis."""
+    lengths = [length for _, gain in gains for length in (*_errors(gain), gain.noise) if _is_size(length)]
     factor, unit = length_unit(lengths)
     axis = size_axis(factor * length for length in lengths)
-    noise = causes[-1].gain.noise
+    noise = gains[-1][1].noise
     return ErrorFigure(
         axis,
         unit,
         axis.place(factor * noise) if _is_size(noise) and noise > 0 else None,
         f"{number(factor * noise)} {unit}",
-        [(cause_title(cause), _changes(cause.gain, axis, factor)) for cause in causes],
+        [(words, _changes(gain, axis, factor)) for words, gain in gains],
     )
 
 

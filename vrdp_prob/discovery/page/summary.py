@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from vrdp_prob.discovery.finding import Check, Finding, FoundCause, Gain, TriedCause, UpperBound, Verdict
 from vrdp_prob.discovery.page.changed_answers import answers_sentence
 from vrdp_prob.discovery.page.wording import (
+    TOGETHER,
     bound_words,
     cause_title,
     chance,
@@ -13,7 +14,9 @@ from vrdp_prob.discovery.page.wording import (
     estimate_words,
     length_unit,
     number,
+    ratio_words,
     title,
+    told_gains,
     tried_words,
     with_unit,
 )
@@ -42,7 +45,7 @@ def verdict_sentence(finding: Finding) -> str:
 
 def summary(finding: Finding) -> list[str]:
     """What the verdict rests on and is worth, in sentences."""
-    told = [_gains(finding.named)] if finding.named else []
+    told = [_gains(told_gains(finding))] if finding.named else []
     if others := possible(finding):
         told.append(_others(others, beside=finding.named))
     if finding.verdict is Verdict.UNKNOWN and finding.tried:
@@ -73,6 +76,7 @@ def lines(finding: Finding) -> list[str]:
         for name, estimate in cause.parameters.items():
             mean, interval = estimate_words(estimate)
             told.append(f"      {title(name)} {mean} (95 %: {interval})")
+    told += [f"  {words}: {_gain_line(gain)}" for words, gain in told_gains(finding) if words == TOGETHER]
     if finding.description is not None:
         told += [f"  {line}" for line in finding.description.sentences]
     if finding.description is not None and finding.description.has_formula:
@@ -103,16 +107,19 @@ def _leaves_a_rest(finding: Finding) -> bool:
     return finding.verdict is Verdict.UNKNOWN or finding.description is not None
 
 
-def _gains(causes: Sequence[FoundCause]) -> str:
+def _gains(gains: Sequence[tuple[str, Gain]]) -> str:
     parts: list[str] = []
-    for cause in causes:
-        before, after, _, unit = errors_words(cause.gain)
+    for words, gain in gains:
+        before, after, _, unit = errors_words(gain)
+        verb = "" if words == TOGETHER else "s"
         what = "it" if parts else "the error of predicted positions"
         change = (
-            f"leaves {what} at {after} {unit}" if before == after else f"takes {what} from {before} to {after} {unit}"
+            f"leave{verb} {what} at {after} {unit}"
+            if before == after
+            else f"take{verb} {what} from {before} to {after} {unit}"
         )
-        parts.append(f"{cause_title(cause)} {change}")
-    *_, noise, unit = errors_words(causes[-1].gain)
+        parts.append(f"{words} {change}")
+    *_, noise, unit = errors_words(gains[-1][1])
     return f"In videos that were left out, {listed(parts)}; the measurement noise is {noise} {unit}."
 
 
@@ -128,7 +135,9 @@ def _carried(causes: Sequence[FoundCause]) -> list[str]:
 
 def _gain_line(gain: Gain) -> str:
     before, after, noise, unit = errors_words(gain)
-    return f"left-out videos: {difference_words(gain)} nats, error {before} to {after} {unit} (noise {noise} {unit})"
+    share = f", a factor of {ratio_words(ratio)}" if (ratio := gain.error_ratios.get("rmse")) is not None else ""
+    errors = f"error {before} to {after} {unit}{share} (noise {noise} {unit})"
+    return f"left-out videos: {difference_words(gain)} nats, {errors}"
 
 
 def _others(others: Sequence[FoundCause], *, beside: Sequence[FoundCause]) -> str:

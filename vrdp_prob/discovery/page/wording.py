@@ -4,7 +4,15 @@ import math
 import re
 from collections.abc import Iterable
 
-from vrdp_prob.discovery.finding import Estimate, FoundCause, Gain, TriedCause, UpperBound
+from vrdp_prob.discovery.finding import (
+    ErrorRatio,
+    Estimate,
+    Finding,
+    FoundCause,
+    Gain,
+    TriedCause,
+    UpperBound,
+)
 from vrdp_prob.models.effects.effect import Effect
 from vrdp_prob.models.model_file import known_effects
 from vrdp_prob.models.physics import PhysicsModel
@@ -12,6 +20,8 @@ from vrdp_prob.report.wording import percent
 
 UNDEFINED = "\N{EN DASH}"
 """Stands where a number is not defined."""
+TOGETHER = "all named causes"
+"""What a gain is of that all named causes bring together."""
 MINUS = "\N{MINUS SIGN}"
 TIMES = " \N{MULTIPLICATION SIGN} "
 PLAIN_FROM, PLAIN_TO = 1e-4, 1e5
@@ -92,6 +102,17 @@ def tried_words(tried: TriedCause) -> str:
 
 def _with_error(value: float, error: float) -> str:
     return f"{signed(value, error)} ± {number(error)}"
+
+
+def ratio_words(ratio: ErrorRatio) -> str:
+    """An error as a share of that before, with its 95 % interval: `0.29 (0.21 to 0.43)`."""
+    return f"{number(ratio.ratio)} ({number(ratio.q025)} to {number(ratio.q975)})"
+
+
+def told_gains(finding: Finding) -> list[tuple[str, Gain]]:
+    """Gains that are told of, each with the words for what it is of: all named causes together first where several."""
+    each = [(cause_title(cause), cause.gain) for cause in finding.named]
+    return each if finding.gain is None or len(each) == 1 else [(TOGETHER, finding.gain), *each]
 
 
 def bound_words(bound: UpperBound) -> str:

@@ -5,15 +5,15 @@ first part, and the rest is predicted.
 """
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields
 
 import numpy as np
 import torch
 from jaxtyping import Float
 from scipy.stats import norm
 
-from vrdp_prob.discovery.finding import HeldOut
+from vrdp_prob.discovery.finding import ErrorRatio, HeldOut, VideoErrors
 from vrdp_prob.discovery.residuals.held_out import Cavity
 from vrdp_prob.inference.runs.parallel import in_parallel
 from vrdp_prob.inference.search.least_squares import jacobian, minimise
@@ -35,6 +35,9 @@ TENTHS = 10
 FEWEST_SEEN = 2
 """Times that a body must have been seen by then, for what comes next to be predicted."""
 ITERATIONS = 20
+FEWEST_VIDEOS = 3
+"""Videos that must tell of an error for its change to be told with an interval."""
+REPLICATIONS = 2000
 
 
 @dataclass(frozen=True)
@@ -74,14 +77,41 @@ def held_out(videos: Sequence[LinkedVideo], points: Sequence[np.ndarray], caviti
     frame = min(float(np.median(np.diff(video.likelihood.tracks.times))) for video in videos)
     one_second = [np.abs(one.ahead - AHEAD) <= (AROUND + 0.5) * frame for one in forecasts]
     end = [one.ahead > one.ahead.max(initial=0.0) - (2 * AROUND + 0.5) * frame for one in forecasts]
+    by_video = tuple(
+        VideoErrors(_error(one.squares), _error(one.squares[near]), _error(one.squares[late]))
+        for one, near, late in zip(forecasts, one_second, end, strict=True)
+    )
     return HeldOut(
-        rmse=math.nan if (rmse := _in_the_middle([one.squares for one in forecasts])) is None else rmse,
-        rmse_one_second=_in_the_middle([one.squares[near] for one, near in zip(forecasts, one_second, strict=True)]),
-        rmse_end=_in_the_middle([one.squares[late] for one, late in zip(forecasts, end, strict=True)]),
+        rmse=math.nan if (rmse := _in_the_middle([one.rmse for one in by_video])) is None else rmse,
+        rmse_one_second=_in_the_middle([one.rmse_one_second for one in by_video]),
+        rmse_end=_in_the_middle([one.rmse_end for one in by_video]),
         coverage_50=float((standardised < HALF).mean()),
         coverage_90=float((standardised < NINE_TENTHS).mean()),
         pit=_tenths(errors),
+        by_video=by_video,
     )
+
+
+def error_ratios(before: HeldOut, after: HeldOut) -> Mapping[str, ErrorRatio]:
+    """Errors of one prediction of some videos in units of those of another, each video compared with itself.
+
+    Intervals are those of the median over videos that are drawn anew.
+    """
+    found = {}
+    for stretch in (one.name for one in fields(VideoErrors)):
+        pairs = [
+            (getattr(first, stretch), getattr(second, stretch))
+            for first, second in zip(before.by_video, after.by_video, strict=True)
+        ]
+        known = np.array([pair for pair in pairs if None not in pair], dtype=float).reshape(-1, 2)
+        known = known[(np.isfinite(known) & (known > 0)).all(axis=1)]
+        logs = np.log(known[:, 1] / known[:, 0])
+        if len(logs) < FEWEST_VIDEOS:
+            continue
+        drawn = np.random.default_rng(0).choice(logs, size=(REPLICATIONS, len(logs)))
+        low, high = np.exp(np.quantile(np.median(drawn, axis=1), [0.025, 0.975]))
+        found[stretch] = ErrorRatio(math.exp(float(np.median(logs))), float(low), float(high))
+    return found
 
 
 def _tenths(standardised: Float[np.ndarray, "error"]) -> tuple[float, ...]:
@@ -93,10 +123,15 @@ def _tenths(standardised: Float[np.ndarray, "error"]) -> tuple[float, ...]:
     return tuple((counts / counts.sum()).tolist())
 
 
-def _in_the_middle(squares: Sequence[Float[np.ndarray, "_"]]) -> float | None:
-    """Root mean square error of the video in the middle; None where there is no error in any."""
-    errors = [np.sqrt(one.mean()) for one in squares if len(one)]
-    return float(np.median(errors)) if errors else None
+def _error(squares: Float[np.ndarray, "_"]) -> float | None:
+    """Root mean square error; None where there is none."""
+    return float(np.sqrt(squares.mean())) if len(squares) else None
+
+
+def _in_the_middle(errors: Sequence[float | None]) -> float | None:
+    """Error of the video in the middle; None where no video has one."""
+    known = [one for one in errors if one is not None]
+    return float(np.median(known)) if known else None
 
 
 def _forecast(video: LinkedVideo, point: Float[np.ndarray, "dimension"], cavity: Cavity) -> Forecast:

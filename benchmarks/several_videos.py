@@ -33,7 +33,8 @@ from vrdp_prob.scene import Shape, Tracks  # noqa: E402
 FRICTION, DRAG, NOISE = 0.05, 0.05, 0.005
 LEVEL = 0.9
 NEAR, SHARE = 0.5, 0.9
-"""Nats by which L-BFGS may end below Gauss-Newton, and the share of sets in which it has to end no lower."""
+"""Nats by which L-BFGS may end below Gauss-Newton, and the share of sets in which it has to end no lower than that.
+Single videos are fitted otherwise, too, so that a gap may come from these."""
 LARGEST_MEMORY = 1000.0
 """MiB by which the resident memory may rise."""
 STATUS = Path("/proc/self/status")

@@ -6,7 +6,7 @@ L-BFGS on the exact gradient and Levenberg-Marquardt on the residuals climb the 
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 import torch
@@ -32,7 +32,7 @@ from vrdp_prob.inference.search.modes import (
     without_idle,
 )
 from vrdp_prob.inference.search.plan import FitPlan
-from vrdp_prob.inference.search.refinement import Refined, Searched, at_the_top, climb, refine
+from vrdp_prob.inference.search.refinement import Refined, Searched, at_the_top, best_first, climb, refine
 from vrdp_prob.inference.search.yaw_search import with_other_yaws
 from vrdp_prob.models.likelihood import Likelihood
 from vrdp_prob.models.noise import NoiseFamily
@@ -163,13 +163,14 @@ def fit_map(
     starts = [one.point for one in merged(everything, [one for fit in attempts for one in fit.hypotheses])]
     structure = structure_at(everything, starts, clues.moving)
     likelihood = Likelihood(tracks, model, unknowns(tracks, model, structure, family), family)
-    found = _refined(everything, starts, likelihood, stages)
+    refined = partial(_refined, plan=stages)
+    found = refined(everything, starts, likelihood)
     evaluations = sum(one.evaluations for one in attempts) + sum(one.evaluations for one in found)
     if stages.alternatives and stages.yaws:
         turned = with_other_yaws(
             likelihood,
             found,
-            lambda starts: _refined(likelihood, starts, likelihood, stages),
+            refined,
             lambda one: judge(likelihood, one.point, clues).ratio < stages.like_noise,
             optimiser=stages.optimiser,
         )
@@ -177,35 +178,32 @@ def fit_map(
         found = turned.found
         evaluations += turned.evaluations
     reordered = _reordered(likelihood, found, stages)
-    found = reordered.found
-    evaluations += reordered.evaluations
-    all_orders = reordered.complete
-    explained = with_bodies_at_rest(
-        Explained(likelihood, structure, found, evaluations),
-        lambda source, starts, other: _refined(source, starts, other, stages),
-    )
+    found, evaluations, all_orders = reordered.found, evaluations + reordered.evaluations, reordered.complete
+    explained = with_bodies_at_rest(Explained(likelihood, structure, found, evaluations), refined)
     likelihood, structure, found = explained.likelihood, explained.structure, explained.found
     evaluations = explained.evaluations
     believed_at_rest = clues.moving - structure.moving
     if noise is None and family is NoiseFamily.GAUSSIAN and shows_outliers(clues, likelihood, found[0].point):
         family = NoiseFamily.STUDENT_T
         heavy = Likelihood(tracks, model, unknowns(tracks, model, structure, family), family)
-        tempered = _refined(likelihood, [one.point for one in found], heavy, stages)
+        tempered = refined(likelihood, [one.point for one in found], heavy)
         evaluations += sum(one.evaluations for one in tempered)
         if (further := with_outliers(clues, heavy, tempered[0].point)) is not clues:
             clues, likelihood, found = further, heavy, tempered
     misfit = judge(likelihood, found[0].point, clues)
     if model_error:
         explained = Explained(likelihood, structure, found, evaluations)
-        explained, misfit = _with_model_error(explained, clues, misfit, stages)
+        explained, misfit, complete = _with_model_error(explained, clues, misfit, stages)
         likelihood, found, evaluations = explained.likelihood, explained.found, explained.evaluations
+        all_orders &= complete
     climbed = _climbed(likelihood, _best(found))
+    evaluations += sum(one.evaluations for one in climbed)
     while (wider := with_all_that_meet(likelihood, structure, [one.point for one in climbed])) is not None:
         structure, widened = wider
-        found = _refined(likelihood, [one.point for one in climbed], widened, stages)
+        found = refined(likelihood, [one.point for one in climbed], widened)
         climbed = _climbed(widened, found)
         likelihood = widened
-        evaluations += sum(one.evaluations for one in climbed)
+        evaluations += sum(one.evaluations for one in (*found, *climbed))
     likelihood, modes = without_idle(likelihood, distinct_modes(likelihood, climbed), structure.moving)
     converged = at_the_top(found, climbed)
     search = ModeSearch(stages.alternatives, len(attempts), not _in_doubt(attempts), all_orders)
@@ -213,7 +211,7 @@ def fit_map(
 
 
 def _refined(
-    source: Likelihood, starts: Sequence[Float[np.ndarray, "dimension"]], likelihood: Likelihood, plan: FitPlan
+    source: Likelihood, starts: Sequence[Float[np.ndarray, "dimension"]], likelihood: Likelihood, *, plan: FitPlan
 ) -> list[Refined]:
     """What refinement makes of several starts, the best first; those without hope left out."""
     descent = Descent(likelihood, plan.optimiser)
@@ -221,40 +219,43 @@ def _refined(
     return _best(refine(descent, carried, hopeless=HOPELESS + MAY_CATCH_UP))
 
 
-def _with_model_error(explained: Explained, clues: Clues, misfit: Misfit, plan: FitPlan) -> tuple[Explained, Misfit]:
-    """The explanation under a density that allows for what the model lacks, where it lacks something."""
+def _with_model_error(
+    explained: Explained, clues: Clues, misfit: Misfit, plan: FitPlan
+) -> tuple[Explained, Misfit, bool]:
+    """The explanation under a density that allows for what the model lacks, where it lacks something.
+
+    And whether all orders of contacts that this leaves open were tried.
+    """
     likelihood, structure, found = explained.likelihood, explained.structure, explained.found
-    evaluations = explained.evaluations
+    evaluations, complete = explained.evaluations, True
     for _ in range(TURNS):
         error = next_model_error(likelihood, found[0].point, clues, misfit)
         if error is None or error is likelihood.model_error:
             break
         tracks, model = likelihood.tracks, likelihood.model
         widened = Likelihood(tracks, model, unknowns(tracks, model, structure, model_error=error), model_error=error)
-        found = _refined(likelihood, [one.point for one in found], widened, plan)
+        found = _refined(likelihood, [one.point for one in found], widened, plan=plan)
         likelihood = widened
         evaluations += sum(one.evaluations for one in found)
         misfit = misfit.with_error(error, likelihood.observations.position_reference)
     if likelihood.model_error is not None:  # it leaves open more orders of contacts than noise does
         reordered = _reordered(likelihood, found, plan)
-        found = reordered.found
+        found, complete = reordered.found, reordered.complete
         evaluations += reordered.evaluations
-    return Explained(likelihood, structure, found, evaluations), misfit
+    return Explained(likelihood, structure, found, evaluations), misfit, complete
 
 
 def _reordered(likelihood: Likelihood, found: Sequence[Refined], plan: FitPlan) -> Searched:
     """Maxima with those in which close contacts have come in another order, where a plan has several starts."""
     if not plan.alternatives:
         return Searched(list(found), 0)
-    searched = with_other_orders(
-        likelihood, found, lambda starts: _refined(likelihood, starts, likelihood, plan), optimiser=plan.optimiser
-    )
+    searched = with_other_orders(likelihood, found, partial(_refined, plan=plan), optimiser=plan.optimiser)
     return replace(searched, found=_best(searched.found))
 
 
 def _best(found: Sequence[Refined]) -> list[Refined]:
     """The best of some maxima and those that are not hopelessly worse, the best first."""
-    ordered = sorted(found, key=lambda one: -one.log_density)
+    ordered = best_first(found)
     return [one for one in ordered if one is ordered[0] or one.log_density > ordered[0].log_density - HOPELESS]
 
 

@@ -28,8 +28,13 @@ from vrdp_prob.inference.several_videos import (
     sample_together,
     together,
 )
+from vrdp_prob.inference.several_videos.ascent import ImpossibleStartError
 from vrdp_prob.inference.several_videos.gibbs import sample_gibbs
+from vrdp_prob.inference.several_videos.gradient_ascent import _Whitened, climb_by_gradient
+from vrdp_prob.inference.several_videos.joining import joined
 from vrdp_prob.inference.several_videos.linking import LinkedVideo
+from vrdp_prob.inference.several_videos.parts import fit_alone
+from vrdp_prob.inference.several_videos.second_look import doubtful
 from vrdp_prob.inference.several_videos.whole_vector import WholeVector
 from vrdp_prob.models.effects.body_friction import BodyFriction
 from vrdp_prob.models.parameters import AIR_DRAG, Prior
@@ -420,3 +425,30 @@ def test_the_paper_stages_start_a_joint_fit() -> None:
     fit = fit_together([sliding(1), sliding(2)], model=BASE, plan=replace(CURRICULUM, optimiser=Optimiser.LBFGS))
     assert fit.joint.converged
     assert abs(float(np.log(fit.value("sliding_friction") / FRICTION))) < 0.5
+
+
+def test_the_gradient_of_all_numbers_is_that_of_the_joint_density() -> None:
+    joint = two().joint
+    units = _Whitened(joint.numbers, joint.videos, joint.gaussian, failed=1e6)
+    generator = np.random.default_rng(0)
+    place, direction = 0.3 * generator.standard_normal((2, joint.gaussian.dimension))
+    step = 1e-4 * direction
+    change = units.cost(place + step)[0] - units.cost(place - step)[0]
+    assert units.cost(place)[1] @ (2 * step) == pytest.approx(change, rel=1e-4)
+    assert units.cost(np.zeros(len(place)))[0] == pytest.approx(-joint.log_density)
+
+
+def test_a_climb_from_no_world_names_the_video() -> None:
+    joint = two().joint
+    locals_ = [local.centre.copy() for local in joint.gaussian.locals]
+    locals_[1][:] = np.nan
+    with pytest.raises(ImpossibleStartError, match="slide 2"):
+        climb_by_gradient(joint.numbers, joint.videos, joint.gaussian.mean, locals_)
+
+
+def test_single_videos_keep_their_fits_under_a_plan_without_several_starts() -> None:
+    alone = [fit_alone(tracks, BASE, seed=0, plan=CURRICULUM) for tracks in (colliding(1), sliding(2))]
+    bad = replace(alone[0], misfit=replace(alone[0].misfit, residual_sd=3 * alone[0].misfit.residual_sd))
+    assert doubtful([bad, alone[1]]) == [0]
+    fits, _ = joined([bad, alone[1]], BASE, None, seed=0, plan=CURRICULUM)
+    assert fits[0] is bad

@@ -7,7 +7,7 @@ video, as the evidence of both explanations says.
 """
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -20,7 +20,7 @@ from vrdp_prob.inference.draws.samples import Gaussian, evaluate
 from vrdp_prob.inference.search.clues import REST_LOOK
 from vrdp_prob.inference.search.modes import in_unknowns_of
 from vrdp_prob.inference.search.prior_mass import log_prior_constant
-from vrdp_prob.inference.search.refinement import Refined, mode_at
+from vrdp_prob.inference.search.refinement import Refine, Refined, mode_at
 from vrdp_prob.models.likelihood import Likelihood
 from vrdp_prob.models.simulator.events import RolloutEventKind
 from vrdp_prob.models.unknowns import Structure
@@ -31,9 +31,6 @@ WORSE = 6.0
 """Nats by which rest may explain the video worse; by chance it is more once in a hundred times."""
 SLOW = 10.0
 """A body may rest if its release velocity is no more standard deviations from none; friction makes these too small."""
-
-Refine = Callable[[Likelihood, Sequence[Float[np.ndarray, "dimension"]], Likelihood], list[Refined]]
-"""Refines starts in the unknowns of one density in those of another one; the best first."""
 
 
 @dataclass(frozen=True)

@@ -1,5 +1,6 @@
 """Lower the cost of the first frames of a video from several starts, by the optimiser of a plan."""
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -16,8 +17,9 @@ from vrdp_prob.models.likelihood import Likelihood
 STEPS = 8
 """L-BFGS iterations that count as one of Levenberg-Marquardt."""
 MEMORY = 20
-FAILED = 1e30
-"""Cost of a world that fails."""
+FAILED = 1e6
+"""Nats by which a world that fails costs more than the start of L-BFGS. With much more, as 1e30, its line search would
+lose the slope to rounding and step back to where it was, and it would call that an end."""
 
 
 @dataclass(frozen=True)
@@ -106,20 +108,34 @@ def _lbfgs(
     """Where it ends, worlds simulated, and whether it ended by itself; the start where its world fails."""
     units, origin = torch.from_numpy(scale), torch.from_numpy(start)
 
-    def descend(moves: Float[np.ndarray, "dimension"]) -> tuple[float, Float[np.ndarray, "dimension"]]:
-        variables = torch.from_numpy(moves).requires_grad_()
-        loss = cost((origin + units * variables)[None])
-        if not bool(torch.isfinite(loss)):
-            return FAILED, np.zeros_like(moves)
-        (gradient,) = torch.autograd.grad(loss, variables)
-        return float(loss.detach()), np.nan_to_num(gradient.numpy())
+    def moved(moves: Float[Tensor, "dimension"]) -> Float[Tensor, ""]:
+        return cost((origin + units * moves)[None])
 
-    before, _ = descend(np.zeros(len(start)))
+    before, _ = with_gradient(moved, math.inf)(np.zeros(len(start)))
+    if not math.isfinite(before):
+        return start, 1, False
     options = {"maxiter": iterations, "maxcor": MEMORY, "ftol": tolerance / max(before, 1.0) / STEPS, "gtol": 1e-6}
-    result = scipy_minimize(descend, np.zeros(len(start)), jac=True, method="L-BFGS-B", options=options)
+    lowered = with_gradient(moved, before + FAILED)
+    result = scipy_minimize(lowered, np.zeros(len(start)), jac=True, method="L-BFGS-B", options=options)
     if not result.fun < before:
         return start, int(result.nfev) + 1, False
     return start + scale * result.x, int(result.nfev) + 1, bool(result.success)
+
+
+def with_gradient(
+    cost: Callable[[Float[Tensor, "dimension"]], Float[Tensor, ""]], failed: float
+) -> Callable[[Float[np.ndarray, "dimension"]], tuple[float, Float[np.ndarray, "dimension"]]]:
+    """A cost together with its gradient; a given one, and no slope, where it is not finite."""
+
+    def both(values: Float[np.ndarray, "dimension"]) -> tuple[float, Float[np.ndarray, "dimension"]]:
+        variables = torch.from_numpy(values).requires_grad_()
+        loss = cost(variables)
+        if not bool(torch.isfinite(loss)):
+            return failed, np.zeros_like(values)
+        (gradient,) = torch.autograd.grad(loss, variables)
+        return float(loss.detach()), np.nan_to_num(gradient.numpy())
+
+    return both
 
 
 def _huber(values: Float[Tensor, "residual"], threshold: float) -> Float[Tensor, ""]:

@@ -16,10 +16,10 @@ from jaxtyping import Float
 
 from vrdp_prob.inference.draws.samples import Gaussian
 from vrdp_prob.inference.search.descent import Descent
-from vrdp_prob.inference.search.least_squares import jacobian, minimise
+from vrdp_prob.inference.search.least_squares import jacobian, minimise, one_sided
 from vrdp_prob.inference.search.noise_fit import NOISE_FIELDS
 from vrdp_prob.inference.search.plan import Optimiser
-from vrdp_prob.inference.search.refinement import Refine, Refined, Searched
+from vrdp_prob.inference.search.refinement import Refine, Refined, Searched, best_first
 from vrdp_prob.models.likelihood import Likelihood
 from vrdp_prob.models.simulator.events import CONTACTS, EventTable, RolloutEventKind
 
@@ -33,8 +33,6 @@ AT_THE_EDGE, JUST_BESIDE = 1.0, 0.02
 """Standard deviations between contacts below which a maximum may be at the edge, and at which it is sought there."""
 STEP = 0.05
 """Step for derivatives, in standard deviations."""
-ALIKE = 10.0
-"""Ratio of the changes on both sides of a step from which on the larger one is a jump, past another order."""
 MOST_ORDERS = 6
 """Orders that are tried from one maximum: those that the tracks contradict least."""
 MOST_LOOKS = 4
@@ -136,10 +134,8 @@ class _Neighbourhood:
         for early, late in pairs:
             between = np.array([one.get(late, np.nan) - one.get(early, np.nan) for one in worlds])
             between[between * between[0] < 0] = np.nan  # in the other order it passes at another rate
-            sides = np.stack([between[1 : count + 1] - between[0], between[0] - between[count + 1 :]]) / STEP
-            sides[np.abs(sides) > ALIKE * np.abs(sides[::-1])] = np.nan
-            known = np.isfinite(sides)
-            slopes = np.where(known, sides, 0.0).sum(axis=0) / np.maximum(known.sum(axis=0), 1)
+            ahead, behind = between[1 : count + 1] - between[0], between[0] - between[count + 1 :]
+            slopes = np.nan_to_num(one_sided(ahead[:, None], behind[:, None], least=0.0)[:, 0]) / STEP
             if slopes.any():
                 found.append(_Gap(early, late, worlds[0][early], float(between[0]), slopes))
         return sorted(found, key=lambda gap: abs(gap.size))
@@ -162,28 +158,25 @@ def with_other_orders(
         How masses and restitutions follow before that.
     """
     descent = Descent(likelihood, optimiser)
-    best, evaluations = sorted(found, key=lambda one: -one.log_density), 0
+    searched = Searched(best_first(found), 0)
     looked: dict[tuple[Contact, ...], float] = {}
-    complete = True
     for look in range(MOST_LOOKS + 1):
+        best = searched.found
         hopeful = [one for one in best if one.log_density > best[0].log_density - NEARLY]
         orders = [tuple(one) for one in _contacts_at(likelihood, [one.point for one in hopeful])]
-        evaluations += len(hopeful)
         new = [
             (order, one.point, one.log_density)
             for order, one in zip(orders, hopeful, strict=True)
             if one.log_density > looked.get(order, -np.inf) + BETTER
         ]
         if not new or look == MOST_LOOKS:
-            complete &= not new
+            searched = searched.beside([], len(hopeful), complete=not new)
             break
         order, point, looked[order] = new[0]
         starts = other_orders(descent, point, frozenset(looked))
-        others = refined(starts.points) if starts.points else []
-        evaluations += starts.evaluations + sum(one.evaluations for one in others)
-        complete &= starts.complete
-        best = sorted([*best, *others], key=lambda one: -one.log_density)
-    return Searched(best, evaluations, complete)
+        others = refined(likelihood, starts.points, likelihood)
+        searched = searched.beside(others, len(hopeful) + starts.evaluations, complete=starts.complete)
+    return searched
 
 
 @dataclass(frozen=True)

@@ -83,15 +83,29 @@ def jacobian(
     derivative = np.zeros((len(base), len(point)))
     if central:
         ahead, behind = forward - base, base - values[1 + len(columns) :]
-        sizes = np.stack([np.linalg.norm(side, axis=1) for side in (ahead, behind)])
-        sizes = np.where(np.isfinite(sizes), sizes, np.inf)
-        jumps = own_side & (sizes > JUMP * sizes[::-1]) & (sizes > LEAST_JUMP)
-        difference = np.where(jumps[0, :, None], behind, np.where(jumps[1, :, None], ahead, (ahead + behind) / 2))
-        difference = difference / steps[:, None]
+        difference = one_sided(ahead, behind, least=LEAST_JUMP if own_side else np.inf) / steps[:, None]
     else:
         difference = (forward - base) / steps[:, None]
     derivative[:, columns] = np.where(np.isfinite(difference), difference, 0.0).T
     return base, derivative
+
+
+def one_sided(
+    ahead: Float[np.ndarray, "step number"], behind: Float[np.ndarray, "step number"], *, least: float
+) -> Float[np.ndarray, "step number"]:
+    """Mean of the changes on both sides of a point; that of one side where the other's is a jump, or is not known.
+
+    Parameters
+    ----------
+    ahead, behind
+        Changes of some numbers by steps forward, and by steps backward.
+    least
+        Size (Euclidean) of a jump at least.
+    """
+    sizes = np.stack([np.linalg.norm(side, axis=1) for side in (ahead, behind)])
+    sizes = np.where(np.isfinite(sizes), sizes, np.inf)
+    jumps = (sizes > JUMP * sizes[::-1]) & (sizes > least)
+    return np.where(jumps[0, :, None], behind, np.where(jumps[1, :, None], ahead, (ahead + behind) / 2))
 
 
 def minimise(

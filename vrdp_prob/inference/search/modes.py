@@ -14,7 +14,7 @@ from vrdp_prob.inference.identifiability.status import uninformed
 from vrdp_prob.inference.search.events import collision_sequences, first_contacts, wall_contacts
 from vrdp_prob.inference.search.hypothesis import distances
 from vrdp_prob.inference.search.passing import close_passes
-from vrdp_prob.inference.search.refinement import Refined, mode_at
+from vrdp_prob.inference.search.refinement import Refined, best_first, mode_at
 from vrdp_prob.models.coordinates import Coordinates
 from vrdp_prob.models.likelihood import Likelihood
 from vrdp_prob.models.unknowns import Structure, felt_masses, unknowns
@@ -29,7 +29,7 @@ APART = 2.0
 
 def distinct_modes(likelihood: Likelihood, found: Sequence[Refined]) -> tuple[Mode, ...]:
     """The modes among some maxima, best first."""
-    left = [mode_at(likelihood, one) for one in sorted(found, key=lambda one: -one.log_density)]
+    left = [mode_at(likelihood, one) for one in best_first(found)]
     kept: list[Mode] = []
     while left:
         kept.append(left[0])

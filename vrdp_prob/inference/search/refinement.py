@@ -7,10 +7,11 @@ import numpy as np
 import torch
 from jaxtyping import Bool, Float
 from scipy.optimize import minimize as scipy_minimize
+from torch import Tensor
 
 from vrdp_prob.inference.draws.mode import Mode
 from vrdp_prob.inference.draws.samples import Gaussian, evaluate
-from vrdp_prob.inference.search.descent import Descent
+from vrdp_prob.inference.search.descent import FAILED, Descent, with_gradient
 from vrdp_prob.inference.search.least_squares import Minimum, jacobian
 from vrdp_prob.inference.search.noise_fit import NOISE_FIELDS, best_noise, noise_curvature
 from vrdp_prob.models.likelihood import Likelihood
@@ -51,8 +52,13 @@ class Refined:
     evaluations: int
 
 
-Refine = Callable[[Sequence[Float[np.ndarray, "dimension"]]], list[Refined]]
-"""Refines starts, the best first."""
+Refine = Callable[[Likelihood, Sequence[Float[np.ndarray, "dimension"]], Likelihood], list[Refined]]
+"""Refines starts in the unknowns of one density in those of another one, or of the same; the best first."""
+
+
+def best_first(found: Sequence[Refined]) -> list[Refined]:
+    """Maxima, the most probable first."""
+    return sorted(found, key=lambda one: -one.log_density)
 
 
 @dataclass(frozen=True)
@@ -72,6 +78,11 @@ class Searched:
     found: list[Refined]
     evaluations: int
     complete: bool = True
+
+    def beside(self, others: Sequence[Refined], evaluations: int, *, complete: bool = True) -> "Searched":
+        """With further maxima, from starts that took so many worlds to find."""
+        worlds = self.evaluations + evaluations + sum(one.evaluations for one in others)
+        return Searched(best_first([*self.found, *others]), worlds, self.complete and complete)
 
 
 def refine(descent: Descent, starts: Sequence[Float[np.ndarray, "dimension"]], *, hopeless: float) -> list[Refined]:
@@ -129,16 +140,11 @@ def climb(likelihood: Likelihood, start: Mode, iterations: int) -> Refined:
     gaussian = Gaussian.from_precision(start.point, start.precision)
     mean, root = torch.from_numpy(gaussian.mean), torch.from_numpy(gaussian.root)
 
-    def descend(whitened: Float[np.ndarray, "dimension"]) -> tuple[float, Float[np.ndarray, "dimension"]]:
-        position = torch.from_numpy(whitened).requires_grad_()
-        value = -likelihood.log_density((mean + root @ position)[None])[0]
-        if not bool(torch.isfinite(value)):
-            return 1e30, np.zeros_like(whitened)
-        (gradient,) = torch.autograd.grad(value, position)
-        return float(value.detach()), np.nan_to_num(gradient.numpy())
+    def cost(whitened: Float[Tensor, "dimension"]) -> Float[Tensor, ""]:
+        return -likelihood.log_density((mean + root @ whitened)[None])[0]
 
     result = scipy_minimize(
-        descend,
+        with_gradient(cost, FAILED - start.log_density),
         np.zeros(len(start.point)),
         jac=True,
         method="L-BFGS-B",

@@ -26,7 +26,7 @@ from vrdp_prob.inference.search.hypothesis import (
 from vrdp_prob.inference.search.least_squares import Minimum
 from vrdp_prob.inference.search.noise_fit import NOISE_FIELDS
 from vrdp_prob.inference.search.plan import Optimiser
-from vrdp_prob.inference.search.refinement import Refine, Refined, Searched
+from vrdp_prob.inference.search.refinement import Refine, Refined, Searched, best_first
 from vrdp_prob.models.likelihood import Likelihood
 from vrdp_prob.models.parameters import ANGULAR_DRAG
 from vrdp_prob.models.simulator.events import CONTACTS
@@ -45,7 +45,7 @@ MOST_KEPT = 16, 8
 """Results that are kept after either."""
 ODD = 1.0
 """Prior standard deviations from the middle at which a decay of spins is an odd one."""
-TURNS = 3
+QUARTERS = 3
 """Quarter turns over which yaws at a later contact are spread: with each the spin is another one."""
 CLOSE = 0.15
 """Contacts (s) after another one that get no yaws of their own."""
@@ -79,18 +79,17 @@ def with_other_yaws(
         How worlds with other yaws are refined before that.
     """
     descent = Descent(likelihood, optimiser)
-    best, evaluations, idle = sorted(found, key=lambda one: -one.log_density), 0, 0
+    searched, idle = Searched(best_first(found), 0), 0
     for look in range(MOST_LOOKS):
-        starts = (other_later_yaws if look % 2 else other_yaws)(descent, best[0].point)
-        others = refined([one.point for one in starts])
-        evaluations += sum(one.evaluations for one in starts) + sum(one.evaluations for one in others)
-        before = best[0].log_density
-        best = sorted([*best, *others], key=lambda one: -one.log_density)
-        gain = best[0].log_density - before
-        idle = 0 if gain > ENOUGH else idle + 1
-        if idle > 1 or explained(best[0]):
+        before = searched.found[0]
+        starts = (other_later_yaws if look % 2 else other_yaws)(descent, before.point)
+        others = refined(likelihood, [one.point for one in starts], likelihood)
+        searched = searched.beside(others, sum(one.evaluations for one in starts))
+        best = searched.found[0]
+        idle = 0 if best.log_density - before.log_density > ENOUGH else idle + 1
+        if idle > 1 or explained(best):
             break
-    return Searched(best, evaluations)
+    return searched
 
 
 def other_yaws(descent: Descent, point: Float[np.ndarray, "dimension"]) -> list[Minimum]:
@@ -132,7 +131,7 @@ def other_later_yaws(descent: Descent, point: Float[np.ndarray, "dimension"]) ->
         for before, time in pairwise([first, *later]):
             if time - before < CLOSE:
                 continue
-            turn = QUARTER * ((np.arange(TURNS * YAWS) + 0.5) / YAWS - TURNS / 2)
+            turn = QUARTER * ((np.arange(QUARTERS * YAWS) + 0.5) / YAWS - QUARTERS / 2)
             change = turn / (time - first)
             starts = np.tile(point, (len(turn), 1))
             starts[:, spin] += change

@@ -33,7 +33,7 @@ EXPECTED = 1.0
 the videos by themselves have gained as much."""
 HALF = 0.5
 """Share of what is expected of a common step below which a trial looks on both sides of edges before it ends."""
-HOPELESS = 2.0
+TOO_DEAR = 2.0
 """How many times what a common step is expected to bring, or `STEEP`, one video may lose by it; if more, others are not
 looked at."""
 STEEP = 5.0
@@ -173,28 +173,28 @@ def climb(
     refused = -np.inf
     for _ in range(effort.rounds):
         inside = _inside(slopes)
-        smooth = _smooth(slopes)
-        expected = smooth.expected_gain
+        inner = smooth(slopes)
+        expected = inner.expected_gain
         converged = expected < TOLERANCE
         if converged:
             break
         trial, ridges = _settled(videos, state, slopes.videos), _Ridges(videos)
         if _gained(trial, state, ~inside) < EXPECTED and trial.total(numbers) > refused + EXPECTED:
             own = trial
-            trial = _improved(numbers, ridges, own, smooth.shared_step, expected)
+            trial = _improved(numbers, ridges, own, inner.shared_step, expected)
             if trial is own:
                 refused = own.total(numbers)
         brought = trial.total(numbers) - state.total(numbers)
         if brought < max(TOLERANCE, min(effort.enough, HALF * expected)):
             own = _across_edges(videos, trial, slopes.videos)
-            trial = _improved(numbers, ridges, own, smooth.shared_step, expected, around=slopes.videos)
+            trial = _improved(numbers, ridges, own, inner.shared_step, expected, around=slopes.videos)
             refused = -np.inf
         gain = trial.total(numbers) - state.total(numbers)
         if gain > 0:
             state = trial
             slopes = expand_all(numbers, videos, state.shared, state.locals)
         if gain < effort.enough:
-            converged = _smooth(slopes).expected_gain < EXPECTED
+            converged = smooth(slopes).expected_gain < EXPECTED
             break
     gaussian = slopes.gaussian(state.shared, state.locals, numbers.logarithms)
     return JointFit(numbers, tuple(videos), gaussian, state.total(numbers), converged)
@@ -208,7 +208,7 @@ def _inside(slopes: Expansions) -> Bool[np.ndarray, "video"]:
     return np.array([one.promised < STEEP for one in slopes.videos], dtype=bool)
 
 
-def _smooth(slopes: Expansions) -> Expansions:
+def smooth(slopes: Expansions) -> Expansions:
     """The expansion of the videos that are inside; of all where none is."""
     inside = tuple(one for one, used in zip(slopes.videos, _inside(slopes), strict=True) if used)
     return Expansions(slopes.prior, inside) if inside else slopes
@@ -232,7 +232,7 @@ def _improved(
 
     What one video loses with a share by far more than is `expected` of the step is looked at first with the next one.
     """
-    before, most = state.total(numbers), HOPELESS * max(expected, STEEP)
+    before, most = state.total(numbers), TOO_DEAR * max(expected, STEEP)
     hindering: list[int] = []
     for share in SHARES:
         target = state.shared + share * step

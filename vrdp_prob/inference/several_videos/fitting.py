@@ -251,7 +251,8 @@ def fit_together(
         Whether what the model leaves unexplained in a video is looked for, and widens its part of the density.
     plan
         Stages in which each video is fitted by itself, and the optimiser that climbs for each and for all together;
-        the default ones where None.
+        `FitPlan()` where None, with one attempt for each video and no search for yaws without a model error. What
+        is made of the fit, as by `under` and `mended`, is made by Gauss-Newton.
     progress
         Told how many videos are done.
 
@@ -271,7 +272,7 @@ def fit_together(
         fitted = partial(fit_alone, model=model, seed=seed, plan=plan, model_error=model_error)
         alone = in_processes(fitted, videos, advance=advance)
         try:
-            fits, joint = joined(alone, model, shared, seed=seed, optimiser=plan.optimiser)
+            fits, joint = joined(alone, model, shared, seed=seed, plan=plan)
         except ImpossibleStartError as error:
             raise NoCommonWorldError(
                 f"the videos have no common world: {str(error) or 'one of them'} cannot be simulated with what all say "

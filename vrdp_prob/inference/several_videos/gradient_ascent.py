@@ -14,16 +14,18 @@ from scipy.optimize import minimize
 
 from vrdp_prob.inference.draws.samples import evaluate_with_gradient
 from vrdp_prob.inference.runs.parallel import in_parallel
+from vrdp_prob.inference.search.descent import FAILED
 from vrdp_prob.inference.several_videos.arrow import ArrowGaussian
-from vrdp_prob.inference.several_videos.ascent import EXPECTED, TOLERANCE, ImpossibleStartError
-from vrdp_prob.inference.several_videos.joint_fit import JointFit, expand_all, expand_prior
+from vrdp_prob.inference.several_videos.ascent import EXPECTED, TOLERANCE, ImpossibleStartError, smooth
+from vrdp_prob.inference.several_videos.joint_fit import JointFit, expand_all
 from vrdp_prob.inference.several_videos.linking import LinkedVideo, SharedNumbers
 
-TURNS = 8
-"""Searches, each in units of the Gaussian around the end of the one before, until one gains next to nothing."""
+SEARCHES = 8
+"""Searches, each in units of the Gaussian around the end of the one before, until one gains next to nothing..."""
 ITERATIONS, MEMORY = 100, 20
-FAILED = 1e30
-"""Cost of worlds one of which fails."""
+"""...of so many steps at most, which remember so many before them..."""
+LAST_STEP = TOLERANCE / 10
+"""...and end with one that gains less than so many nats."""
 
 
 @dataclass(frozen=True)
@@ -35,12 +37,15 @@ class _Whitened:
     numbers, videos
         What is fitted.
     gaussian
-        The Gaussian.
+        The Gaussian; own numbers follow the shared ones in straight lines here.
+    failed
+        Cost (nats) of worlds one of which fails.
     """
 
     numbers: SharedNumbers
     videos: Sequence[LinkedVideo]
     gaussian: ArrowGaussian
+    failed: float
 
     def places(
         self, whitened: Float[np.ndarray, "dimension"]
@@ -65,10 +70,11 @@ class _Whitened:
             return float(values[0]), gradients[0]
 
         found = in_parallel(derived, range(len(self.videos)))
-        value = float(self.numbers.log_prior(shared[None])[0]) + sum(one for one, _ in found)
+        prior, slope = evaluate_with_gradient(self.numbers.log_density, shared[None])
+        value = float(prior[0]) + sum(one for one, _ in found)
         if not np.isfinite(value):
-            return FAILED, np.zeros_like(whitened)
-        pull, rows = -expand_prior(self.numbers, shared).gradient, []
+            return self.failed, np.zeros_like(whitened)
+        pull, rows = slope[0], []
         for video, local, (_, gradient) in zip(self.videos, self.gaussian.locals, found, strict=True):
             own = gradient[video.local_places]
             pull[video.shared_columns] += gradient[video.shared_places]
@@ -101,32 +107,29 @@ def climb_by_gradient(
     ImpossibleStartError
         If a video has no world at the start.
     """
-    names = [
-        video.name for video, own in zip(videos, locals_, strict=True) if not np.isfinite(video.value(shared, own))
-    ]
-    if names:
-        raise ImpossibleStartError(", ".join(names))
+    values = [video.value(shared, own) for video, own in zip(videos, locals_, strict=True)]
+    if not np.isfinite(values).all():
+        failing = (video.name for video, value in zip(videos, values, strict=True) if not np.isfinite(value))
+        raise ImpossibleStartError(", ".join(failing))
+    value = float(numbers.log_prior(shared[None])[0]) + sum(values)
     slopes, ended = expand_all(numbers, videos, shared, locals_), False
-    for _ in range(TURNS):
-        whitened = _Whitened(numbers, videos, slopes.gaussian(shared, locals_, numbers.logarithms))
-        start = np.zeros(whitened.gaussian.dimension)
-        before, _ = whitened.cost(start)
+    for _ in range(SEARCHES):
+        gaussian = slopes.gaussian(shared, locals_, numbers.logarithms)
+        units = _Whitened(numbers, videos, gaussian, FAILED - value)
         result = minimize(
-            whitened.cost,
-            start,
+            units.cost,
+            np.zeros(gaussian.dimension),
             jac=True,
             method="L-BFGS-B",
-            options={"maxiter": ITERATIONS, "maxcor": MEMORY, "ftol": TOLERANCE / 10 / max(abs(before), 1.0)},
+            options={"maxiter": ITERATIONS, "maxcor": MEMORY, "ftol": LAST_STEP / max(abs(value), 1.0)},
         )
-        gained = before - float(result.fun)
+        gained = -float(result.fun) - value
         if gained > 0:
-            shared, locals_ = whitened.places(result.x)
+            value += gained
+            shared, locals_ = units.places(result.x)
             slopes = expand_all(numbers, videos, shared, locals_)
         ended = gained < TOLERANCE
         if ended:
             break
     gaussian = slopes.gaussian(shared, locals_, numbers.logarithms)
-    value = float(numbers.log_prior(shared[None])[0]) + sum(
-        video.value(shared, own) for video, own in zip(videos, locals_, strict=True)
-    )
-    return JointFit(numbers, tuple(videos), gaussian, value, ended and slopes.expected_gain < EXPECTED)
+    return JointFit(numbers, tuple(videos), gaussian, value, ended and smooth(slopes).expected_gain < EXPECTED)

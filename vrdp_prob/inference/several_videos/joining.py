@@ -11,7 +11,7 @@ from vrdp_prob.inference.map_fit import MapFit
 from vrdp_prob.inference.runs.journal import kept
 from vrdp_prob.inference.runs.parallel import in_processes
 from vrdp_prob.inference.search.misfit import judge
-from vrdp_prob.inference.search.plan import TURNING, Optimiser
+from vrdp_prob.inference.search.plan import TURNING, FitPlan, Optimiser
 from vrdp_prob.inference.search.yaw_search import tells_yaws_by_contacts
 from vrdp_prob.inference.several_videos.agreement import first_guess
 from vrdp_prob.inference.several_videos.ascent import ImpossibleStartError, climb
@@ -46,7 +46,7 @@ def joined(
     shared: Sequence[str] | None,
     *,
     seed: int,
-    optimiser: Optimiser = Optimiser.GAUSS_NEWTON,
+    plan: FitPlan,
 ) -> tuple[list[MapFit], JointFit]:
     """The videos' own fits, some of them searched anew, and the joint fit from what they agree on.
 
@@ -60,14 +60,14 @@ def joined(
         The videos' own fits.
     model, shared, seed
         See `fit_together`.
-    optimiser
-        What refines starts, of each video and of all together.
+    plan
+        How the videos were fitted; one that has no several starts leaves their own fits as they are.
     """
-    join = partial(_joined, model=model, shared=shared, seed=seed, optimiser=optimiser)
+    join = partial(_joined, model=model, shared=shared, seed=seed, plan=plan)
     found = [join(alone, islands=False)]
-    if not _strays(*found[0]) or not any(_has_unseen_yaws(fit) for fit in alone):
+    if not plan.alternatives or not _strays(*found[0]) or not any(_has_unseen_yaws(fit) for fit in alone):
         return found[0]
-    turned = _turned(alone, model, seed=seed, optimiser=optimiser) if explained(alone) else alone
+    turned = _turned(alone, model, seed=seed, optimiser=plan.optimiser) if explained(alone) else alone
     found += [join(turned, islands=False)] if turned is not alone else []
     if _strays(*found[-1]):
         found.append(join(turned, islands=True))
@@ -103,21 +103,21 @@ def _joined(
     model: PhysicsModel,
     shared: Sequence[str] | None,
     seed: int,
-    optimiser: Optimiser,
+    plan: FitPlan,
     islands: bool,
 ) -> tuple[list[MapFit], JointFit]:
-    look = partial(look_again, model=model, shared=shared, seed=seed, islands=islands, optimiser=optimiser)
-    fits = look(alone, doubtful(alone))
+    look = partial(look_again, model=model, shared=shared, seed=seed, islands=islands, optimiser=plan.optimiser)
+    fits = look(alone, doubtful(alone) if plan.alternatives else [])
     numbers, linked, guess = _guessed(fits, model, shared, islands=islands)
     seen = [_with_misfit(fit, video, guess[0], own) for fit, video, own in zip(fits, linked, guess[1], strict=True)]
     lost = [k for k, fit in enumerate(fits) if seen[k].misfit.residual_sd > WORSE * fit.misfit.residual_sd]
-    found_again = look(seen, doubtful(seen, lost))
+    found_again = look(seen, doubtful(seen, lost) if plan.alternatives else [])
     if any(one is not other for one, other in zip(found_again, seen, strict=True)):
         pairs = zip(found_again, seen, fits, strict=True)
         fits = [fit if one is other else one for one, other, fit in pairs]
         numbers, linked, guess = _guessed(fits, model, shared, islands=islands)
-    climbed = CLIMBS[optimiser](numbers, linked, *guess)
-    return fits, _asking_dissenters(climbed, fits, CLIMBS[optimiser])
+    climbed = CLIMBS[plan.optimiser](numbers, linked, *guess)
+    return fits, _asking_dissenters(climbed, fits, CLIMBS[plan.optimiser])
 
 
 def _worsened(fits: Sequence[MapFit], joint: JointFit) -> Float[np.ndarray, "video"]:

@@ -35,11 +35,11 @@ from vrdp_prob.models.physics import PhysicsModel
 from vrdp_prob.progress import ProgressDisplay
 from vrdp_prob.scene import Tracks
 
-WHOLE: Mapping[str, Callable[..., Samples]] = {"emcee": sample_emcee, "nuts": sample_nuts}
+OF_WHOLE_VECTOR: Mapping[str, Callable[..., Samples]] = {"emcee": sample_emcee, "nuts": sample_nuts}
 """Samplers of the vector of all numbers."""
 WORK_LIMIT = 40_000_000
 """Work for each video after which they stop (see `work.py` of the simulator)."""
-SAMPLERS = ("gibbs", "laplace", *WHOLE)
+SAMPLERS = ("gibbs", "laplace", *OF_WHOLE_VECTOR)
 
 
 @dataclass(frozen=True)
@@ -161,9 +161,9 @@ def _sampled(
     ]
     if sampler == "gibbs":
         drawn = _by_gibbs(fit, reported, generator, progress, checkpoint=checkpoint)
-    elif sampler in WHOLE:
+    elif sampler in OF_WHOLE_VECTOR:
         options = {"draws": draws, "generator": generator, "progress": progress, "checkpoint": checkpoint}
-        drawn = _by_whole_vector(fit, WHOLE[sampler], reported, **options)
+        drawn = _by_whole_vector(fit, OF_WHOLE_VECTOR[sampler], reported, **options)
     else:
         drawn = _by_importance(fit, draws, generator, progress)
         if hand_on and (reason := _distrust(drawn.shared, draws)):

@@ -11,15 +11,19 @@ from tests.discovery.fitted import fitted
 from tests.discovery.hidden import hide
 from tests.discovery.measurement import Measurement
 from tests.discovery.scenes import Setting
+from vrdp_prob.discovery.checks import contacts
 from vrdp_prob.discovery.checks.battery import run_checks
+from vrdp_prob.discovery.checks.bodies import OwnValues
+from vrdp_prob.discovery.checks.contacts import KICK
 from vrdp_prob.discovery.checks.flight import QUESTIONS
 from vrdp_prob.discovery.checks.measurement import GENERAL
 from vrdp_prob.discovery.finding import Check
-from vrdp_prob.discovery.residuals.free_flight import FreeFlight
+from vrdp_prob.discovery.residuals.free_flight import FRICTION, FreeFlight
 from vrdp_prob.discovery.residuals.free_flight_patterns import patterns, spanned
 from vrdp_prob.discovery.residuals.residual_model import ResidualModel
 from vrdp_prob.inference import default_model
 from vrdp_prob.inference.several_videos.fitting import fit_together
+from vrdp_prob.inference.several_videos.population import own_parameters
 from vrdp_prob.scene import Body, Shape, Tracks
 
 LARGER = Setting(videos=4, bodies=4)
@@ -173,3 +177,27 @@ def test_false_alarms_are_as_rare_as_stated() -> None:
     # At a rate of 5 % more than 6 of 40 alarms have a probability below 1 %.
     assert sum(alarms) <= 6
     assert kstest(p_values, "uniform").pvalue > 1e-3
+
+
+def test_a_kick_is_looked_for_piece_by_piece_and_nowhere_where_none_would_show(monkeypatch: pytest.MonkeyPatch) -> None:
+    _, fit = fitted(seed=1)
+    whole = by_name(run_checks(fit, seed=0))[KICK]
+    monkeypatch.setattr(contacts, "PLACES_AT_ONCE", 7)
+    pieces = by_name(run_checks(fit, seed=0))[KICK]
+    assert pieces.sentence == whole.sentence
+    assert pieces.p_value == pytest.approx(whole.p_value, rel=1e-6)
+    monkeypatch.setattr(contacts, "_shows", lambda *_: False)
+    assert KICK not in by_name(run_checks(fit, seed=0))
+
+
+def test_what_was_believed_of_bodies_is_no_observation() -> None:
+    data, fit = fitted(seed=1)
+    friction = next(one for one in own_parameters(fit.model) if one.name == FRICTION)
+    alike = replace(friction, prior=replace(friction.prior, sd=0.01))
+    believing = fit.under(replace(fit.model, beliefs={**fit.model.beliefs, FRICTION: alike}), model_error=False)
+    plain, other = OwnValues.of(fit, FRICTION), OwnValues.of(believing, FRICTION)
+    np.testing.assert_allclose(np.diag(other.covariance), np.diag(plain.covariance), rtol=0.3)
+    rolls = np.array([data.tracks[video].bodies[body].shape is Shape.SPHERE for video, body in plain.bodies])
+    for group in (rolls, ~rolls):  # what such bodies share may shift all of them
+        assert group.sum() > 2
+        assert other.values[group].std() == pytest.approx(plain.values[group].std(), rel=0.1)

@@ -71,16 +71,23 @@ def test_a_strength_that_goes_with_the_masses_is_told_as_such_where_no_mass_is()
 
 
 class _Placed(Effect):
-    """An effect with the number of the air drag, as if that were a place."""
+    """The air drag with its number as if that were a place."""
 
-    name: ClassVar = "placed"
+    name: ClassVar = AirDrag.name
     parameters: ClassVar = (replace(AIR_DRAG, prior=Prior(math.log(1000.0), 0.1)),)
+
+
+class _Beside(_Placed):
+    """Another effect that acts by the number of the air drag, as a wind does."""
+
+    name: ClassVar = "beside"
 
 
 def test_a_strength_may_surprise_but_not_a_place() -> None:
     _, fit = fitted(seed=1)
     assert surprise(fit, AirDrag()) == 1.0
     assert surprise(fit, _Placed()) < 1e-6
+    assert surprise(fit, _Beside()) == 1.0
 
 
 @pytest.mark.parametrize(("far", "high"), [(0.9, 1.8), (0.01, 1.2)], ids=["farther", "nearer"])

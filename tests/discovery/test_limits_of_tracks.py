@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from vrdp_prob.discovery.discover import _limits
+from vrdp_prob.discovery.discover import _limits, _on_one_clock
 from vrdp_prob.scene import Body, Shape, Tracks
 
 
@@ -31,3 +31,10 @@ def test_what_is_true_of_all_is_told_once() -> None:
 def test_of_a_limit_that_many_videos_have_one_is_told() -> None:
     (sentence,) = _limits([_tracks("u", 2.0), _tracks("v", 0.04), _tracks("w", 33.0), _tracks("x", 0.5)])
     assert sentence.startswith("u (and two other videos alike): Frames are 2 s apart")
+
+
+def test_clips_of_one_recording_are_put_on_one_clock() -> None:
+    clips = [_tracks("v", 0.04), _tracks("w", 0.04, start=1.0)]
+    assert _on_one_clock(clips) is clips
+    for one in _on_one_clock([*clips, _tracks("x", 0.04, start=60.0)]):
+        np.testing.assert_allclose(one.times, 0.04 * np.arange(40.0), atol=1e-9)

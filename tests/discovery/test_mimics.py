@@ -8,6 +8,7 @@ from tests.discovery.scenes import Setting
 from vrdp_prob.discovery.candidates.scores import score_causes
 from vrdp_prob.discovery.candidates.unlisted_law import UnlistedMotion, UnlistedRebound
 from vrdp_prob.discovery.checks.bodies import REBOUND
+from vrdp_prob.discovery.checks.contacts import REBOUND_AT_WALLS
 from vrdp_prob.discovery.finding import Check
 from vrdp_prob.discovery.selection.mimics import laws_of, without_mimics
 from vrdp_prob.discovery.selection.refits import Refits
@@ -58,12 +59,14 @@ def test_a_tilt_that_acts_stays_and_leaves_nothing_to_a_law_outside_the_catalogu
 def test_what_remains_decides_which_law_is_asked() -> None:
     motion = Check("push against place", 1.0, 1e-6, True, "")
     rebound = Check(REBOUND, 1.0, 1e-6, True, "")
+    at_walls = Check(REBOUND_AT_WALLS, 1.0, 1e-6, True, "")
     memory = Check("memory of the residuals", 1.0, 1e-6, True, "")
     by_chance = Check("outliers", 1.0, 0.2, False, "")
     asked = {
         (motion, by_chance): (UnlistedMotion,),
         (rebound, by_chance): (UnlistedRebound,),
         (rebound, memory): (UnlistedRebound,),
+        (at_walls, memory): (UnlistedRebound,),
         (memory,): (UnlistedMotion,),
         (rebound, motion): (UnlistedMotion, UnlistedRebound),
         (by_chance,): (),

@@ -1,5 +1,6 @@
 """A run that is killed goes on where it was, and ends with the same numbers."""
 
+import importlib
 import os
 import signal
 import subprocess
@@ -16,11 +17,18 @@ from vrdp_prob.inference.draws.samples import Samples
 from vrdp_prob.inference.emcee_sampler import sample_emcee
 from vrdp_prob.inference.infer import default_model, infer
 from vrdp_prob.inference.nuts_sampler import sample_nuts
-from vrdp_prob.inference.runs.checkpoint import Checkpoint, fingerprint
+from vrdp_prob.inference.runs.checkpoint import Checkpoint, fingerprint, model_facts
 from vrdp_prob.inference.search.plan import CURRICULUM
+from vrdp_prob.models.physics import PhysicsModel
 from vrdp_prob.scene import Body, Shape, Tracks
 
 FACTS = {"seed": "3"}
+OWN_EFFECT = """from vrdp_prob.models.effects.linear_drag import LinearDrag
+
+
+class Own(LinearDrag):
+    law = "{}"
+"""
 ROOT = Path(__file__).parents[2]
 PATIENCE = 120.0
 """Seconds."""
@@ -130,3 +138,15 @@ def test_a_fingerprint_changes_with_one_measured_number() -> None:
     assert facts == fingerprint(again, default_model(), seed=1)
     changed = fingerprint(other, default_model(), seed=1)
     assert [name for name in facts if facts[name] != changed[name]] == ["tracks"]
+
+
+def test_a_run_depends_on_the_code_of_effects_from_elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    module = tmp_path / "own_effects_of_a_test.py"
+    module.write_text(OWN_EFFECT.format("a = -b v"), encoding="utf-8")
+    monkeypatch.syspath_prepend(str(tmp_path))
+    effect = importlib.import_module(module.stem).Own()
+    before = model_facts(PhysicsModel("own", (effect,), {}))
+    module.write_text(OWN_EFFECT.format("a = -2 b v"), encoding="utf-8")
+    changed = {name for name, text in model_facts(PhysicsModel("own", (effect,), {})).items() if text != before[name]}
+    assert changed == {f"module {module.stem}"}
+    assert set(model_facts(PhysicsModel.base())) == {"model"}

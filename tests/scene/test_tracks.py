@@ -1,5 +1,7 @@
 """What tracks refuse."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -86,6 +88,9 @@ def test_times_of_day_are_counted_from_the_first_frame() -> None:
     tracks = Tracks.from_arrays(*arguments, 1.7e9 + np.arange(5) / 25, np.zeros((5, 1, 2)))
     np.testing.assert_allclose(tracks.times, np.arange(5) / 25, atol=1e-6)
     assert tracks.until(0.1).data.attrs["time_origin"] == 1.7e9
+    later = replace(tracks, data=tracks.data.assign_coords(time=tracks.times + 2.0)).from_first_frame()
+    np.testing.assert_allclose(later.times, tracks.times)
+    assert later.data.attrs["time_origin"] == 1.7e9 + 2.0
     assert Tracks.from_arrays(*arguments, 3.0 + np.arange(5) / 25, np.zeros((5, 1, 2))).times[0] == 3.0
 
 

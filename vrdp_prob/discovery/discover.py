@@ -20,7 +20,7 @@ from vrdp_prob.discovery.selection.tried import tried_causes
 from vrdp_prob.inference import default_model
 from vrdp_prob.inference.assembly import limits_of_tracks
 from vrdp_prob.inference.infer import check_model
-from vrdp_prob.inference.runs.checkpoint import Checkpoint, model_facts, program_facts, videos_facts
+from vrdp_prob.inference.runs.checkpoint import Checkpoint, effects_facts, model_facts, program_facts, videos_facts
 from vrdp_prob.inference.runs.journal import journal
 from vrdp_prob.inference.runs.parallel import linear_algebra_in_one_thread, several_processes
 from vrdp_prob.inference.several_videos.fitting import fit_together
@@ -35,6 +35,9 @@ from vrdp_prob.scene import Tracks
 
 TELLING = 2.0
 """Overdispersion of a video that is told of."""
+COUNTED_ANEW = (
+    "The videos begin further apart than any of them is long, so times are told from the first frame of each video."
+)
 
 
 @linear_algebra_in_one_thread
@@ -80,8 +83,9 @@ def discover(
     looked_for = _catalogue(physics, catalogue)
     own = None if checkpoint is None else Checkpoint(checkpoint, _facts(videos, physics, looked_for, seed))
     compile_model(physics)
+    on_one_clock = _on_one_clock(videos)
     with several_processes(processes), journal(own):
-        fit = fit_together(videos, model=physics, seed=seed, model_error=False, progress=progress)
+        fit = fit_together(on_one_clock, model=physics, seed=seed, model_error=False, progress=progress)
         outcome = outcome_of(fit, looked_for, seed=seed, progress=progress)
         if outcome.verdict is Verdict.UNKNOWN and not outcome.found.best.causes:
             better = fit.with_other_courses(seed=seed) if explained(fit.fits) else fit
@@ -103,6 +107,7 @@ def discover(
             *_notes(found, outcome.reasons, outcome.unlisted, doubtful=doubtful and bool(causes)),
             *mass_scale_notes(_told(found, causes), videos),
             *_limits(videos),
+            *([] if on_one_clock is videos else [COUNTED_ANEW]),
         ),
         figures=residual_figures(
             found.base.fit,
@@ -114,6 +119,15 @@ def discover(
         tried=tuple(tried),
         gain=outcome.gain,
     )
+
+
+def _on_one_clock(videos: Sequence[Tracks]) -> Sequence[Tracks]:
+    """Videos with their times counted from their first frames, where they begin further apart than one is long.
+
+    When something happened once in a video is believed to be while that video lasts.
+    """
+    starts, longest = [tracks.times[0] for tracks in videos], max(np.ptp(tracks.times) for tracks in videos)
+    return videos if np.ptp(starts) <= longest else [tracks.from_first_frame() for tracks in videos]
 
 
 def _limits(videos: Sequence[Tracks]) -> list[str]:
@@ -135,7 +149,8 @@ def _limits(videos: Sequence[Tracks]) -> list[str]:
 def _facts(videos: Sequence[Tracks], model: PhysicsModel, catalogue: Sequence[Effect], seed: int) -> dict[str, str]:
     """What a search depends on, in short texts by name."""
     names = ", ".join(sorted(effect.name for effect in catalogue))
-    return {**videos_facts(videos), **model_facts(model), **program_facts(seed=seed, catalogue=names)}
+    code = {**model_facts(model), **effects_facts(catalogue)}
+    return {**videos_facts(videos), **code, **program_facts(seed=seed, catalogue=names)}
 
 
 def _catalogue(model: PhysicsModel, catalogue: Sequence[Effect] | None) -> list[Effect]:

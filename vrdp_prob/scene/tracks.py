@@ -1,6 +1,6 @@
 """Measured positions of the objects of one video."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import xarray as xr
@@ -117,6 +117,12 @@ class Tracks:
             times = times - times[0]
         coordinates = {"time": ("time", times, {"units": "s"}), "body": ("body", [body.id for body in bodies])}
         return cls(video, bodies, xr.Dataset(variables, coordinates, attributes), walls, camera)
+
+    def from_first_frame(self) -> "Tracks":
+        """The same with times counted from the first frame; `data.attrs["time_origin"]` says when that was."""
+        first = float(self.times[0])
+        data = self.data.assign_coords(time=("time", self.times - first, self.data["time"].attrs))
+        return replace(self, data=data.assign_attrs({ORIGIN: self.data.attrs.get(ORIGIN, 0.0) + first}))
 
     @property
     def times(self) -> Float[np.ndarray, "time"]:

@@ -25,18 +25,22 @@ from vrdp_prob.models.parameters import MASS, RESTITUTION
 from vrdp_prob.scene import Body, Shape
 
 REBOUND = "restitution against approach speed"
+OPEN = 10.0
+"""Standard deviation of a logarithm of which nothing is believed."""
 LARGEST_SD = 0.3
 """Values that are known no better (standard deviation of the logarithm) tell nothing."""
 
 
 @dataclass(frozen=True)
 class OwnValues:
-    """Logarithms of a quantity that every body has for itself, in all videos.
+    """Logarithms of a quantity that every body has for itself, in all videos, as the tracks alone tell them.
+
+    What was believed of bodies is no observation: it would hold them together where a law drives them apart.
 
     Parameters
     ----------
     values, covariance
-        The fitted logarithms.
+        The most probable logarithms where next to nothing was believed of them, given what videos share.
     bodies
         Video and body that each belongs to.
     """
@@ -53,8 +57,15 @@ class OwnValues:
             local = fit.joint.gaussian.locals[index]
             entries = [video.likelihood.coordinates.entries[place] for place in video.local_places]
             mine = [k for k, entry in enumerate(entries) if entry.field == field and entry.owner is not None]
-            values += [float(local.centre[k]) for k in mine]
-            blocks.append((local.root @ local.root.T)[np.ix_(mine, mine)])
+            root = local.root[mine]
+            believed = np.array([1 / entries[k].prior.sd ** 2 for k in mine])
+            expected = np.array([entries[k].prior.mean for k in mine])
+            both = np.linalg.inv(root @ root.T)
+            own, directions = np.linalg.eigh(both - np.diag(believed))
+            alone = (directions / (np.maximum(own, 0.0) + 1 / OPEN**2)) @ directions.T
+            pull = both @ (local.centre[mine] - expected)
+            values += (expected + alone @ pull).tolist()
+            blocks.append(alone)
             bodies += [(index, int(entries[k].owner or 0)) for k in mine]
         covariance = np.zeros((len(values), len(values)))
         first = 0

@@ -9,6 +9,7 @@ of free flight and all that the fit can absorb. Where a cube's yaw is not measur
 direction of their impulse is known from the motion after them alone.
 """
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
@@ -38,6 +39,8 @@ WHERE = {AT_CONTACTS: RolloutEventKind.COLLISION, AT_WALLS: RolloutEventKind.WAL
 """Where bodies touch each other, and stated walls."""
 FEWEST_FRAMES = 4
 """Frames of a body before and after a kick without which it does not show."""
+PLACES_AT_ONCE = 256
+"""Frames of bodies at which kicks are looked for in one go: each needs room for all residuals of its video."""
 
 
 def contact_checks(
@@ -281,19 +284,22 @@ def _kick_without_partner(model: ResidualModel, replicas: Sequence[Float[np.ndar
         frames, bodies = _kick_places(video.motion)
         if not len(frames):
             continue
-        times = video.motion.times[frames]
-        rows = video.rows(video.motion.kicked(Kicks.single(times, bodies))).reshape(video.linear.data, -1, 2)
-        scores, blocks = model.linear.scores_in(index, rows)
-        shown = [k for k, score in enumerate(scores) if score.degrees == 2 and _shows(score, rows[:, k])]
-        places += len(shown)
-        for k in shown:
-            statistic = scores[k].chi_square / model.dispersion
-            if best is None or statistic > best[0]:
-                best = (statistic, index, int(frames[k]), int(bodies[k]), scores[k])
-        pulls = (blocks[:, shown].reshape(len(noise), -1).T @ noise).reshape(len(shown), 2, -1)
-        inverse = np.array([np.linalg.inv(scores[k].information) for k in shown]).reshape(-1, 2, 2)
-        found = (pulls * (inverse @ pulls)).sum(axis=1)
-        largest = np.maximum(largest, found.max(axis=0, initial=0.0))
+        for some in np.array_split(np.arange(len(frames)), math.ceil(len(frames) / PLACES_AT_ONCE)):
+            kicks = Kicks.single(video.motion.times[frames[some]], bodies[some])
+            rows = video.rows(video.motion.kicked(kicks)).reshape(video.linear.data, -1, 2)
+            scores, blocks = model.linear.scores_in(index, rows)
+            shown = [k for k, score in enumerate(scores) if score.degrees == 2 and _shows(score, rows[:, k])]
+            if not shown:
+                continue
+            places += len(shown)
+            for k in shown:
+                statistic = scores[k].chi_square / model.dispersion
+                if best is None or statistic > best[0]:
+                    best = (statistic, index, int(frames[some[k]]), int(bodies[some[k]]), scores[k])
+            pulls = (blocks[:, shown].reshape(len(noise), -1).T @ noise).reshape(len(shown), 2, -1)
+            inverse = np.array([np.linalg.inv(scores[k].information) for k in shown])
+            found = (pulls * (inverse @ pulls)).sum(axis=1)
+            largest = np.maximum(largest, found.max(axis=0))
     if best is None:
         return
     statistic, index, frame, body, score = best

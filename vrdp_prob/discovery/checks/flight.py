@@ -213,7 +213,7 @@ def free_flight_checks(flight: FreeFlight) -> list[Check]:
 
 
 def _shaking(flight: FreeFlight) -> Iterator[tuple[Question, Part, float]]:
-    """Whether the table shakes, at whatever frequency."""
+    """Whether the table shakes, at whatever frequency, in step with the start of the videos."""
     parts = {
         (name, frequency): flight.part(_phases(name), PUSH) for name, frequency in flight.scales.frequencies.items()
     }
@@ -225,7 +225,8 @@ def _shaking(flight: FreeFlight) -> Iterator[tuple[Question, Part, float]]:
 
     def sentence(part: Part) -> str:
         times = "once" if round(frequency, 1) == 1 else f"{number(frequency)} times"
-        return f"all bodies are pushed to and fro {times} a second, by {number(part.size)} m/s^2 (root mean square)"
+        pushed = f"all bodies are pushed to and fro {times} a second, in step with the start of the videos,"
+        return f"{pushed} by {number(part.size)} m/s^2 (root mean square)"
 
     question = Question("push against time", _phases(name), sentence, PUSH)
     yield question, best, anywhere(best.score.p_value, len(known))

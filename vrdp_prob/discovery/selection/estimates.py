@@ -129,6 +129,7 @@ def _between_frames(middle: float, tracks: Tracks, unit: str) -> Estimate:
 def surprise(fit: SharedFit, effect: Effect) -> float:
     """Probability that the shared parameters of an effect lie so far from what was expected of them, strengths aside.
 
+    What the model has without the effect, as the drag that a wind acts by, does not count.
     A cause that holds another one as its limit takes its place with parameters far off: a bowl whose middle is far away
     is a slope. How strong a cause is may surprise. Source: prior-data conflict (Evans and Moshonov, Checking for
     prior-data conflict, Bayesian Analysis 1, 2006), with the most probable values in the place of the data.
@@ -141,8 +142,9 @@ def surprise(fit: SharedFit, effect: Effect) -> float:
         The effect.
     """
     joint = fit.joint
-    strengths = {*effect.vanishes_at, *effect.vanishes_like}
-    priors = {one.name: fit.model.believed(one).prior for one in effect.parameters if one.name not in strengths}
+    others = {one.name for one in fit.model.without_effect(effect).parameters}
+    left_out = {*effect.vanishes_at, *effect.vanishes_like, *others}
+    priors = {one.name: fit.model.believed(one).prior for one in effect.parameters if one.name not in left_out}
     found = [
         (priors[key[0]], joint.gaussian.mean[place]) for place, key in enumerate(joint.numbers.keys) if key[0] in priors
     ]

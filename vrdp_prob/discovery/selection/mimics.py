@@ -15,6 +15,7 @@ import numpy as np
 from vrdp_prob.discovery.candidates.scores import score_causes
 from vrdp_prob.discovery.candidates.unlisted_law import UnlistedMotion, UnlistedRebound
 from vrdp_prob.discovery.checks.bodies import REBOUND
+from vrdp_prob.discovery.checks.contacts import REBOUND_AT_WALLS
 from vrdp_prob.discovery.checks.measurement import GENERAL
 from vrdp_prob.discovery.finding import Check
 from vrdp_prob.discovery.selection.search import FALSE_ALARM, Search
@@ -25,6 +26,8 @@ from vrdp_prob.progress import ProgressDisplay, SilentProgress
 
 BELIEVED = 0.5
 """Probability below which a cause is taken to follow something outside the catalogue."""
+REBOUNDS = {REBOUND, REBOUND_AT_WALLS}
+"""Checks of what the law of rebounds is about."""
 UNLISTED = float(np.log(FALSE_ALARM))
 """Log prior odds of such a thing."""
 
@@ -54,8 +57,8 @@ def laws_of(left: Sequence[Check]) -> tuple[Effect, ...]:
     """Laws of no particular cause for what checks say is left."""
     failing = {check.name for check in left if check.significant}
     telling = failing - set(GENERAL) or failing
-    motion = (UnlistedMotion(),) if telling - {REBOUND} else ()
-    return (*motion, UnlistedRebound()) if REBOUND in telling else motion
+    motion = (UnlistedMotion(),) if telling - REBOUNDS else ()
+    return (*motion, UnlistedRebound()) if telling & REBOUNDS else motion
 
 
 def without_mimics(

@@ -169,6 +169,8 @@ def search(
             chain.append(best)
             steps.append(searcher.untried(best))
         best, lesser, rivals = searcher.compared(chain, steps)
+        if not best.causes:  # what was tried, and what is told, is of the model that was given
+            best = chain[0]
     return Search(chain[0], best, tuple(steps), lesser, rivals, searcher.refits)
 
 
@@ -323,11 +325,7 @@ class _Searcher:
         """
         found = []
         for cause, without in zip(best.causes, lesser, strict=True):
-            base, step = next(
-                (base, one)
-                for base, one in zip(chain, steps, strict=True)
-                if any(trial.causes[-1].name == cause.name for trial in one.tried)
-            )
+            base, step = _tried_at(cause, chain, steps)
             others = [one for one in step.tried if one.causes[-1].name not in best.names]
             if len(best.causes) > 1 or step is not steps[0]:
                 least = HOPEFUL * max(gain(one, base)[0] for one in step.tried)
@@ -347,6 +345,15 @@ class _Searcher:
                 others += sorted(hidden, key=merit, reverse=True)
             found.append(tuple(one for one in others if not one.patches(one.causes[-1])))
         return tuple(found)
+
+
+def _tried_at(cause: Effect, chain: Sequence[Trial], steps: Sequence[Step]) -> tuple[Trial, Step]:
+    """The model and the step at which a cause was tried first; a wall or a disc that kicks led to, where these were."""
+    for name in (cause.name, ExternalImpulse.name):
+        for base, step in zip(chain, steps, strict=True):
+            if any(trial.causes[-1].name == name for trial in step.tried):
+                return base, step
+    return chain[0], steps[0]
 
 
 def _sure(trial: Trial, divisor: Float[np.ndarray, "video"]) -> float:

@@ -155,7 +155,8 @@ class Trial:
             )
         except ImpossibleStartError:
             return None
-        return replace(self, causes=(*self.causes[:-1], score.effect), fit=fit, choices=choices)
+        causes = (*self.causes[:-1], score.effect)
+        return replace(self, causes=causes, fit=with_own_population(fit), choices=choices)
 
     def _with_lasting(self, score: CauseScore) -> "Trial":
         """The fit with an effect that acts on all videos."""

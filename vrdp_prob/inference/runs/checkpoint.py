@@ -6,6 +6,7 @@ with a seed or a state of its own, and is kept when it is whole. A file that can
 
 import json
 import pickle
+import sys
 import zipfile
 from collections.abc import Callable, Collection, Mapping, Sequence
 from functools import cache
@@ -17,6 +18,7 @@ import numpy as np
 
 from vrdp_prob.errors import InputError
 from vrdp_prob.files import check_writable, write_atomically
+from vrdp_prob.models.effects.effect import Effect
 from vrdp_prob.models.physics import PhysicsModel
 from vrdp_prob.scene import Camera, Tracks
 from vrdp_prob.version import __version__
@@ -62,9 +64,18 @@ def film_facts(file: Path, camera: Camera | None) -> dict[str, str]:
 
 
 def model_facts(model: PhysicsModel) -> dict[str, str]:
-    """A physics model, in a short text."""
-    text = model.text
-    return {"model": sha256(text.encode()).hexdigest()}
+    """A physics model with the code of effects from elsewhere, in short texts."""
+    return {"model": sha256(model.text.encode()).hexdigest(), **effects_facts(model.effects)}
+
+
+def effects_facts(effects: Sequence[Effect]) -> dict[str, str]:
+    """The modules of effects that are not of this package, in short texts by name."""
+    found = {}
+    for name in sorted({type(effect).__module__ for effect in effects}):
+        file = getattr(sys.modules.get(name), "__file__", None)
+        if file is not None and name.split(".")[0] != PACKAGE.name:
+            found[f"module {name}"] = sha256(Path(file).read_bytes()).hexdigest()
+    return found
 
 
 def program_facts(**settings: object) -> dict[str, str]:

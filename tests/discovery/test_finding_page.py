@@ -10,6 +10,7 @@ from tests.discovery.findings import (
     CHECKS,
     EVERY_KIND,
     TILT,
+    WIND,
     named,
     nothing,
     unknown,
@@ -66,6 +67,11 @@ def test_the_verdict_is_one_sentence_without_intervals():
     doubtful = replace(TILT, probability=0.7, sentence="TV pictures shake. They do so often.")
     assert verdict_sentence(replace(named(), causes=(doubtful,), videos=("a", "b", "c"))) == (
         "These three videos suggest that TV pictures shake."
+    )
+    equal = replace(named(), causes=(replace(TILT, probability=0.3), WIND))
+    assert verdict_sentence(equal) == (
+        "These 12 videos suggest that the table slopes by 0.15 degrees, down towards x = 0.83, y = -0.56, or, no less "
+        "likely, that the air moves at 0.42 m/s towards x = 0.8, y = -0.6."
     )
     assert verdict_sentence(with_a_rest()).endswith("and something else that no cause of the catalogue explains.")
 

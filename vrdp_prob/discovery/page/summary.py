@@ -36,6 +36,9 @@ def verdict_sentence(finding: Finding) -> str:
     if finding.named:
         verb = "show" if all(cause.probability >= SURE for cause in finding.named) else "suggest"
         found = ", and ".join(f"that {_clause(cause.sentence)}" for cause in finding.named)
+        least = min(cause.probability for cause in finding.named)
+        others = [cause for cause in possible(finding) if cause.probability >= least]
+        found += "".join(f", or, no less likely, that {_clause(cause.sentence)}" for cause in others)
         rest = ", and something else that no cause of the catalogue explains" if _leaves_a_rest(finding) else ""
         return f"{sentence(videos)} {verb} {found}{rest}."
     if finding.verdict is Verdict.NONE:

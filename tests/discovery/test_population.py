@@ -2,13 +2,17 @@
 
 import math
 
+import numpy as np
 import pytest
 
 from tests.discovery.fitted import fitted
 from tests.discovery.scenes import Setting
-from vrdp_prob.inference.several_videos.learned import learned_model
+from vrdp_prob.inference.several_videos.learned import believing, learned_model
 from vrdp_prob.inference.several_videos.population import with_learned_population
-from vrdp_prob.models.parameters import AIR_DRAG, MASS, RESTITUTION
+from vrdp_prob.models.effects.material_friction import MATERIAL_RATIO, MaterialFriction
+from vrdp_prob.models.parameters import AIR_DRAG, MASS, RESTITUTION, SLIDING_FRICTION, WALL_RESTITUTION
+from vrdp_prob.models.physics import PhysicsModel
+from vrdp_prob.scene import Wall
 
 
 @pytest.mark.parametrize("spread", [0.05, pytest.param(0.3, marks=pytest.mark.slow)])
@@ -47,3 +51,19 @@ def test_a_learned_model_knows_the_bodies_and_the_table(mass_spread: float) -> N
     drag = model.believed(AIR_DRAG)
     assert drag.prior.sd < 0.3 * AIR_DRAG.prior.sd
     assert math.log(drag.default / 0.03) == pytest.approx(0.0, abs=4 * drag.prior.sd)
+
+
+def test_a_learned_model_knows_each_material_and_each_wall() -> None:
+    model = PhysicsModel.base().with_effect(MaterialFriction())
+    wall = Wall(1.0, -2.0, 1.0, 2.0)
+    keys = [("sliding_friction", ()), ("material_friction_ratio", ("metal",)), ("wall_restitution", wall.place)]
+    keys += [("position_noise", ())]
+    learned = believing(model, keys, np.log([0.05, 1.4, 0.7, 1.0]), np.array([0.1, 0.02, 9.0, 0.1]))
+    assert learned.believed(SLIDING_FRICTION).default == pytest.approx(0.05)
+    assert learned.believed(MATERIAL_RATIO, ("metal",)).default == pytest.approx(1.4)
+    assert learned.believed(MATERIAL_RATIO, ("metal",)).prior.sd == 0.02
+    assert learned.believed(MATERIAL_RATIO, ("rubber",)) == MATERIAL_RATIO
+    rebound = learned.believed(WALL_RESTITUTION, wall.place)
+    assert rebound.default == pytest.approx(0.7)
+    assert rebound.prior.sd == WALL_RESTITUTION.prior.sd  # never less sharp than before
+    assert len(learned.beliefs) == 3

@@ -1,13 +1,16 @@
 """One number for all bodies of a material, in the vector of unknowns and between videos."""
 
+from dataclasses import replace
+
 import numpy as np
 import torch
 
-from vrdp_prob.models.effects.material_friction import MaterialFriction
+from vrdp_prob.models.effects.material_friction import MATERIAL_RATIO, MaterialFriction
 from vrdp_prob.models.likelihood import Likelihood
+from vrdp_prob.models.parameters import WALL_RESTITUTION, Prior, belief_key
 from vrdp_prob.models.physics import PhysicsModel
 from vrdp_prob.models.unknowns import Structure, unknowns
-from vrdp_prob.scene import Body, Shape, Tracks
+from vrdp_prob.scene import Body, Shape, Tracks, Wall
 
 FRAMES = 20
 GRAVITY, FRICTION = 9.81, 0.05
@@ -60,3 +63,24 @@ def test_the_true_ratios_explain_the_motion() -> None:
     assert np.abs(right).max() < 1e-6
     wrong = np.where(coordinates.mask(["material_friction_ratio"]), 0.0, point)
     assert np.abs(likelihood.residuals(wrong[None])[0, :numbers]).max() > 1
+
+
+def test_what_is_believed_of_a_material_is_its_own() -> None:
+    known = replace(MATERIAL_RATIO, default=1.5, prior=Prior(np.log(1.5), 0.01))
+    model = replace(MODEL, beliefs={belief_key(known.name, ("rubber",)): known})
+    tracks = tracks_of("rubber", "metal", "rubber")
+    coordinates = unknowns(tracks, model, Structure(frozenset({0, 1}), frozenset()))
+    priors = {entry.group: entry.prior for entry in coordinates.entries if entry.field == known.name}
+    assert priors == {"rubber": known.prior, "metal": MATERIAL_RATIO.prior}
+    resting = unknowns(tracks, model, Structure(frozenset({1}), frozenset()))
+    values = resting.quantities(torch.from_numpy(resting.prior_mean.copy())[None])[known.name]
+    np.testing.assert_allclose(values[0].numpy(), [1.5, 1.0, 1.5])
+
+
+def test_what_is_believed_of_a_wall_is_its_own() -> None:
+    tracks = replace(tracks_of("metal"), walls=(Wall(5.0, -9.0, 5.0, 9.0), Wall(-5.0, -9.0, -5.0, 9.0)))
+    known = replace(WALL_RESTITUTION, default=0.5, prior=replace(WALL_RESTITUTION.prior, mean=np.log(0.5), sd=0.01))
+    model = replace(MODEL, beliefs={belief_key(known.name, tracks.walls[1].place): known})
+    coordinates = unknowns(tracks, model, Structure(frozenset({0}), frozenset({0})))
+    priors = [entry.prior for entry in coordinates.entries if entry.field == known.name]
+    assert priors == [WALL_RESTITUTION.prior, known.prior]

@@ -1,6 +1,7 @@
 """Models as files."""
 
 import importlib
+import math
 import re
 from dataclasses import replace
 from pathlib import Path
@@ -10,9 +11,11 @@ import pytest
 from vrdp_prob.errors import InputError
 from vrdp_prob.inference import default_model
 from vrdp_prob.models.effects.bowl import Bowl
+from vrdp_prob.models.effects.material_friction import MATERIAL_RATIO, MaterialFriction
 from vrdp_prob.models.model_file import known_effects
-from vrdp_prob.models.parameters import MASS, RESTITUTION, SLIDING_FRICTION
+from vrdp_prob.models.parameters import MASS, RESTITUTION, SLIDING_FRICTION, WALL_RESTITUTION, belief_key
 from vrdp_prob.models.physics import PhysicsModel
+from vrdp_prob.scene import Wall
 
 
 def test_write_then_read_gives_the_same(tmp_path: Path) -> None:
@@ -36,6 +39,26 @@ def test_a_model_may_believe_something_of_masses_and_restitutions(tmp_path: Path
     model.write(path)
     assert PhysicsModel.read(path).believed(MASS) == model.believed(MASS)
     assert model.with_effect(Bowl()).without_effect(model.effects[0]).believed(MASS).default == 0.2
+
+
+def test_a_model_may_believe_something_of_one_material_and_of_one_wall(tmp_path: Path) -> None:
+    wall, other = Wall(1.0, -2.0, 1.0, 2.0), Wall(0.0, 0.0, 3.0, 0.0)
+    ratio = replace(MATERIAL_RATIO, default=1.4, prior=replace(MATERIAL_RATIO.prior, mean=math.log(1.4), sd=0.02))
+    rebound = replace(WALL_RESTITUTION, default=0.6, prior=replace(WALL_RESTITUTION.prior, mean=math.log(0.6), sd=0.03))
+    beliefs = {belief_key(ratio.name, ("metal",)): ratio, belief_key(rebound.name, wall.place): rebound}
+    model = PhysicsModel("table", PhysicsModel.base().with_effect(MaterialFriction()).effects, beliefs)
+    model.write(tmp_path / "model.toml")
+    again = PhysicsModel.read(tmp_path / "model.toml")
+    assert again.text == model.text
+    assert again.believed(MATERIAL_RATIO, ("metal",)) == ratio
+    assert again.believed(MATERIAL_RATIO, ("rubber",)) == again.believed(MATERIAL_RATIO) == MATERIAL_RATIO
+    assert (
+        again.believed(WALL_RESTITUTION, replace(wall, x1=wall.x2, y1=wall.y2, x2=wall.x1, y2=wall.y1).place) == rebound
+    )
+    assert again.believed(WALL_RESTITUTION, other.place) == WALL_RESTITUTION
+    assert set(again.without_effect(MaterialFriction()).beliefs) & set(beliefs) == {
+        belief_key(rebound.name, wall.place)
+    }
 
 
 def test_every_effect_of_the_catalogue_can_be_named(tmp_path: Path) -> None:
@@ -62,6 +85,8 @@ def test_every_effect_of_the_catalogue_can_be_named(tmp_path: Path) -> None:
         ('name = "a"\neffects = ["air_drag"]\n[parameters.air_drag]\nprior_sd = -1', "sd positive"),
         ('name = "a"\neffects = ["air_drag"]\n[parameters.air_drag]\ndefault = -1', "outside its support"),
         ('name = "a"\neffects = ["air_drag"]\n[parameters.air_drag]\nshape = 1', "air_drag.shape' is not known"),
+        ('name = "a"\neffects = ["air_drag"]\n[parameters."air_drag[metal]"]', "is of no material or wall"),
+        ('name = "a"\neffects = ["air_drag"]\n[parameters."wall_restitution[1, 2"]', "belongs to none"),
     ],
 )
 def test_mistakes_name_file_and_field(tmp_path: Path, content: str, message: str) -> None:

@@ -9,6 +9,9 @@
     default = 0.1                        # in the parameter's unit
     prior_mean = -2.3                    # of the inferred coordinate (for most parameters the logarithm)
     prior_sd = 1.0
+
+    [parameters."material_friction_ratio[metal]"]  # of one material, or of a wall: "wall_restitution[x1, y1, x2, y2]"
+    prior_mean = 0.2
 """
 
 import importlib
@@ -24,7 +27,7 @@ from typing import Any
 from vrdp_prob.errors import InputError
 from vrdp_prob.models import effects as catalogue
 from vrdp_prob.models.effects.effect import Effect
-from vrdp_prob.models.parameters import MATTER, Parameter
+from vrdp_prob.models.parameters import MATTER, WALL_RESTITUTION, Parameter, Scope, plain_name
 
 _NUMBERS = ("default", "prior_mean", "prior_sd")
 
@@ -39,15 +42,16 @@ def known_effects() -> Mapping[str, type[Effect]]:
     }
 
 
-def text(name: str, effects: Sequence[Effect], parameters: Sequence[Parameter]) -> str:
-    """Content of a model file."""
+def text(name: str, effects: Sequence[Effect], parameters: Mapping[str, Parameter]) -> str:
+    """Content of a model file, with what is believed by name."""
     lines = [f"name = {json.dumps(name)}", "effects = ["]
     lines += [f"    {json.dumps(_reference(effect))}, # {effect.sentence}" for effect in effects]
     lines.append("]")
-    for parameter in parameters:
+    for key, parameter in parameters.items():
+        quoted = key if key == parameter.name else json.dumps(key)
         lines += [
             "",
-            f"[parameters.{parameter.name}] # {parameter.description}, in {parameter.unit}",
+            f"[parameters.{quoted}] # {parameter.description}, in {parameter.unit}",
             f"default = {parameter.default!r}",
             f"prior_mean = {parameter.prior.mean!r}",
             f"prior_sd = {parameter.prior.sd!r}",
@@ -113,7 +117,8 @@ def _effect_of_module(module: str, name: str) -> Effect:
 
 
 def _belief(name: str, table: Any, stated: Mapping[str, Parameter]) -> Parameter:
-    if name not in stated:
+    plain = plain_name(name)
+    if plain not in stated or (plain != name and not name.endswith("]")):
         raise InputError(f"parameter '{name}' belongs to none of the effects; they have {', '.join(sorted(stated))}.")
     if not isinstance(table, dict):
         raise InputError(f"field 'parameters.{name}' must be a table with {', '.join(_NUMBERS)}.")
@@ -122,7 +127,9 @@ def _belief(name: str, table: Any, stated: Mapping[str, Parameter]) -> Parameter
             raise InputError(f"field 'parameters.{name}.{key}' is not known; use {', '.join(_NUMBERS)}.")
         if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
             raise InputError(f"field 'parameters.{name}.{key}' is {value!r}; give a finite number.")
-    parameter = stated[name]
+    parameter = stated[plain]
+    if plain != name and parameter.scope is not Scope.MATERIAL and plain != WALL_RESTITUTION.name:
+        raise InputError(f"field 'parameters.{name}': '{plain}' is of no material or wall; leave out the brackets.")
     prior = replace(
         parameter.prior,
         mean=float(table.get("prior_mean", parameter.prior.mean)),

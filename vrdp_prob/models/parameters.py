@@ -185,6 +185,25 @@ RESTITUTION = restitution_parameter(
     scope=Scope.BODY,
 )
 WALL_RESTITUTION = restitution_parameter("wall_restitution", "restitution factor of a wall")
+Group = tuple[float | str, ...]
+"""Which of several things a number belongs to that videos may share: the name of a material, or where a wall is."""
+
+
+def group_words(group: Group) -> str:
+    """The same as a text; empty where it belongs to none."""
+    return ", ".join(part if isinstance(part, str) else f"{part:g}" for part in group)
+
+
+def belief_key(name: str, group: Group) -> str:
+    """What is believed of a parameter of one of several things is told by this: `material_friction_ratio[metal]`."""
+    return f"{name}[{group_words(group)}]" if group else name
+
+
+def plain_name(key: str) -> str:
+    """The parameter that a belief is about."""
+    return key.partition("[")[0]
+
+
 MATTER = {parameter.name: parameter for parameter in (MASS, RESTITUTION, WALL_RESTITUTION)}
 """What bodies and walls of every model have."""
 SLIDING_FRICTION = _log_parameter(

@@ -14,7 +14,7 @@ from vrdp_prob.models.effects.angular_drag import AngularDrag
 from vrdp_prob.models.effects.dry_friction import DryFriction
 from vrdp_prob.models.effects.effect import Effect
 from vrdp_prob.models.effects.normal_impact import NormalImpact
-from vrdp_prob.models.parameters import FRAME_JITTER, MATTER, VIDEO_START, Parameter
+from vrdp_prob.models.parameters import FRAME_JITTER, MATTER, VIDEO_START, Group, Parameter, belief_key, plain_name
 from vrdp_prob.models.simulator.kernel import Kernel, load
 from vrdp_prob.models.simulator.laws import (
     CONSTANTS,
@@ -40,7 +40,8 @@ class PhysicsModel:
         Its causes. The order matters where one changes what another has made (the restitution of a contact).
     beliefs
         Parameters by name whose prior or default differs from what the effect states, or, for masses and restitutions,
-        from `vrdp_prob.models.parameters.MATTER`.
+        from `vrdp_prob.models.parameters.MATTER`. What is believed of one material or wall alone has it in brackets:
+        `material_friction_ratio[metal]`, `wall_restitution[x1, y1, x2, y2]`.
 
     Raises
     ------
@@ -59,8 +60,8 @@ class PhysicsModel:
             raise InputError(f"model {self.name}: an effect appears twice ({', '.join(names)}); list each effect once.")
         for effect in self.effects:
             self._check_effect(effect)
-        strange = sorted(set(self.beliefs) - {*MATTER, *(parameter.name for parameter in self._stated_parameters())})
-        if strange:
+        stated = {*MATTER, *(parameter.name for parameter in self._stated_parameters())}
+        if strange := sorted(key for key in self.beliefs if plain_name(key) not in stated):
             raise InputError(f"model {self.name}: no effect has a parameter '{strange[0]}'; leave it out.")
 
     def __getstate__(self) -> dict[str, Any]:
@@ -111,7 +112,7 @@ class PhysicsModel:
         """The model without one of its causes, and without what was believed of it alone."""
         effects = tuple(one for one in self.effects if one.name != effect.name)
         stated = {*MATTER, *(parameter.name for one in effects for parameter in one.parameters)}
-        beliefs = {name: belief for name, belief in self.beliefs.items() if name in stated}
+        beliefs = {key: belief for key, belief in self.beliefs.items() if plain_name(key) in stated}
         name = "+".join(part for part in self.name.split("+") if part != effect.name)
         return PhysicsModel(name, effects, beliefs)
 
@@ -145,8 +146,8 @@ class PhysicsModel:
     @property
     def text(self) -> str:
         """Content of its model file."""
-        matter = [belief for name, belief in self.beliefs.items() if name in MATTER]
-        return model_file.text(self.name, self.effects, [*self.parameters, *matter])
+        of_all = {parameter.name: parameter for parameter in self.parameters}
+        return model_file.text(self.name, self.effects, {**of_all, **self.beliefs})
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
@@ -154,9 +155,10 @@ class PhysicsModel:
         stated = {parameter.name: parameter for parameter in self._stated_parameters()}
         return tuple(self.believed(parameter) for parameter in stated.values())
 
-    def believed(self, parameter: Parameter) -> Parameter:
-        """A parameter with the prior and the default that this model believes."""
-        return self.beliefs.get(parameter.name, parameter)
+    def believed(self, parameter: Parameter, group: Group = ()) -> Parameter:
+        """A parameter, of one material or wall where given, with the prior and the default that this model believes."""
+        believed = self.beliefs.get(parameter.name, parameter)
+        return self.beliefs.get(belief_key(parameter.name, group), believed) if group else believed
 
     def _stated_parameters(self) -> Iterator[Parameter]:
         for effect in self.effects:

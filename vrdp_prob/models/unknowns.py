@@ -181,7 +181,7 @@ def _matter(tracks: Tracks, model: PhysicsModel, structure: Structure) -> Iterat
         yield Coordinate.of(model.believed(RESTITUTION), body)
     for index, wall in enumerate(tracks.walls):
         if wall.restitution is None:
-            yield Coordinate.of(model.believed(WALL_RESTITUTION), index)
+            yield Coordinate.of(model.believed(WALL_RESTITUTION, wall.place), index)
 
 
 def felt_masses(model: PhysicsModel, moving: frozenset[int]) -> frozenset[int]:
@@ -206,7 +206,8 @@ def _physics(tracks: Tracks, model: PhysicsModel, structure: Structure) -> Itera
         if parameter.scope is Scope.MATERIAL:
             for material, bodies in _by_material(tracks).items():
                 if (structure.moving | structure.meeting).intersection(concerned, bodies):
-                    yield replace(Coordinate.of(parameter, bodies[0]), group=material, others=bodies[1:])
+                    believed = model.believed(parameter, (material,))
+                    yield replace(Coordinate.of(believed, bodies[0]), group=material, others=bodies[1:])
 
 
 def _by_material(tracks: Tracks) -> dict[str, tuple[int, ...]]:
@@ -232,15 +233,18 @@ def _defaults(tracks: Tracks, model: PhysicsModel) -> dict[str, Float[np.ndarray
     """Every quantity where it is not sampled."""
     count = len(tracks.bodies)
     first = first_positions(tracks)
-    known = [wall.restitution for wall in tracks.walls]
-    mass, of_wall = _mass_default(tracks, model), model.believed(WALL_RESTITUTION).default
+    walls = [
+        model.believed(WALL_RESTITUTION, wall.place).default if wall.restitution is None else wall.restitution
+        for wall in tracks.walls
+    ]
+    mass = _mass_default(tracks, model)
     defaults = {
         "x": first[:, 0],
         "y": first[:, 1],
         **{name: np.zeros(count) for name in ("velocity_x", "velocity_y", "angle", "spin", "angle_zero")},
         MASS.name: np.array([mass if body.mass is None else body.mass for body in tracks.bodies]),
         RESTITUTION.name: np.full(count, model.believed(RESTITUTION).default),
-        WALL_RESTITUTION.name: np.array([of_wall if value is None else value for value in known]),
+        WALL_RESTITUTION.name: np.array(walls),
         NOISE: np.ones(1),
         ANGLE_NOISE: np.ones(1),
         DEGREES_OF_FREEDOM: np.full(1, math.exp(DEGREES_PRIOR.mean)),
@@ -249,6 +253,9 @@ def _defaults(tracks: Tracks, model: PhysicsModel) -> dict[str, Float[np.ndarray
         if parameter.name not in defaults:
             owners = 1 if parameter.scope.per_video else count
             defaults[parameter.name] = np.full(owners, parameter.default)
+        if parameter.scope is Scope.MATERIAL:
+            for material, bodies in _by_material(tracks).items():
+                defaults[parameter.name][list(bodies)] = model.believed(parameter, (material,)).default
     return defaults
 
 

@@ -13,6 +13,8 @@ from vrdp_prob.errors import InputError
 ATTRIBUTES = ("color", "material", "shape")
 COLORS = ("gray", "red", "blue", "green", "brown", "cyan", "purple", "yellow")
 MATERIALS = ("metal", "rubber")
+WALL_DIGITS = 6
+"""Decimals (m) in which the end points of one wall agree."""
 
 
 class Shape(StrEnum):
@@ -153,8 +155,19 @@ class Wall:
                 f"wall {ends}: restitution is {self.restitution:g}; give a number from 0 to 1 or leave it empty."
             )
 
+    @property
+    def place(self) -> tuple[float, float, float, float]:
+        """End points in m, rounded, the smaller one first: walls of several videos with the same ones are one wall."""
+        (x1, y1), (x2, y2) = sorted([(self.x1, self.y1), (self.x2, self.y2)])
+        return _rounded(x1), _rounded(y1), _rounded(x2), _rounded(y2)
+
     def distance(self, place: Float[np.ndarray, "2"]) -> float:
         """Distance in m of a place from the wall."""
         begin, along = np.array([self.x1, self.y1]), np.array([self.x2 - self.x1, self.y2 - self.y1])
         share = np.clip((place - begin) @ along / (along @ along), 0.0, 1.0)
         return float(np.linalg.norm(place - begin - share * along))
+
+
+def _rounded(number: float) -> float:
+    """A coordinate of a wall; no zero has a sign."""
+    return round(number, WALL_DIGITS) + 0.0

@@ -12,9 +12,8 @@ from vrdp_prob.discovery.finding import Estimate, UpperBound
 from vrdp_prob.discovery.residuals.unexplained import Unexplained
 from vrdp_prob.discovery.selection.reach import Reach, reaches
 from vrdp_prob.inference.several_videos.fitting import SharedFit
-from vrdp_prob.inference.several_videos.linking import place_words
 from vrdp_prob.models.effects.effect import Effect
-from vrdp_prob.models.parameters import Transform
+from vrdp_prob.models.parameters import Transform, group_words
 from vrdp_prob.scene import Tracks
 
 CERTAIN = 0.95
@@ -51,7 +50,7 @@ def estimates(
     joint, farther = fit.joint, reaches(fit, units, shared_sd)
     for place, key in enumerate(joint.numbers.keys):
         if key[0] in units:
-            words = place_words(key[1])
+            words = group_words(key[1])
             name = f"{key[0]}[{words}]" if words else key[0]
             mean, sd = float(joint.gaussian.mean[place]), float(shared_sd[place])
             transform, unit = units[key[0]].transform, units[key[0]].unit

@@ -11,15 +11,19 @@ from vrdp_prob.inference.several_videos.fitting import SharedFit
 from vrdp_prob.inference.several_videos.linking import Key, shared_key
 from vrdp_prob.inference.several_videos.population import with_learned_population
 from vrdp_prob.models.coordinates import Coordinate
-from vrdp_prob.models.parameters import WALL_RESTITUTION, Scope
+from vrdp_prob.models.parameters import WALL_RESTITUTION, Scope, belief_key
 from vrdp_prob.models.physics import PhysicsModel
 from vrdp_prob.scene import Tracks, Wall
+
+OF_THE_TABLE = (Scope.SHARED, Scope.MATERIAL)
+"""What further videos of a table have in common with others: no numbers of a single video or body."""
 
 
 def learned_model(fit: SharedFit) -> PhysicsModel:
     """The model of a fit, believing what its videos tell: for further videos of the same table.
 
-    Shared parameters have what all videos say of them as their prior and default. Of what bodies have of their own
+    Shared parameters, those of materials and the restitutions of walls have what all videos say of them as their prior
+    and default. Of what bodies have of their own
     (masses, restitutions, frictions) it is learned how far apart they are, of restitutions their middle, too; that of
     masses cannot be seen.
     """
@@ -44,13 +48,16 @@ def believing(
     mean, sd
         What is believed of the numbers, in their coordinates; it is never believed less sharply than before.
     """
-    told = dict(zip(keys, zip(mean, sd, strict=True), strict=True))
+    stated = {parameter.name: parameter for parameter in model.parameters if parameter.scope in OF_THE_TABLE}
+    stated[WALL_RESTITUTION.name] = WALL_RESTITUTION
     beliefs = dict(model.beliefs)
-    for parameter in model.parameters:
-        if parameter.scope is Scope.SHARED and (parameter.name, ()) in told:
-            middle, width = map(float, told[parameter.name, ()])
+    for (name, group), middle, width in zip(keys, mean.tolist(), sd.tolist(), strict=True):
+        if name in stated:
+            parameter = model.believed(stated[name], group)
             prior = replace(parameter.prior, mean=middle, sd=min(width, parameter.prior.sd))
-            beliefs[parameter.name] = replace(parameter, prior=prior, default=parameter.transform.to_value(middle))
+            value = parameter.transform.to_value(middle)
+            value = value if prior.upper is None else min(value, 1.0)
+            beliefs[belief_key(name, group)] = replace(parameter, prior=prior, default=value)
     return replace(model, beliefs=beliefs)
 
 

@@ -19,17 +19,15 @@ from vrdp_prob.inference.draws.samples import evaluate
 from vrdp_prob.inference.search.noise_fit import NOISE_FIELDS
 from vrdp_prob.models.coordinates import Coordinate, Coordinates
 from vrdp_prob.models.likelihood import Likelihood
-from vrdp_prob.models.parameters import WALL_RESTITUTION, Prior, Scope, Transform
+from vrdp_prob.models.parameters import WALL_RESTITUTION, Group, Prior, Scope, Transform, group_words
 from vrdp_prob.models.physics import PhysicsModel
 from vrdp_prob.models.unknowns import ANGLE_NOISE, NOISE
 from vrdp_prob.scene import Tracks
 
 FLAT_SD = 1e8
 """Standard deviation of a prior that says nothing."""
-WALL_DIGITS = 6
-"""Walls whose end points agree to so many decimals (m) are one wall."""
 
-Key = tuple[str, tuple[float | str, ...]]
+Key = tuple[str, Group]
 """A shared number: its quantity, and for the restitution of a wall where the wall is, or the name of a material."""
 
 
@@ -58,7 +56,7 @@ class SharedNumbers:
     @cached_property
     def names(self) -> tuple[str, ...]:
         """A name for each number."""
-        return tuple(field + (f"({words})" if (words := place_words(place)) else "") for field, place in self.keys)
+        return tuple(field + (f"({words})" if (words := group_words(place)) else "") for field, place in self.keys)
 
     @cached_property
     def logarithms(self) -> Bool[np.ndarray, "shared"]:
@@ -254,11 +252,6 @@ def check_names(names: Sequence[str], model: PhysicsModel) -> None:
             )
 
 
-def place_words(place: tuple[float | str, ...]) -> str:
-    """Which wall or material a shared number belongs to; empty where it belongs to none."""
-    return ", ".join(part if isinstance(part, str) else f"{part:g}" for part in place)
-
-
 def shared_key(entry: Coordinate, tracks: Tracks) -> Key | None:
     """What a number of a video's vector may be shared as; None where it is the video's own."""
     if entry.owner is None:
@@ -267,9 +260,7 @@ def shared_key(entry: Coordinate, tracks: Tracks) -> Key | None:
         return entry.field, (entry.group,)
     if entry.field != WALL_RESTITUTION.name:
         return None
-    wall = tracks.walls[entry.owner]
-    ends = sorted([(wall.x1, wall.y1), (wall.x2, wall.y2)])
-    return entry.field, tuple(round(number, WALL_DIGITS) + 0.0 for end in ends for number in end)
+    return entry.field, tracks.walls[entry.owner].place
 
 
 def _noise_reference(likelihoods: Sequence[Likelihood]) -> float | None:

@@ -15,12 +15,12 @@ from vrdp_prob.files import write_atomically
 from vrdp_prob.inference.draws.samples import Convergence
 from vrdp_prob.inference.draws.summaries import Summary
 from vrdp_prob.inference.posterior import Posterior
-from vrdp_prob.inference.several_videos.linking import SharedNumbers, place_words
+from vrdp_prob.inference.several_videos.linking import SharedNumbers
 from vrdp_prob.inference.storage import check_format, from_tree, reading, to_tree
 from vrdp_prob.inference.tree import for_arviz
 from vrdp_prob.models import model_file
 from vrdp_prob.models.coordinates import Coordinate
-from vrdp_prob.models.parameters import WALL_RESTITUTION, Prior, Transform
+from vrdp_prob.models.parameters import WALL_RESTITUTION, Prior, Transform, group_words
 from vrdp_prob.models.physics import PhysicsModel
 from vrdp_prob.models.unknowns import NOISE
 
@@ -225,7 +225,7 @@ class SharedPosterior:
             attributes: dict[str, Any] = {"units": units.get(field, "1")}
             if field == NOISE and self.numbers.noise_reference is not None:
                 attributes["reference_m"] = self.numbers.noise_reference
-            labels = [place_words(keys[place][1]) for place in places]
+            labels = [group_words(keys[place][1]) for place in places]
             if not any(labels):
                 variables[field] = (axes, values[..., places[0]], attributes)
                 continue

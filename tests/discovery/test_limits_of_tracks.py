@@ -1,8 +1,10 @@
 """What limits a finding by the tracks themselves."""
 
+from dataclasses import replace
+
 import numpy as np
 
-from vrdp_prob.discovery.discover import _limits, _on_one_clock
+from vrdp_prob.discovery.discover import _limits, _not_asked, _on_one_clock
 from vrdp_prob.scene import Body, Shape, Tracks
 
 
@@ -38,3 +40,15 @@ def test_clips_of_one_recording_are_put_on_one_clock() -> None:
     assert _on_one_clock(clips) is clips
     for one in _on_one_clock([*clips, _tracks("x", 0.04, start=60.0)]):
         np.testing.assert_allclose(one.times, 0.04 * np.arange(40.0), atol=1e-9)
+
+
+def test_what_only_some_videos_tell_is_not_asked_and_that_is_told() -> None:
+    plain, other = _tracks("v", 0.04), _tracks("w", 0.04)
+    assert _not_asked([plain, other]) == []
+    angles = np.zeros((40, 1))
+    turning = Tracks.from_arrays("x", plain.bodies, plain.times, plain.positions, angles=angles)
+    (sentence,) = _not_asked([plain, turning])
+    assert sentence.startswith("Whether the motion depends on spin is not asked, since v does not tell the angles")
+    heavy = replace(plain, bodies=(replace(plain.bodies[0], mass=1.0),))
+    (sentence,) = _not_asked([heavy, other])
+    assert "the masses of some bodies only are stated" in sentence

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
+from vrdp_prob.datasets.folder import some
 from vrdp_prob.discovery.checking import check_video_count
 from vrdp_prob.discovery.describe import describe
 from vrdp_prob.discovery.finding import Finding, FoundCause, UpperBound, Verdict
@@ -107,6 +108,7 @@ def discover(
             *_notes(found, outcome.reasons, outcome.unlisted, doubtful=doubtful and bool(causes)),
             *mass_scale_notes(_told(found, causes), videos),
             *_limits(videos),
+            *_not_asked(videos),
             *([] if on_one_clock is videos else [COUNTED_ANEW]),
         ),
         figures=residual_figures(
@@ -119,6 +121,24 @@ def discover(
         tried=tuple(tried),
         gain=outcome.gain,
     )
+
+
+def _not_asked(videos: Sequence[Tracks]) -> list[str]:
+    """What is asked of no video because some do not tell it, in sentences."""
+    notes = []
+    untold = [tracks.video for tracks in videos if not tracks.turning_told]
+    if 0 < len(untold) < len(videos):
+        notes.append(
+            f"Whether the motion depends on spin is not asked, since {some(untold)} "
+            f"{'does' if len(untold) == 1 else 'do'} not tell the angles of all bodies that can turn; the other videos "
+            "alone would allow it."
+        )
+    weighed = [body.mass is not None for tracks in videos for body in tracks.bodies]
+    if any(weighed) and not all(weighed):
+        notes.append(
+            "Whether accelerations depend on mass is not asked, since the masses of some bodies only are stated."
+        )
+    return notes
 
 
 def _on_one_clock(videos: Sequence[Tracks]) -> Sequence[Tracks]:
@@ -137,10 +157,10 @@ def _limits(videos: Sequence[Tracks]) -> list[str]:
         for kind, sentence in limits_of_tracks(tracks).items():
             told.setdefault(kind, []).append((tracks.video, sentence))
     limits = []
-    for some in told.values():
-        video, sentence = some[0]
-        if len({one for _, one in some}) > 1 or len(some) < len(videos):
-            others = f" (and {counted(len(some) - 1, 'other video')} alike)" if len(some) > 1 else ""
+    for alike in told.values():
+        video, sentence = alike[0]
+        if len({one for _, one in alike}) > 1 or len(alike) < len(videos):
+            others = f" (and {counted(len(alike) - 1, 'other video')} alike)" if len(alike) > 1 else ""
             sentence = f"{video}{others}: {sentence}"
         limits.append(sentence)
     return limits

@@ -83,7 +83,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--scenes", type=int, default=300, help="how many videos")
     parser.add_argument("--first", type=int, default=0, help="seed of the first video")
     parser.add_argument("--plan", choices=PLANS, default="default")
+    parser.set_defaults(processes=1)
     options = parser.parse_args(arguments)
+    if options.docs is not None and options.plan != "default":
+        parser.error("the page holds the table of the default plan; leave --docs or --plan out")
     videos = [Video(seed, options.plan) for seed in range(options.first, options.first + options.scenes)]
     compile_model(default_model())
     results = measured(

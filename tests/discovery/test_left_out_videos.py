@@ -98,14 +98,18 @@ def test_errors_are_compared_video_by_video() -> None:
     def predicted(*errors: float | None) -> HeldOut:
         return HeldOut(1.0, None, None, 0.5, 0.9, (), tuple(VideoErrors(one, None, one) for one in errors))
 
-    halved = error_ratios(predicted(0.1, 4.0, 0.01, None), predicted(0.05, 2.0, 0.005, None))
+    before, after = (0.1, 4.0, 0.01, None, 1.0, 2.0), (0.05, 2.0, 0.005, None, 0.5, 1.0)
+    halved = error_ratios(predicted(*before), predicted(*after))
     assert set(halved) == {"rmse", "rmse_end"}
     assert astuple(halved["rmse"]) == pytest.approx((0.5, 0.5, 0.5))
     mixed = error_ratios(predicted(1, 1, 1, 1, 1), predicted(0.1, 0.4, 0.5, 0.6, 2.0))["rmse"]
     assert mixed.ratio == pytest.approx(0.5)
     assert 0.1 <= mixed.q025 < 0.45
     assert 0.55 < mixed.q975 <= 2.0
-    assert not error_ratios(predicted(1, 1, None), predicted(0.5, 0.5, 0.5))
+    few = error_ratios(predicted(1, 1, None), predicted(0.5, 0.5, 0.5))["rmse"]
+    assert few.ratio == 0.5
+    assert np.isnan([few.q025, few.q975]).all()
+    assert not error_ratios(predicted(None, None), predicted(0.5, 0.5))
 
 
 @pytest.mark.slow

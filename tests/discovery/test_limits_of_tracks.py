@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from vrdp_prob.discovery.discover import _limits, _not_asked, _on_one_clock
+from vrdp_prob.discovery.discover import _from_first_frames, _limits, _not_asked
 from vrdp_prob.scene import Body, Shape, Tracks
 
 
@@ -35,10 +35,10 @@ def test_of_a_limit_that_many_videos_have_one_is_told() -> None:
     assert sentence.startswith("u (and two other videos alike): Frames are 2 s apart")
 
 
-def test_clips_of_one_recording_are_put_on_one_clock() -> None:
+def test_times_of_clips_of_one_recording_are_counted_from_their_first_frames() -> None:
     clips = [_tracks("v", 0.04), _tracks("w", 0.04, start=1.0)]
-    assert _on_one_clock(clips) is clips
-    for one in _on_one_clock([*clips, _tracks("x", 0.04, start=60.0)]):
+    assert _from_first_frames(clips) is clips
+    for one in _from_first_frames([*clips, _tracks("x", 0.04, start=60.0)]):
         np.testing.assert_allclose(one.times, 0.04 * np.arange(40.0), atol=1e-9)
 
 

@@ -61,6 +61,14 @@ def test_a_model_may_believe_something_of_one_material_and_of_one_wall(tmp_path:
     }
 
 
+def test_a_person_may_write_the_ends_of_a_wall_in_either_order(tmp_path: Path) -> None:
+    path = tmp_path / "model.toml"
+    table = '[parameters."wall_restitution[1.20,-0.6, -1.1234567,0]"]\nprior_mean = -0.5\n'
+    path.write_text(f'name = "a"\neffects = ["air_drag"]\n{table}[parameters.wall_restitution]\nprior_sd = 0.05\n')
+    believed = PhysicsModel.read(path).believed(WALL_RESTITUTION, Wall(-1.1234567, 0.0, 1.2, -0.6).place)
+    assert (believed.prior.mean, believed.prior.sd) == (-0.5, 0.05)
+
+
 def test_every_effect_of_the_catalogue_can_be_named(tmp_path: Path) -> None:
     names = sorted(known_effects())
     assert {"dry_friction", "air_drag", "angular_drag", "normal_impact"} <= set(names)
@@ -87,6 +95,8 @@ def test_every_effect_of_the_catalogue_can_be_named(tmp_path: Path) -> None:
         ('name = "a"\neffects = ["air_drag"]\n[parameters.air_drag]\nshape = 1', "air_drag.shape' is not known"),
         ('name = "a"\neffects = ["air_drag"]\n[parameters."air_drag[metal]"]', "is of no material or wall"),
         ('name = "a"\neffects = ["air_drag"]\n[parameters."wall_restitution[1, 2"]', "belongs to none"),
+        ('name = "a"\neffects = ["air_drag"]\n[parameters."wall_restitution[1, 2, 3]"]', "name the wall by its ends"),
+        ('name = "a"\neffects = ["air_drag"]\n[parameters."wall_restitution[1, 2, 3, 4, 5]"]', "by its ends"),
     ],
 )
 def test_mistakes_name_file_and_field(tmp_path: Path, content: str, message: str) -> None:

@@ -32,7 +32,7 @@ from vrdp_prob.models.physics import PhysicsModel
 from vrdp_prob.models.simulator.rollout import compile_model
 from vrdp_prob.progress import ProgressDisplay
 from vrdp_prob.report.wording import counted, listed
-from vrdp_prob.scene import Tracks
+from vrdp_prob.scene import Shape, Tracks
 
 TELLING = 2.0
 """Overdispersion of a video that is told of."""
@@ -84,9 +84,9 @@ def discover(
     looked_for = _catalogue(physics, catalogue)
     own = None if checkpoint is None else Checkpoint(checkpoint, _facts(videos, physics, looked_for, seed))
     compile_model(physics)
-    on_one_clock = _on_one_clock(videos)
+    timed = videos if _reads_stamps((*physics.effects, *looked_for)) else _from_first_frames(videos)
     with several_processes(processes), journal(own):
-        fit = fit_together(on_one_clock, model=physics, seed=seed, model_error=False, progress=progress)
+        fit = fit_together(timed, model=physics, seed=seed, model_error=False, progress=progress)
         outcome = outcome_of(fit, looked_for, seed=seed, progress=progress)
         if outcome.verdict is Verdict.UNKNOWN and not outcome.found.best.causes:
             better = fit.with_other_courses(seed=seed) if explained(fit.fits) else fit
@@ -109,7 +109,7 @@ def discover(
             *mass_scale_notes(_told(found, causes), videos),
             *_limits(videos),
             *_not_asked(videos),
-            *([] if on_one_clock is videos else [COUNTED_ANEW]),
+            *([] if timed is videos else [COUNTED_ANEW]),
         ),
         figures=residual_figures(
             found.base.fit,
@@ -126,8 +126,12 @@ def discover(
 def _not_asked(videos: Sequence[Tracks]) -> list[str]:
     """What is asked of no video because some do not tell it, in sentences."""
     notes = []
-    untold = [tracks.video for tracks in videos if not tracks.turning_told]
-    if 0 < len(untold) < len(videos):
+    untold = [
+        tracks.video
+        for tracks in videos
+        if not tracks.turning_told and any(body.shape is not Shape.SPHERE for body in tracks.bodies)
+    ]
+    if untold and any(tracks.turning_told for tracks in videos):
         notes.append(
             f"Whether the motion depends on spin is not asked, since {some(untold)} "
             f"{'does' if len(untold) == 1 else 'do'} not tell the angles of all bodies that can turn; the other videos "
@@ -141,7 +145,13 @@ def _not_asked(videos: Sequence[Tracks]) -> list[str]:
     return notes
 
 
-def _on_one_clock(videos: Sequence[Tracks]) -> Sequence[Tracks]:
+def _reads_stamps(effects: Sequence[Effect]) -> bool:
+    """Whether an effect of the user's own may depend on what time it is, and not on how long a video has run."""
+    ours = set(known_effects().values())
+    return any(type(effect) not in ours and not effect.reads_video_start for effect in effects)
+
+
+def _from_first_frames(videos: Sequence[Tracks]) -> Sequence[Tracks]:
     """Videos with their times counted from their first frames, where they begin further apart than one is long.
 
     When something happened once in a video is believed to be while that video lasts.

@@ -94,7 +94,7 @@ class ErrorRatio:
     ratio
         Of the video in the middle, half of the others being better.
     q025, q975
-        Ends of its 95 % interval over videos.
+        Ends of its 95 % interval over videos; NaN where too few videos tell of it.
     """
 
     ratio: float

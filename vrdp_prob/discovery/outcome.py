@@ -77,7 +77,8 @@ def outcome_of(fit: SharedFit, catalogue: Sequence[Effect], *, seed: int, progre
     causes = _in_order([*_causes(found, {}, seed), *not_named])
     if verdict is Verdict.UNKNOWN:
         causes = [replace(one, probability=(1 - MIMIC) * one.probability) for one in causes]
-    gained = _gain(found.base, found.best, found.overdispersion) if found.best.causes else None
+    without = found.lesser[0] if len(found.best.causes) == 1 else found.base
+    gained = _gain(without, found.best, found.overdispersion) if found.best.causes else None
     return Outcome(found, checks, after, verdict, tuple(causes), gained, tuple(reasons), unlisted)
 
 

@@ -224,12 +224,15 @@ def _with_model_error(
 ) -> tuple[Explained, Misfit, bool]:
     """The explanation under a density that allows for what the model lacks, where it lacks something.
 
-    And whether all orders of contacts that this leaves open were tried.
+    And whether all orders of contacts that this leaves open were tried. An error that a fit was to allow for, and of
+    which its residuals then show nothing, is none, unless they were large without it.
     """
     likelihood, structure, found = explained.likelihood, explained.structure, explained.found
-    evaluations, complete = explained.evaluations, True
-    for _ in range(TURNS):
+    evaluations, complete, before = explained.evaluations, True, misfit
+    for turn in range(TURNS):
         error = next_model_error(likelihood, found[0].point, clues, misfit)
+        if turn == 1 and error is likelihood.model_error and not before.large:
+            return replace(explained, evaluations=evaluations), before, True
         if error is None or error is likelihood.model_error:
             break
         tracks, model = likelihood.tracks, likelihood.model

@@ -27,7 +27,8 @@ from typing import Any
 from vrdp_prob.errors import InputError
 from vrdp_prob.models import effects as catalogue
 from vrdp_prob.models.effects.effect import Effect
-from vrdp_prob.models.parameters import MATTER, WALL_RESTITUTION, Parameter, Scope, plain_name
+from vrdp_prob.models.parameters import MATTER, WALL_RESTITUTION, Parameter, Scope, belief_key, plain_name
+from vrdp_prob.scene import Wall
 
 _NUMBERS = ("default", "prior_mean", "prior_sd")
 
@@ -84,7 +85,10 @@ def parse(content: str) -> tuple[str, tuple[Effect, ...], dict[str, Parameter]]:
     tables = document.get("parameters", {})
     if not isinstance(tables, dict):
         raise InputError("field 'parameters' must hold one table for each parameter.")
-    return name, effects, {key: _belief(key, table, stated) for key, table in tables.items()}
+    beliefs: dict[str, Parameter] = {}
+    for key, table in sorted(tables.items(), key=lambda one: plain_name(one[0]) != one[0]):  # those of all first
+        beliefs[_key(key)] = _belief(key, table, {name: beliefs.get(name, one) for name, one in stated.items()})
+    return name, effects, beliefs
 
 
 def _reference(effect: Effect) -> str:
@@ -114,6 +118,18 @@ def _effect_of_module(module: str, name: str) -> Effect:
     if not (isinstance(found, type) and issubclass(found, Effect)):
         raise InputError(f"effect '{module}:{name}' is no subclass of Effect; name a class that is.")
     return found()
+
+
+def _key(name: str) -> str:
+    """By what a belief is looked up: that of a wall by its ends as every file has them."""
+    plain = plain_name(name)
+    if plain != WALL_RESTITUTION.name or plain == name:
+        return name
+    try:
+        x1, y1, x2, y2 = map(float, name.removeprefix(f"{plain}[").removesuffix("]").split(","))
+    except ValueError as error:
+        raise InputError(f"field 'parameters.{name}': name the wall by its ends: {plain}[x1, y1, x2, y2].") from error
+    return belief_key(plain, Wall(x1, y1, x2, y2).place)
 
 
 def _belief(name: str, table: Any, stated: Mapping[str, Parameter]) -> Parameter:

@@ -196,7 +196,8 @@ def group_words(group: Group) -> str:
 
 def belief_key(name: str, group: Group) -> str:
     """What is believed of a parameter of one of several things is told by this: `material_friction_ratio[metal]`."""
-    return f"{name}[{group_words(group)}]" if group else name
+    parts = (part if isinstance(part, str) else repr(part) for part in group)
+    return f"{name}[{', '.join(parts)}]" if group else name
 
 
 def plain_name(key: str) -> str:

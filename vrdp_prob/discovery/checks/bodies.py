@@ -12,6 +12,7 @@ import numpy as np
 from jaxtyping import Float
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
+from scipy.special import expit
 
 from vrdp_prob.discovery.checks.flight import SEEN
 from vrdp_prob.discovery.checks.scatter_regression import Dependence, dependence
@@ -21,7 +22,7 @@ from vrdp_prob.discovery.residuals.free_flight import FRICTION, NORMAL_95
 from vrdp_prob.discovery.residuals.residual_model import ResidualModel
 from vrdp_prob.discovery.words import number, opposite
 from vrdp_prob.inference.several_videos.fitting import SharedFit
-from vrdp_prob.models.parameters import MASS, RESTITUTION
+from vrdp_prob.models.parameters import MASS, RESTITUTION, Prior
 from vrdp_prob.scene import Body, Shape
 
 REBOUND = "restitution against approach speed"
@@ -60,10 +61,11 @@ class OwnValues:
             root = local.root[mine]
             believed = np.array([1 / entries[k].prior.sd ** 2 for k in mine])
             expected = np.array([entries[k].prior.mean for k in mine])
-            both = np.linalg.inv(root @ root.T)
+            edge, curvature = _edges([entries[k].prior for k in mine], local.centre[mine])
+            both = np.linalg.inv(root @ root.T) - np.diag(curvature)
             own, directions = np.linalg.eigh(both - np.diag(believed))
             alone = (directions / (np.maximum(own, 0.0) + 1 / OPEN**2)) @ directions.T
-            pull = both @ (local.centre[mine] - expected)
+            pull = both @ (local.centre[mine] - expected) + edge
             values += (expected + alone @ pull).tolist()
             blocks.append(alone)
             bodies += [(index, int(entries[k].owner or 0)) for k in mine]
@@ -73,6 +75,17 @@ class OwnValues:
             covariance[first : first + len(block), first : first + len(block)] = block
             first += len(block)
         return cls(np.array(values), covariance, tuple(bodies))
+
+
+def _edges(
+    priors: Sequence[Prior], values: Float[np.ndarray, "number"]
+) -> tuple[Float[np.ndarray, "number"], Float[np.ndarray, "number"]]:
+    """First derivative of the negative log priors' soft edges, and the curvature that a fit has of them."""
+    upper = np.array([np.inf if prior.upper is None else prior.upper for prior in priors])
+    beyond = (values - upper) / np.array([prior.softness for prior in priors])
+    slope = expit(beyond) / np.array([prior.softness for prior in priors])
+    height = 2 * np.logaddexp(0.0, beyond)
+    return slope, np.divide(slope**2, height, out=np.zeros_like(slope), where=height > 0)
 
 
 @dataclass(frozen=True)

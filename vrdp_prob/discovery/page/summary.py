@@ -36,8 +36,8 @@ def verdict_sentence(finding: Finding) -> str:
     if finding.named:
         verb = "show" if all(cause.probability >= SURE for cause in finding.named) else "suggest"
         found = ", and ".join(f"that {_clause(cause.sentence)}" for cause in finding.named)
-        least = min(cause.probability for cause in finding.named)
-        others = [cause for cause in possible(finding) if cause.probability >= least]
+        alone = finding.named[0] if len(finding.named) == 1 else None
+        others = [one for one in possible(finding) if alone is not None and one.probability >= alone.probability]
         found += "".join(f", or, no less likely, that {_clause(cause.sentence)}" for cause in others)
         rest = ", and something else that no cause of the catalogue explains" if _leaves_a_rest(finding) else ""
         return f"{sentence(videos)} {verb} {found}{rest}."

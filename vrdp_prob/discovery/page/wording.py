@@ -105,8 +105,9 @@ def _with_error(value: float, error: float) -> str:
 
 
 def ratio_words(ratio: ErrorRatio) -> str:
-    """An error as a share of that before, with its 95 % interval: `0.29 (0.21 to 0.43)`."""
-    return f"{number(ratio.ratio)} ({number(ratio.q025)} to {number(ratio.q975)})"
+    """An error as a share of that before, with its 95 % interval where there is one: `0.29 (0.21 to 0.43)`."""
+    interval = "" if math.isnan(ratio.q025) else f" ({number(ratio.q025)} to {number(ratio.q975)})"
+    return f"{number(ratio.ratio)}{interval}"
 
 
 def told_gains(finding: Finding) -> list[tuple[str, Gain]]:

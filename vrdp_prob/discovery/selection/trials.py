@@ -145,18 +145,20 @@ class Trial:
         left = self.fit.model.without_effect(last).with_effect(score.effect, self.fit.tracks)
         choices = {name: one for name, one in self.choices.items() if name != last.name}
         try:
-            fit = self.fit.under(
-                left,
-                start=score.start,
-                held=self._held_without(last),
-                least=least,
-                effort=FIRST,
-                model_error=False,
+            fit = with_own_population(
+                self.fit.under(
+                    left,
+                    start=score.start,
+                    held=self._held_without(last),
+                    least=least,
+                    effort=FIRST,
+                    model_error=False,
+                )
             )
         except ImpossibleStartError:
             return None
         causes = (*self.causes[:-1], score.effect)
-        return replace(self, causes=causes, fit=with_own_population(fit), choices=choices)
+        return replace(self, causes=causes, fit=fit, choices=choices)
 
     def _with_lasting(self, score: CauseScore) -> "Trial":
         """The fit with an effect that acts on all videos."""

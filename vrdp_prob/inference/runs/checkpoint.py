@@ -69,9 +69,10 @@ def model_facts(model: PhysicsModel) -> dict[str, str]:
 
 
 def effects_facts(effects: Sequence[Effect]) -> dict[str, str]:
-    """The modules of effects that are not of this package, in short texts by name."""
+    """The modules that define effects and are not of this package, in short texts by name; not what they import."""
     found = {}
-    for name in sorted({type(effect).__module__ for effect in effects}):
+    kinds = {kind for effect in effects for kind in type(effect).__mro__ if issubclass(kind, Effect)}
+    for name in sorted({kind.__module__ for kind in kinds}):
         file = getattr(sys.modules.get(name), "__file__", None)
         if file is not None and name.split(".")[0] != PACKAGE.name:
             found[f"module {name}"] = sha256(Path(file).read_bytes()).hexdigest()

@@ -252,7 +252,8 @@ def fit_together(
     plan
         Stages in which each video is fitted by itself, and the optimiser that climbs for each and for all together;
         `FitPlan()` where None, with one attempt for each video and no search for yaws without a model error. What
-        is made of the fit, as by `under` and `mended`, is made by Gauss-Newton.
+        is made of the fit, as by `under` and `mended`, is made by Gauss-Newton. Second looks at single videos have
+        stages of their own, and take its optimiser.
     progress
         Told how many videos are done.
 

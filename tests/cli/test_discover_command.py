@@ -90,11 +90,15 @@ def test_what_a_terminal_shows_of_named_causes(
     assert capsys.readouterr().out.splitlines()[:-3] == [
         "These 12 videos show that the table slopes by 0.15 degrees, down towards x = 0.83, y = -0.56, and that bodies "
         "that touch rub on each other, with a friction coefficient of 0.18.",
-        "  surface tilt: probability > 99 %; left-out videos: +231 ± 33 nats, error 12 to 5.9 mm (noise 3.0 mm)",
+        "  surface tilt: probability > 99 %; left-out videos: +231 ± 33 nats, error 12 to 5.9 mm (noise 3.0 mm), a "
+        "factor of 0.48 (0.40 to 0.57)",
         "      tilt x 0.00217 (95 %: 0.00188 to 0.00246)",
         f"      tilt y {MINUS}0.00147 (95 %: {MINUS}0.00176 to {MINUS}0.00117)",
-        "  contact friction: probability 94 %; left-out videos: +87 ± 12 nats, error 5.9 to 3.4 mm (noise 3.0 mm)",
+        "  contact friction: probability 94 %; left-out videos: +87 ± 12 nats, error 5.9 to 3.4 mm (noise 3.0 mm), a "
+        "factor of 0.57 (0.54 to 0.62)",
         "      contact friction 0.181 (95 %: 0.153 to 0.212)",
+        "  all named causes: left-out videos: +319 ± 68 nats, error 12 to 3.4 mm (noise 3.0 mm), a factor of 0.27 "
+        "(0.21 to 0.35)",
         "Also possible: wind (31 %).",
         "Of six checks of the residuals, two fail under the model that was given, and one fails under the extended "
         "one.",

@@ -82,7 +82,7 @@ def test_what_all_causes_bring_together_is_told_before_what_each_brings():
         "surface tilt takes it from 12 to 5.9 mm and contact friction takes it from 5.9 to 3.4 mm"
     )
     together = next(line for line in lines(named()) if line.startswith("  all named causes: left-out videos: +319"))
-    assert "error 12 to 3.4 mm, a factor of 0.27 (0.21 to 0.35)" in together
+    assert "error 12 to 3.4 mm (noise 3.0 mm), a factor of 0.27 (0.21 to 0.35)" in together
     alone = replace(named(), causes=(TILT,), gain=TILT.gain)
     assert "all named causes" not in "".join([*lines(alone), render(alone)])
 

@@ -139,7 +139,7 @@ def _carried(causes: Sequence[FoundCause]) -> list[str]:
 def _gain_line(gain: Gain) -> str:
     before, after, noise, unit = errors_words(gain)
     share = f", a factor of {ratio_words(ratio)}" if (ratio := gain.error_ratios.get("rmse")) is not None else ""
-    errors = f"error {before} to {after} {unit}{share} (noise {noise} {unit})"
+    errors = f"error {before} to {after} {unit} (noise {noise} {unit}){share}"
     return f"left-out videos: {difference_words(gain)} nats, {errors}"
 
 

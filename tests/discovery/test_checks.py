@@ -14,7 +14,6 @@ from tests.discovery.scenes import Setting
 from vrdp_prob.discovery.checks import contacts
 from vrdp_prob.discovery.checks.battery import run_checks
 from vrdp_prob.discovery.checks.bodies import OwnValues
-from vrdp_prob.discovery.checks.contacts import KICK
 from vrdp_prob.discovery.checks.flight import QUESTIONS
 from vrdp_prob.discovery.checks.measurement import GENERAL
 from vrdp_prob.discovery.finding import Check
@@ -181,13 +180,15 @@ def test_false_alarms_are_as_rare_as_stated() -> None:
 
 def test_a_kick_is_looked_for_piece_by_piece_and_nowhere_where_none_would_show(monkeypatch: pytest.MonkeyPatch) -> None:
     _, fit = fitted(seed=1)
-    whole = by_name(run_checks(fit, seed=0))[KICK]
+    model = ResidualModel.of(fit).without_beliefs
+    replicas = FreeFlight.of(model).beside.replicas(50, np.random.default_rng(0))
+    (whole,) = contacts._kick_without_partner(model, replicas)
     monkeypatch.setattr(contacts, "PLACES_AT_ONCE", 7)
-    pieces = by_name(run_checks(fit, seed=0))[KICK]
+    (pieces,) = contacts._kick_without_partner(model, replicas)
     assert pieces.sentence == whole.sentence
     assert pieces.p_value == pytest.approx(whole.p_value, rel=1e-6)
     monkeypatch.setattr(contacts, "_shows", lambda *_: False)
-    assert KICK not in by_name(run_checks(fit, seed=0))
+    assert not list(contacts._kick_without_partner(model, replicas))
 
 
 def test_what_was_believed_of_bodies_is_no_observation() -> None:

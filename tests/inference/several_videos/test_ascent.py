@@ -9,7 +9,7 @@ import pytest
 
 from tests.inference.several_videos.videos import sliding
 from vrdp_prob.inference.search.least_squares import jacobian
-from vrdp_prob.inference.several_videos import ascent
+from vrdp_prob.inference.several_videos import ascent, joint_fit
 from vrdp_prob.inference.several_videos.arrow import Expansion
 from vrdp_prob.inference.several_videos.linking import LinkedVideo, SharedNumbers
 from vrdp_prob.models.coordinates import Coordinate, Coordinates
@@ -59,7 +59,7 @@ def grazing() -> tuple[SharedNumbers, Grazing]:
 
 
 def climbed(monkeypatch: pytest.MonkeyPatch) -> ascent.JointFit:
-    monkeypatch.setattr(ascent, "expand", expand)
+    monkeypatch.setattr(joint_fit, "expand", expand)
     numbers, video = grazing()
     return ascent.climb(numbers, [video], np.zeros(1), [np.array([-0.52, -0.48])])
 

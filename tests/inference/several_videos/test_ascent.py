@@ -85,7 +85,7 @@ def test_others_do_not_follow_a_step_that_one_video_hinders(monkeypatch: pytest.
         return np.array([3.0, 0.0]) if hindered and index else own  # where bodies that met do not
 
     monkeypatch.setattr(ascent._Ridges, "end", end)
-    state = ascent._State.at(videos, np.zeros(1), [np.array([-3.0, -0.4])] * 2)
+    state = ascent.State.at(videos, np.zeros(1), [np.array([-3.0, -0.4])] * 2)
     found = ascent._improved(numbers, ascent._Ridges(videos), state, np.array([2.0]), 1.0)
     assert (found is state) == hindered
     assert [share for index, share in followed if index == 0] == [2.0]

@@ -79,7 +79,7 @@ class NoCommonWorldError(ImpossibleStartError, InputError):
 
 
 @dataclass(frozen=True)
-class _State:
+class State:
     """Where a climb is: shared numbers, those of each video, and the log density of each video."""
 
     shared: Float[np.ndarray, "shared"]
@@ -92,11 +92,18 @@ class _State:
         videos: Sequence[LinkedVideo],
         shared: Float[np.ndarray, "shared"],
         locals_: Sequence[Float[np.ndarray, "_"]],
-    ) -> "_State":
+    ) -> "State":
+        """That of some numbers."""
         values = (video.value(shared, local) for video, local in zip(videos, locals_, strict=True))
         return cls(shared, tuple(locals_), tuple(values))
 
+    def impossible(self, videos: Sequence[LinkedVideo]) -> ImpossibleStartError:
+        """What is raised where nothing can begin here: it names the videos that cannot be simulated."""
+        values = zip(videos, self.values, strict=True)
+        return ImpossibleStartError(", ".join(video.name for video, value in values if not np.isfinite(value)))
+
     def total(self, numbers: SharedNumbers) -> float:
+        """Joint log posterior (nats, up to a constant)."""
         return float(numbers.log_prior(self.shared[None])[0]) + sum(self.values)
 
 
@@ -161,10 +168,9 @@ def climb(
     """
     if least is not None:
         locals_ = in_parallel(lambda index: settle(videos[index], shared, [locals_[index]]), range(len(videos)))
-    state, converged = _with_best_noise(numbers, videos, _State.at(videos, shared, locals_)), False
+    state, converged = _with_best_noise(numbers, videos, State.at(videos, shared, locals_)), False
     if not state.total(numbers) > (-np.inf if least is None else least):
-        values = zip(videos, state.values, strict=True)
-        raise ImpossibleStartError(", ".join(video.name for video, value in values if not np.isfinite(value)))
+        raise state.impossible(videos)
     slopes = expand_all(numbers, videos, state.shared, state.locals)
     if towards is not None and not np.array_equal(towards, shared):
         settled = _settled(videos, state, slopes.videos)
@@ -214,7 +220,7 @@ def smooth(slopes: Expansions) -> Expansions:
     return Expansions(slopes.prior, inside) if inside else slopes
 
 
-def _gained(trial: _State, state: _State, chosen: Bool[np.ndarray, "video"]) -> float:
+def _gained(trial: State, state: State, chosen: Bool[np.ndarray, "video"]) -> float:
     """What some of the videos have gained; as long as those at an edge gain much they would follow no common step."""
     return float((np.array(trial.values) - np.array(state.values))[chosen].sum())
 
@@ -222,12 +228,12 @@ def _gained(trial: _State, state: _State, chosen: Bool[np.ndarray, "video"]) -> 
 def _improved(
     numbers: SharedNumbers,
     ridges: _Ridges,
-    state: _State,
+    state: State,
     step: Float[np.ndarray, "shared"],
     expected: float = np.inf,
     *,
     around: Sequence[Expansion] | None = None,
-) -> _State:
+) -> State:
     """The first share of a common step that brings something; where none does, the state itself.
 
     What one video loses with a share by far more than is `expected` of the step is looked at first with the next one.
@@ -249,13 +255,13 @@ def _improved(
 
 def _followed(
     ridges: _Ridges,
-    state: _State,
+    state: State,
     target: Float[np.ndarray, "shared"],
     around: Sequence[Expansion] | None,
     *,
     first: Sequence[int],
     most: float,
-) -> _State | None:
+) -> State | None:
     """The state at other shared numbers, every video on its ridge; None where those that come first lose too much.
 
     A video whose best own numbers are at an edge, where a contact just happens, leaves its ridge with the first step;
@@ -275,10 +281,10 @@ def _followed(
         return None
     rest = [index for index in range(len(ridges.videos)) if index not in locals_]
     locals_ |= zip(rest, in_parallel(found, rest), strict=True)
-    return _State.at(ridges.videos, target, [locals_[index] for index in range(len(ridges.videos))])
+    return State.at(ridges.videos, target, [locals_[index] for index in range(len(ridges.videos))])
 
 
-def _across_edges(videos: Sequence[LinkedVideo], state: _State, expansions: Sequence[Expansion]) -> _State:
+def _across_edges(videos: Sequence[LinkedVideo], state: State, expansions: Sequence[Expansion]) -> State:
     """The state with each video whose own Newton step promised something at the best of a cloud around it."""
 
     def best(index: int) -> Float[np.ndarray, "_"]:
@@ -288,7 +294,7 @@ def _across_edges(videos: Sequence[LinkedVideo], state: _State, expansions: Sequ
         found = _best_of_cloud(video, state.shared, own, expansion.local_root, own)
         return found if video.value(state.shared, found) > state.values[index] else own
 
-    return _State.at(videos, state.shared, in_parallel(best, range(len(videos))))
+    return State.at(videos, state.shared, in_parallel(best, range(len(videos))))
 
 
 def _best_of_cloud(
@@ -305,7 +311,7 @@ def _best_of_cloud(
     return settle(video, shared, [known, *cloud[promising]])
 
 
-def _settled(videos: Sequence[LinkedVideo], state: _State, expansions: Sequence[Expansion]) -> _State:
+def _settled(videos: Sequence[LinkedVideo], state: State, expansions: Sequence[Expansion]) -> State:
     """Each video at the best that its own Newton step leads to."""
     locals_, values = [], []
     for video, local, value, one in zip(videos, state.locals, state.values, expansions, strict=True):
@@ -346,7 +352,7 @@ def _values(
     return video.log_density(np.tile(shared, (len(locals_), 1)), locals_)
 
 
-def _with_best_noise(numbers: SharedNumbers, videos: Sequence[LinkedVideo], state: _State) -> _State:
+def _with_best_noise(numbers: SharedNumbers, videos: Sequence[LinkedVideo], state: State) -> State:
     """The state with the most probable sizes of the noise for its worlds."""
     locals_ = []
     for video, local in zip(videos, state.locals, strict=True):
@@ -356,7 +362,7 @@ def _with_best_noise(numbers: SharedNumbers, videos: Sequence[LinkedVideo], stat
         locals_.append(video.split(best_noise(video.data, point, own))[1] if own.any() else local)
     columns = np.flatnonzero([field in NOISE_FIELDS for field, _ in numbers.keys])
     shared = _best_shared_noise(numbers, videos, state.shared, locals_, columns) if len(columns) else state.shared
-    found = _State.at(videos, shared, locals_)
+    found = State.at(videos, shared, locals_)
     return found if found.total(numbers) > state.total(numbers) else state
 
 

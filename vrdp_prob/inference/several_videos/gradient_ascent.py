@@ -16,7 +16,7 @@ from vrdp_prob.inference.draws.samples import evaluate_with_gradient
 from vrdp_prob.inference.runs.parallel import in_parallel
 from vrdp_prob.inference.search.descent import FAILED
 from vrdp_prob.inference.several_videos.arrow import ArrowGaussian
-from vrdp_prob.inference.several_videos.ascent import EXPECTED, TOLERANCE, ImpossibleStartError, smooth
+from vrdp_prob.inference.several_videos.ascent import EXPECTED, TOLERANCE, State, smooth
 from vrdp_prob.inference.several_videos.joint_fit import JointFit, expand_all
 from vrdp_prob.inference.several_videos.linking import LinkedVideo, SharedNumbers
 
@@ -107,11 +107,10 @@ def climb_by_gradient(
     ImpossibleStartError
         If a video has no world at the start.
     """
-    values = [video.value(shared, own) for video, own in zip(videos, locals_, strict=True)]
-    if not np.isfinite(values).all():
-        failing = (video.name for video, value in zip(videos, values, strict=True) if not np.isfinite(value))
-        raise ImpossibleStartError(", ".join(failing))
-    value = float(numbers.log_prior(shared[None])[0]) + sum(values)
+    state = State.at(videos, shared, locals_)
+    value = state.total(numbers)
+    if not np.isfinite(value):
+        raise state.impossible(videos)
     slopes, ended = expand_all(numbers, videos, shared, locals_), False
     for _ in range(SEARCHES):
         gaussian = slopes.gaussian(shared, locals_, numbers.logarithms)

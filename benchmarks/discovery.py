@@ -144,9 +144,9 @@ def outcome(finding: Finding, truth: Truth) -> Result:
 
 
 def _bounds(finding: Finding, truth: Truth) -> Iterator[Result]:
-    """Upper bounds of what was hidden and is not told of, each beside how much of it there was."""
+    """Upper bounds of strengths that were hidden and are not told of, each beside how much of it there was."""
     hidden = {cause.name for cause in truth.causes}
-    for bound in (one for one in finding.upper_bounds if one.name in hidden):
+    for bound in (one for one in finding.upper_bounds if one.name in hidden and one.measure is None):
         asked = {bound.parameter: 0.0} | ({} if isinstance(bound.vanishes_at, float) else {bound.vanishes_at: 0.0})
         true = true_values(truth, asked)
         nothing = bound.vanishes_at if isinstance(bound.vanishes_at, float) else true.get(bound.vanishes_at)

@@ -27,6 +27,7 @@ from vrdp_prob.models.effects.clock_error import ClockError
 from vrdp_prob.models.effects.contact_friction import ContactFriction
 from vrdp_prob.models.effects.effect import Effect
 from vrdp_prob.models.effects.external_impulse import ExternalImpulse
+from vrdp_prob.models.effects.hidden_obstacle import HiddenObstacle
 from vrdp_prob.models.effects.linear_drag import LinearDrag
 from vrdp_prob.models.effects.slip_to_roll import SlipToRoll
 from vrdp_prob.models.effects.surface_tilt import SurfaceTilt
@@ -194,6 +195,14 @@ def test_a_kick_may_be_as_large_as_where_it_would_fit_best() -> None:
 def test_what_has_no_score_has_no_bound(cause: Effect, strength: str) -> None:
     unit = next(one.unit for one in cause.parameters if one.name == strength)
     assert upper_bounds(cause, None)[0] == UpperBound(cause.name, strength, None, unit, told=0)
+
+
+@pytest.mark.parametrize("cause", [Wall(), HiddenObstacle()], ids=lambda cause: cause.name)
+def test_what_stands_in_the_way_is_bounded_by_where_bodies_were(cause: Effect) -> None:
+    videos = fitted(seed=1)[1].tracks
+    bounds = upper_bounds(cause, None, videos=videos)
+    assert {bound.parameter: bound.bound for bound in bounds} == {n: one.size for n, one in cause.unmet(videos).items()}
+    assert all(bound.measure and bound.unit == "m" for bound in bounds)
 
 
 def test_of_several_places_the_largest_bound_counts_and_what_says_nothing_does_not() -> None:

@@ -200,11 +200,12 @@ def _bounds(found: Search, told: Sequence[FoundCause]) -> list[UpperBound]:
     estimated = {cause.name for cause in told}
     scores = {score.effect.name: score for score in found.left.beside_chance}
     left = sorted(found.refits.catalogue, key=lambda effect: effect.name not in scores)
+    widening, videos = float(np.sqrt(found.overdispersion.mean())), found.base.fit.tracks
     return [
         bound
         for effect in left
         if effect.cause_name() not in estimated
-        for bound in upper_bounds(effect, scores.get(effect.name), widening=float(np.sqrt(found.overdispersion.mean())))
+        for bound in upper_bounds(effect, scores.get(effect.name), widening=widening, videos=videos)
     ]
 
 

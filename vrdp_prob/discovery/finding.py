@@ -242,6 +242,9 @@ class UpperBound:
         anything: nobody was at the others.
     way
         Name of the effect that has the parameter, where that is a further way in which the cause acts.
+    measure
+        What is bounded where that is not how far the parameter is from where the cause does nothing: of something in
+        the way, how large it may be without that any body has met it.
     """
 
     name: str
@@ -252,6 +255,7 @@ class UpperBound:
     places: int = 1
     told: int = 1
     way: str | None = None
+    measure: str | None = None
 
 
 @dataclass(frozen=True)

@@ -219,7 +219,9 @@ def _bounds(finding: Finding) -> list[dict[str, Any]]:
             "rows": [
                 {
                     "name": bound.parameter,
-                    "words": sentence(parameter_words(bound.parameter, effect_of(way or name, finding.extended))),
+                    "words": sentence(
+                        bound.measure or parameter_words(bound.parameter, effect_of(way or name, finding.extended))
+                    ),
                     "bound": bound_words(bound),
                     "is_known": bound.bound is not None,
                 }

@@ -169,11 +169,10 @@ def _failing(checks: Sequence[Check]) -> str:
 
 
 def _bounds(bounds: Sequence[UpperBound]) -> list[str]:
-    names = dict.fromkeys(bound.name for bound in bounds)
+    words = {bound: f"{bound.measure or title(bound.parameter)} {bound_words(bound)}" for bound in bounds}
     return [
-        f"  {title(name)}: "
-        + ", ".join(f"{title(bound.parameter)} {bound_words(bound)}" for bound in bounds if bound.name == name)
-        for name in names
+        f"  {title(name)}: {', '.join(told for bound, told in words.items() if bound.name == name)}"
+        for name in dict.fromkeys(bound.name for bound in bounds)
     ]
 
 

@@ -1,7 +1,7 @@
 """What a fit says of the parameters of a cause, in their units, and how large a cause may be that was not named."""
 
 import math
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 import numpy as np
 from jaxtyping import Float
@@ -172,8 +172,12 @@ def _unit(unit: str) -> str:
     return "" if unit == "1" else unit
 
 
-def upper_bounds(effect: Effect, score: CauseScore | None, *, widening: float = 1.0) -> list[UpperBound]:
+def upper_bounds(
+    effect: Effect, score: CauseScore | None, *, widening: float = 1.0, videos: Sequence[Tracks] = ()
+) -> list[UpperBound]:
     """How large the strengths of a cause may be (95 %), at the place where most could have hidden.
+
+    What stands in the way has no strength: of that it is said how large it may be without that any body has met it.
 
     Parameters
     ----------
@@ -183,7 +187,14 @@ def upper_bounds(effect: Effect, score: CauseScore | None, *, widening: float = 
         What the residuals say of it; None where they say nothing, or it has no strength (a wall has none).
     widening
         Factor by which standard deviations are larger than the residuals say.
+    videos
+        What was seen; nothing is said of what stands in the way where there are none.
     """
+    if videos and effect.overrides("unmet"):
+        return [
+            UpperBound(effect.cause_name(), name, one.size, "m", way=effect.way(), measure=one.words)
+            for name, one in effect.unmet(videos).items()
+        ]
     names = dict.fromkeys([*effect.vanishes_at, *effect.vanishes_like]) or [effect.parameters[0].name]
     units = {parameter.name: parameter.unit for parameter in effect.parameters}
     largest = {name: (score.largest if score else {}).get(name, Largest(None, 1, 0)) for name in names}

@@ -18,6 +18,7 @@ from typing import ClassVar
 from jaxtyping import Float
 from torch import Tensor
 
+from vrdp_prob.models.effects.unmet import Unmet
 from vrdp_prob.models.parameters import Parameter
 from vrdp_prob.models.simulator.formula import Scalar
 from vrdp_prob.models.simulator.obstacle import Obstacle
@@ -172,6 +173,13 @@ class Effect:
         """
         return {}
 
+    def unmet(self, videos: Sequence[Tracks]) -> Mapping[str, Unmet]:
+        """How large what stands in the way may be and no body has met it, by the names of parameters.
+
+        For an effect that has no strength, but which a body feels that comes where it is.
+        """
+        return {}
+
     def acceleration(self, time: Scalar, body: BodyView, parameters: Mapping[str, Scalar]) -> tuple[Scalar, Scalar]:
         """Acceleration of a body in m/s^2, dry friction apart."""
         return 0.0, 0.0
@@ -282,7 +290,7 @@ class Effect:
         return positions
 
 
-_OF_THE_SEARCH = ("search_points", "expected")
+_OF_THE_SEARCH = ("search_points", "expected", "unmet")
 
 
 def _hooks() -> list[str]:

@@ -9,6 +9,7 @@ from torch import Tensor
 
 from vrdp_prob.models.effects.effect import Effect
 from vrdp_prob.models.effects.places import Region
+from vrdp_prob.models.effects.unmet import Unmet, largest_disc
 from vrdp_prob.models.parameters import Parameter, Prior, Transform, restitution_parameter
 from vrdp_prob.models.simulator.obstacle import Obstacle
 from vrdp_prob.scene import Tracks
@@ -38,6 +39,10 @@ class HiddenObstacle(Effect):
         """The obstacle is somewhere where bodies were seen, and small beside that."""
         region = Region.of(videos)
         return region.expected(OBSTACLE_X, OBSTACLE_Y, REACH) | region.expected_size(OBSTACLE_RADIUS, SIZE)
+
+    def unmet(self, videos: Sequence[Tracks]) -> Mapping[str, Unmet]:
+        """A disc is met by all that pass within its radius."""
+        return {OBSTACLE_RADIUS.name: largest_disc(videos)}
 
     def obstacles(self, parameters: Mapping[str, Float[Tensor, "..."]]) -> Sequence[Obstacle]:
         """The disc."""

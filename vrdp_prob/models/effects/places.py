@@ -113,8 +113,25 @@ def _bounds(videos: Sequence[Tracks]) -> tuple[Float[np.ndarray, "2"], Float[np.
     return paths.min(axis=0), paths.max(axis=0)
 
 
+def paths_of_bodies(videos: Sequence[Tracks]) -> list[tuple[float, Float[np.ndarray, "place 2"]]]:
+    """Radius and path in m of each body of each video: a radius that nobody states is 0, and no outlier counts.
+
+    Each place is that in the middle of those around it.
+    """
+    return [
+        (body.radius or 0.0, _without_outliers(tracks.positions[tracks.seen[:, index], index]))
+        for tracks in videos
+        for index, body in enumerate(tracks.bodies)
+        if tracks.seen[:, index].any()
+    ]
+
+
+def _without_outliers(path: Float[np.ndarray, "place 2"]) -> Float[np.ndarray, "place 2"]:
+    """A path of which each place is that in the middle of those around it."""
+    smooth: np.ndarray = median_filter(path, size=(AROUND, 1), mode="mirror") if len(path) > AROUND else path
+    return smooth
+
+
 def _paths(videos: Sequence[Tracks]) -> Float[np.ndarray, "place 2"]:
-    """Where bodies were seen in m, each place that in the middle of those around it, so that no outlier counts."""
-    seen = [tracks.positions[tracks.seen[:, body], body] for tracks in videos for body in range(len(tracks.bodies))]
-    around = [median_filter(path, size=(AROUND, 1), mode="mirror") if len(path) > AROUND else path for path in seen]
-    return np.concatenate(around)
+    """Where bodies were seen in m."""
+    return np.concatenate([path for _, path in paths_of_bodies(videos)])

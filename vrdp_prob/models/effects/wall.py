@@ -9,6 +9,7 @@ from torch import Tensor
 
 from vrdp_prob.models.effects.effect import Effect
 from vrdp_prob.models.effects.places import Region
+from vrdp_prob.models.effects.unmet import Unmet, deepest_wall
 from vrdp_prob.models.parameters import Parameter, Prior, Transform, restitution_parameter
 from vrdp_prob.models.simulator.obstacle import Obstacle
 from vrdp_prob.scene import Tracks
@@ -53,6 +54,10 @@ class Wall(Effect):
     def expected(self, videos: Sequence[Tracks]) -> Mapping[str, Parameter]:
         """The wall is somewhere in or around the region where bodies were seen."""
         return Region.of(videos).expected_distance(WALL_DISTANCE, REACH)
+
+    def unmet(self, videos: Sequence[Tracks]) -> Mapping[str, Unmet]:
+        """No path goes through a wall."""
+        return {WALL_DISTANCE.name: deepest_wall(videos)}
 
     def obstacles(self, parameters: Mapping[str, Float[Tensor, "..."]]) -> Sequence[Obstacle]:
         """The wall."""

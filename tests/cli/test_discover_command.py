@@ -120,6 +120,7 @@ def test_what_a_terminal_shows_of_nothing_and_of_the_unknown(
     told = capsys.readouterr().out
     assert told.startswith("These 12 videos show something that no cause of the catalogue explains.\n")
     assert "  a description, not a cause: a_x = 0.041 sin(6.2 t) - 0.11 v_y; a_y = 0.11 v_x\n" in told
+    assert "  a description, not a cause: J = 0.12 J_n s\n" in told
 
 
 def test_quiet_prints_nothing(

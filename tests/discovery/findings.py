@@ -198,6 +198,8 @@ def unknown() -> Finding:
             "It swings with a period of 1.0 s and grows with speed.",
             "It points across the velocity and is the same for all bodies.",
         ),
+        "J = 0.12 J_n s",
+        0.34,
     )
     return Finding(
         Verdict.UNKNOWN,

@@ -108,6 +108,10 @@ def test_the_unknown_is_described():
     }
     assert {one["name"] for one in found["tried"]}.isdisjoint(cause["name"] for cause in found["causes"])
     assert found["description"]["formula"].startswith("a_x = ")
+    assert (found["description"]["contact_formula"], found["description"]["contact_explained"]) == (
+        "J = 0.12 J_n s",
+        0.34,
+    )
     assert to_document(nothing())["description"] is None
 
 

@@ -144,6 +144,8 @@ def test_the_unknown_is_marked_as_a_description():
     assert "A description, not a cause" in text
     assert "a_x = 0.041 sin(6.2 t) - 0.11 v_y" in text
     assert "follows 61 % of its variance in videos that were left out" in text
+    assert "J = 0.12 J_n s" in text
+    assert "missing at contacts explains 34 % of what is left beside it" in text
     assert "A description, not a cause" in text_of(render(with_a_rest()))
 
 

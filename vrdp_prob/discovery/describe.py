@@ -8,6 +8,8 @@ from jaxtyping import Float
 from vrdp_prob.discovery.checks.flight import BESIDE
 from vrdp_prob.discovery.checks.measurement import GENERAL, roughness
 from vrdp_prob.discovery.finding import Check, Description
+from vrdp_prob.discovery.residuals.contact_patterns import SYMBOLS as CONTACT_SYMBOLS
+from vrdp_prob.discovery.residuals.contact_patterns import ContactRows
 from vrdp_prob.discovery.residuals.free_flight import FreeFlight
 from vrdp_prob.discovery.residuals.free_flight_patterns import SYMBOLS, Pattern, spanned
 from vrdp_prob.discovery.residuals.missing_acceleration import Separate, Windows, missing_acceleration
@@ -37,11 +39,15 @@ def describe(fit: SharedFit, checks: Sequence[Check]) -> Description:
 
     Returns
     -------
-    The description. Its formula is the sum of the fewest state terms whose error in left-out videos is within one
-    standard error of the smallest (orthogonal matching pursuit, whole videos left out); it tells what the missing
-    acceleration is like, not what causes it.
+    The description. Its formulas are the sums of the fewest state terms whose error in left-out videos is within one
+    standard error of the smallest (orthogonal matching pursuit, whole videos left out); they tell what the missing
+    acceleration, and beside it the missing impulse at contacts, are like, not what causes them.
     """
-    model = ResidualModel.of(fit)
+    return description_of(ResidualModel.of(fit), checks)
+
+
+def description_of(model: ResidualModel, checks: Sequence[Check]) -> Description:
+    """What `describe` says, of the residuals of a joint fit."""
     flight = FreeFlight.of(model)
     noise = roughness(model)
     windows = missing_acceleration(flight.model, noise)
@@ -51,14 +57,29 @@ def describe(fit: SharedFit, checks: Sequence[Check]) -> Description:
     )
     found = sparse_formula(separate)
     places = [shown[k] for k in found.terms]
-    formula = _formula([flight.patterns[k] for k in places], found.coefficients)
+    formula = _formula("a", [flight.patterns[k].formula for k in places], found.coefficients)
+    of_contacts, contact_formula = _at_contacts(model, flight, places, windows, noise)
     sentences = [
         *_share_sentences(model, flight.model, noise),
         *_window_sentences(windows),
         *_formula_sentences(found, formula),
+        *_contact_sentences(of_contacts, contact_formula),
         *_check_sentences(checks),
     ]
-    return Description(formula, found.explained, float(np.sqrt(2)) * windows.size, tuple(sentences))
+    size = float(np.sqrt(2)) * windows.size
+    return Description(formula, found.explained, size, tuple(sentences), contact_formula, of_contacts.explained)
+
+
+def _at_contacts(
+    model: ResidualModel, flight: FreeFlight, chosen: list[int], windows: Windows, noise: float
+) -> tuple[SparseFormula, str]:
+    """The sparse formula of what is missing at contacts, beside that of free flight; empty where nothing is."""
+    contacts = ContactRows.of(model, flight.scales)
+    beside = model.freed(contacts.anything).sharing([rows[:, chosen] for rows in flight.rows])
+    kept = [video.linear.name in windows.lost for video in model.videos]
+    found = sparse_formula(Separate.of(beside, contacts.rows, noise).without(kept))
+    terms = [contacts.patterns[k].formula for k in found.terms]
+    return found, _formula("J", terms, found.coefficients) if terms else ""
 
 
 def _may_show(flight: FreeFlight, pattern: Pattern) -> bool:
@@ -73,15 +94,15 @@ def _may_show(flight: FreeFlight, pattern: Pattern) -> bool:
     return pattern.name.startswith(f"{names[int(np.argmax(statistics))]} ")
 
 
-def _formula(terms: list[Pattern], coefficients: Float[np.ndarray, "term"]) -> str:
+def _formula(of: str, terms: Sequence[str], coefficients: Float[np.ndarray, "term"]) -> str:
     if not terms:
         return "none of the terms"
     signs = ["-" if value < 0 else "+" for value in coefficients]
     parts = [
-        f"{sign} {number(abs(value))} {term.formula}"
+        f"{sign} {number(abs(value))} {term}"
         for sign, value, term in zip(signs, coefficients.tolist(), terms, strict=True)
     ]
-    return "a = " + " ".join(parts).removeprefix("+ ").replace("- ", "-", int(signs[0] == "-"))
+    return f"{of} = " + " ".join(parts).removeprefix("+ ").replace("- ", "-", int(signs[0] == "-"))
 
 
 def _share_sentences(model: ResidualModel, freed: ResidualModel, noise: float) -> Iterator[str]:
@@ -139,6 +160,14 @@ def _formula_sentences(found: SparseFormula, formula: str) -> Iterator[str]:
         f"The formula {formula} explains {100 * found.explained:.0f} % of it in videos that were left out ({SYMBOLS}); "
         "it describes, and names no cause."
     )
+
+
+def _contact_sentences(found: SparseFormula, formula: str) -> Iterator[str]:
+    if found.terms:
+        yield (
+            f"At contacts an impulse {formula} is missing, which explains {100 * found.explained:.0f} % of what free "
+            f"flight leaves in videos that were left out ({CONTACT_SYMBOLS}); it describes, and names no cause."
+        )
 
 
 def _check_sentences(checks: Sequence[Check]) -> Iterator[str]:

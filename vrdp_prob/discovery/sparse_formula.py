@@ -1,5 +1,6 @@
 """The best sparse sum of terms, by how well it does in whole videos that were left out."""
 
+import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -74,10 +75,12 @@ def sparse_formula(separate: Separate) -> SparseFormula:
 def _pursuit(
     patterns: Sequence[Float[np.ndarray, "_ term"]], residuals: Sequence[Float[np.ndarray, "_"]], count: int
 ) -> Float[np.ndarray, "term"]:
-    """Coefficients of which no more than some are not 0."""
+    """Coefficients of which no more than some are not 0; fewer where further terms say the same as these."""
     design = np.concatenate(patterns)
     length = np.maximum(np.linalg.norm(design, axis=0), 1e-300)
     pursuit: Any = OrthogonalMatchingPursuit(n_nonzero_coefs=count, fit_intercept=False)
-    pursuit.fit(design / length, np.concatenate(residuals))
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", "Orthogonal matching pursuit ended prematurely", RuntimeWarning)
+        pursuit.fit(design / length, np.concatenate(residuals))
     coefficients: np.ndarray = np.asarray(pursuit.coef_) / length
     return coefficients

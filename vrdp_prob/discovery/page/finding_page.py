@@ -239,6 +239,8 @@ def _description(description: Description) -> dict[str, Any]:
         "formula": description.formula if description.has_formula else "",
         "size": with_unit(number(description.size), "m/s^2"),
         "explained": _percent(description.explained),
+        "contact_formula": description.contact_formula,
+        "contact_explained": _percent(description.contact_explained),
     }
 
 

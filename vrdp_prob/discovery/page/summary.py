@@ -3,7 +3,7 @@
 import re
 from collections.abc import Sequence
 
-from vrdp_prob.discovery.finding import Check, Finding, FoundCause, Gain, TriedCause, UpperBound, Verdict
+from vrdp_prob.discovery.finding import Check, Description, Finding, FoundCause, Gain, TriedCause, UpperBound, Verdict
 from vrdp_prob.discovery.page.changed_answers import answers_sentence
 from vrdp_prob.discovery.page.wording import (
     TOGETHER,
@@ -82,8 +82,7 @@ def lines(finding: Finding) -> list[str]:
     told += [f"  {words}: {_gain_line(gain)}" for words, gain in told_gains(finding) if words == TOGETHER]
     if finding.description is not None:
         told += [f"  {line}" for line in finding.description.sentences]
-    if finding.description is not None and finding.description.has_formula:
-        told.append(f"  a description, not a cause: {'; '.join(finding.description.formula.splitlines())}")
+        told += [f"  a description, not a cause: {formula}" for formula in _formulas(finding.description)]
     told += summary(finding)[bool(finding.named) :]
     if finding.verdict is Verdict.NONE and finding.upper_bounds:
         told += ["How strong each cause can be at most (95 %):", *_bounds(finding.upper_bounds)]
@@ -166,6 +165,12 @@ def _checks(finding: Finding) -> str:
 def _failing(checks: Sequence[Check]) -> str:
     count = sum(check.significant for check in checks)
     return f"{number_word(count)} fail" if count > 1 else "one fails" if count else "none fails"
+
+
+def _formulas(description: Description) -> list[str]:
+    """The formulas that explain anything, each in one line."""
+    flight = ["; ".join(description.formula.splitlines())] if description.has_formula else []
+    return [*flight, *([description.contact_formula] if description.contact_formula else [])]
 
 
 def _bounds(bounds: Sequence[UpperBound]) -> list[str]:

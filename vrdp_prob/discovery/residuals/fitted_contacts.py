@@ -109,13 +109,18 @@ class FittedContacts:
         return np.asarray(1 / (1 / self.motion.mass[self.bodies]).sum(axis=1))
 
     @cached_property
-    def bounce(self) -> Float[np.ndarray, "contact"]:
-        """Part of the normal impulse (kg m/s) that restitution adds to what ends the approach."""
+    def stopping(self) -> Float[np.ndarray, "contact"]:
+        """Normal impulse (kg m/s) that ends the approach."""
         turning = (
             self.lever[..., 0] * self.events.normal[:, None, 1] - self.lever[..., 1] * self.events.normal[:, None, 0]
         )
         per_impulse = (1 / self.motion.mass[self.bodies] + turning**2 / self.motion.inertia[self.bodies]).sum(axis=1)
-        return np.maximum(self.events.impulse - self.events.closing_speed / per_impulse, 0.0)
+        return self.events.closing_speed / per_impulse
+
+    @property
+    def bounce(self) -> Float[np.ndarray, "contact"]:
+        """Part of the normal impulse (kg m/s) that restitution adds to what ends the approach."""
+        return np.maximum(self.events.impulse - self.stopping, 0.0)
 
     def pushed_apart(
         self, impulse: Float[np.ndarray, "contact 2 column"], *, moving: bool = True, turning: bool = True

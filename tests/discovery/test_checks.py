@@ -13,9 +13,9 @@ from tests.discovery.measurement import Measurement
 from tests.discovery.scenes import Setting
 from vrdp_prob.discovery.checks import contacts
 from vrdp_prob.discovery.checks.battery import run_checks
-from vrdp_prob.discovery.checks.bodies import OwnValues
 from vrdp_prob.discovery.checks.flight import QUESTIONS
 from vrdp_prob.discovery.checks.measurement import GENERAL
+from vrdp_prob.discovery.checks.own_values import OwnValues
 from vrdp_prob.discovery.finding import Check
 from vrdp_prob.discovery.residuals.free_flight import FRICTION, FreeFlight
 from vrdp_prob.discovery.residuals.free_flight_patterns import patterns, spanned

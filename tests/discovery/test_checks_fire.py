@@ -11,9 +11,11 @@ from jaxtyping import Float
 from tests.discovery.fitted import fitted, moved
 from tests.discovery.test_checks import by_name
 from tests.discovery.videos import Video, move, recorded
-from vrdp_prob.discovery.checks.contacts import DISTANCE, KICK, contact_checks
+from vrdp_prob.discovery.checks.clock import LOST, SINGLE
+from vrdp_prob.discovery.checks.contacts import DISTANCE, contact_checks
 from vrdp_prob.discovery.checks.flight import free_flight_checks
-from vrdp_prob.discovery.checks.measurement import DISTORTION, LOST, OUTLIERS, SINGLE, measurement_checks
+from vrdp_prob.discovery.checks.kicks import KICK
+from vrdp_prob.discovery.checks.measurement import DISTORTION, OUTLIERS, measurement_checks
 from vrdp_prob.discovery.finding import Check
 from vrdp_prob.discovery.residuals.free_flight import FreeFlight
 from vrdp_prob.discovery.residuals.residual_model import ResidualModel

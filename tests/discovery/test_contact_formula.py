@@ -8,7 +8,7 @@ import pytest
 from tests.discovery.fitted import fitted, moved
 from tests.discovery.scenes import Setting
 from vrdp_prob.discovery.describe import description_of
-from vrdp_prob.discovery.residuals.contact_patterns import ContactRows
+from vrdp_prob.discovery.residuals.missing_impulse import MissingImpulse
 from vrdp_prob.discovery.residuals.fitted_contacts import FittedContacts
 from vrdp_prob.discovery.residuals.free_flight import FreeFlight
 from vrdp_prob.discovery.residuals.residual_model import ResidualModel
@@ -61,7 +61,7 @@ def test_an_impulse_to_one_side_is_not_taken_for_friction(null: ResidualModel) -
 
 
 def test_terms_are_impulses_of_their_size(null: ResidualModel) -> None:
-    rows = ContactRows.of(null, FreeFlight.of(null).scales)
+    rows = MissingImpulse.of(null, FreeFlight.of(null).scales)
     assert {one.kind for one in rows.patterns} == {RolloutEventKind.COLLISION}
     contacts = FittedContacts.of(null.videos[0].motion)
     for pattern in rows.patterns:
@@ -80,7 +80,7 @@ def test_the_impulse_that_ends_an_approach_is_what_no_restitution_leaves(null: R
 def test_contacts_of_which_nobody_knows_the_direction_say_nothing() -> None:
     _, fit = fitted(seed=1)
     model = ResidualModel.of(fit)
-    rows = ContactRows.of(model, FreeFlight.of(model).scales)
+    rows = MissingImpulse.of(model, FreeFlight.of(model).scales)
     for video, some, vague in zip(model.videos, rows.rows, rows.anything, strict=True):
         contacts = FittedContacts.of(video.motion)
         assert vague.shape[1] == 4 * int((~contacts.known_normal).sum())

@@ -10,9 +10,11 @@ from vrdp_prob.discovery import discover as module
 from vrdp_prob.discovery import outcome
 from vrdp_prob.discovery.checks.battery import run_checks
 from vrdp_prob.discovery.checks.bodies import REBOUND
-from vrdp_prob.discovery.checks.contacts import AT_WALLS, KICK, REBOUND_AT_WALLS
+from vrdp_prob.discovery.checks.contacts import REBOUND_AT_WALLS
+from vrdp_prob.discovery.checks.kicks import KICK
 from vrdp_prob.discovery.describe import describe
 from vrdp_prob.discovery.finding import Check, Verdict
+from vrdp_prob.discovery.residuals.contact_patterns import AT_WALLS
 from vrdp_prob.discovery.selection.doubts import OWN_CHECKS, Doubt, causes_with_own_check_failing, doubts, with_doubts
 from vrdp_prob.discovery.selection.trials import Trial
 from vrdp_prob.inference.several_videos.fitting import SharedFit

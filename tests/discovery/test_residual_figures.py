@@ -8,11 +8,10 @@ import pytest
 from tests.discovery.fitted import fitted, moved
 from tests.discovery.test_describe import PAIRS
 from vrdp_prob.discovery.checks.contacts import DISTANCE
-from vrdp_prob.discovery.checks.flight import QUESTIONS
-from vrdp_prob.discovery.checks.measurement import DISTORTION, LOST, SINGLE, roughness
-from vrdp_prob.discovery.page.figures import residual_figures
+from vrdp_prob.discovery.checks.measurement import MEMORY
+from vrdp_prob.discovery.checks.neighbours import roughness
+from vrdp_prob.discovery.page.figures import residual_figures, title_of
 from vrdp_prob.discovery.page.plots import Plot, side_by_side
-from vrdp_prob.discovery.page.residual_panels import PANELS, Remainder, _groups
 from vrdp_prob.discovery.residuals.free_flight import FreeFlight
 from vrdp_prob.discovery.residuals.missing_acceleration import Windows, missing_acceleration
 from vrdp_prob.discovery.residuals.residual_model import ResidualModel
@@ -74,27 +73,14 @@ def test_there_is_a_figure_of_each_aspect_and_it_is_an_svg_element() -> None:
 def test_a_check_that_fails_has_a_figure_of_the_residuals_it_is_about() -> None:
     _, fit = fitted(seed=1)
     plain = residual_figures(fit, None)
-    failing = [DISTANCE, LOST, "push in one direction"]
+    failing = [DISTANCE, MEMORY, "push in one direction"]
     figures = residual_figures(fit, fit, failing=failing)
-    assert figures.keys() - plain.keys() == {f"Residuals: {DISTANCE}", f"Residuals: {LOST}"}
-    element = ElementTree.fromstring(figures[f"Residuals: {LOST}"])
+    assert figures.keys() - plain.keys() == {title_of(DISTANCE), title_of(MEMORY)}
+    element = ElementTree.fromstring(figures[title_of(DISTANCE)])
     assert len(list(element.iter(f"{SVG}polygon"))) == 2
     assert len(list(element.iter(f"{SVG}circle"))) >= 8
     words = {text.text for text in element.iter(f"{SVG}text")}
-    assert {"time (s)", "along the velocity, noise sd", "the extended model"} <= words
-
-
-def test_panels_go_by_the_names_of_checks_and_what_is_equal_stands_together() -> None:
-    model = ResidualModel.of(fitted(seed=1)[1])
-    known = {question.name for question in QUESTIONS} | {DISTANCE, LOST, SINGLE, DISTORTION}
-    assert known >= PANELS.keys()
-    remainder = Remainder(model, "red", "a model")
-    for panel in PANELS.values():
-        places = [place for place, *_ in _groups(remainder, panel)]
-        assert len(places) > 1
-        assert places == sorted(set(places))
-        inside = [abs(mean) < 4 * sd for _, mean, sd in _groups(remainder, panel)]
-        assert all(inside)
+    assert {"time since a contact (s)", "away from the partner, noise sd", "the extended model"} <= words
 
 
 def test_a_point_stands_where_its_axes_say_and_labels_are_escaped() -> None:

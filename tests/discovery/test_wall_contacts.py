@@ -12,7 +12,8 @@ from tests.discovery.laws import Laws
 from tests.discovery.measurement import Measurement, measure
 from tests.discovery.test_checks import by_name, noise_in_place
 from tests.discovery.videos import Video
-from vrdp_prob.discovery.checks.contacts import KICK, REBOUND_AT_WALLS, RUBBING_AT_WALLS, contact_checks
+from vrdp_prob.discovery.checks.contacts import REBOUND_AT_WALLS, RUBBING_AT_WALLS, contact_checks
+from vrdp_prob.discovery.checks.kicks import KICK
 from vrdp_prob.discovery.finding import Check
 from vrdp_prob.discovery.residuals.fitted_contacts import FittedContacts
 from vrdp_prob.discovery.residuals.free_flight import FreeFlight

@@ -6,10 +6,11 @@ import numpy as np
 from jaxtyping import Float
 
 from vrdp_prob.discovery.checks.flight import BESIDE
-from vrdp_prob.discovery.checks.measurement import GENERAL, roughness
+from vrdp_prob.discovery.checks.measurement import GENERAL
+from vrdp_prob.discovery.checks.neighbours import roughness
 from vrdp_prob.discovery.finding import Check, Description
-from vrdp_prob.discovery.residuals.contact_patterns import SYMBOLS as CONTACT_SYMBOLS
-from vrdp_prob.discovery.residuals.contact_patterns import ContactRows
+from vrdp_prob.discovery.residuals.missing_impulse import SYMBOLS as CONTACT_SYMBOLS
+from vrdp_prob.discovery.residuals.missing_impulse import MissingImpulse
 from vrdp_prob.discovery.residuals.free_flight import FreeFlight
 from vrdp_prob.discovery.residuals.free_flight_patterns import SYMBOLS, Pattern, spanned
 from vrdp_prob.discovery.residuals.missing_acceleration import Separate, Windows, missing_acceleration
@@ -74,7 +75,7 @@ def _at_contacts(
     model: ResidualModel, flight: FreeFlight, chosen: list[int], windows: Windows, noise: float
 ) -> tuple[SparseFormula, str]:
     """The sparse formula of what is missing at contacts, beside that of free flight; empty where nothing is."""
-    contacts = ContactRows.of(model, flight.scales)
+    contacts = MissingImpulse.of(model, flight.scales)
     beside = model.freed(contacts.anything).sharing([rows[:, chosen] for rows in flight.rows])
     kept = [video.linear.name in windows.lost for video in model.videos]
     found = sparse_formula(Separate.of(beside, contacts.rows, noise).without(kept))

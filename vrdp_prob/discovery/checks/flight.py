@@ -42,6 +42,7 @@ class Question:
 
 
 PUSH = ("push x", "push y")
+SHAKING = "push against time"
 
 QUESTIONS = (
     Question(
@@ -215,7 +216,7 @@ def free_flight_checks(flight: FreeFlight) -> list[Check]:
 def _shaking(flight: FreeFlight) -> Iterator[tuple[Question, Part, float]]:
     """Whether the table shakes, at whatever frequency, in step with the start of the videos."""
     parts = {
-        (name, frequency): flight.part(_phases(name), PUSH) for name, frequency in flight.scales.frequencies.items()
+        (name, frequency): flight.part(phases(name), PUSH) for name, frequency in flight.scales.frequencies.items()
     }
     known = {key: part for key, part in parts.items() if part.score.degrees}
     if not known:
@@ -228,11 +229,12 @@ def _shaking(flight: FreeFlight) -> Iterator[tuple[Question, Part, float]]:
         pushed = f"all bodies are pushed to and fro {times} a second, in step with the start of the videos,"
         return f"{pushed} by {number(part.size)} m/s^2 (root mean square)"
 
-    question = Question("push against time", _phases(name), sentence, PUSH)
+    question = Question(SHAKING, phases(name), sentence, PUSH)
     yield question, best, anywhere(best.score.p_value, len(known))
 
 
-def _phases(name: str) -> tuple[str, ...]:
+def phases(name: str) -> tuple[str, ...]:
+    """Names of the patterns of shaking at one frequency."""
     return tuple(f"{name} {phase} {axis}" for phase in ("cosine", "sine") for axis in "xy")
 
 

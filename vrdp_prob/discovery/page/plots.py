@@ -1,7 +1,7 @@
 """Small plots as SVG elements in the colours of the page: axes, points with bars, lines, arrows."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from html import escape
 
@@ -30,6 +30,8 @@ class Plot:
         What stands above.
     width, height
         Size in pixels, with all labels.
+    x_names
+        Words that stand for ticks of the horizontal axis.
     """
 
     x: Axis
@@ -39,6 +41,7 @@ class Plot:
     title: str = ""
     width: float = 440
     height: float = 250
+    x_names: Mapping[float, str] = field(default_factory=dict)
     _marks: list[str] = field(default_factory=list)
 
     def at(self, x: float, y: float) -> tuple[float, float]:
@@ -47,14 +50,16 @@ class Plot:
         down = self.height - BOTTOM - self.y.place(y) / 100 * (self.height - TOP - BOTTOM)
         return round(across, 1), round(down, 1)
 
-    def point(self, x: float, y: float, sd: float | None, colour: str, *, faint: bool = False) -> None:
+    def point(
+        self, x: float, y: float, sd: float | None, colour: str, *, faint: bool = False, small: bool = False
+    ) -> None:
         """A dot, with a bar of one standard deviation to both sides."""
         u, v = self.at(x, y)
         opacity = 0.35 if faint else 1
         if sd is not None and math.isfinite(sd):
             low, high = self.at(x, y - sd)[1], self.at(x, y + sd)[1]
             self._marks.append(_line([(u, low), (u, high)], colour, 1.2, opacity))
-        radius = 1.8 if faint else 3.2
+        radius = 1.8 if faint or small else 3.2
         self._marks.append(f'<circle cx="{u}" cy="{v}" r="{radius}" style="fill:{colour};opacity:{opacity}"/>')
 
     def arrow(self, start: tuple[float, float], end: tuple[float, float], colour: str, *, faint: bool = False) -> None:
@@ -96,7 +101,8 @@ class Plot:
         parts = [_text(left, 14, self.title, INK, weight=600)] if self.title else []
         for tick in self.x.ticks:
             u, _ = self.at(tick, self.y.low)
-            parts += [_line([(u, TOP), (u, bottom)], LINE, 1), _text(u, bottom + 14, f"{tick:g}", MUTED, "middle")]
+            word = self.x_names.get(tick, f"{tick:g}")
+            parts += [_line([(u, TOP), (u, bottom)], LINE, 1), _text(u, bottom + 14, word, MUTED, "middle")]
         for tick in self.y.ticks:
             _, v = self.at(self.x.low, tick)
             parts += [_line([(left, v), (right, v)], LINE, 1), _text(left - 5, v + 4, f"{tick:g}", MUTED, "end")]

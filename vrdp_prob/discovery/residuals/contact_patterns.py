@@ -1,114 +1,161 @@
-"""Impulses that a model may miss at contacts: patterns over the approach speed, the slip, the place and the time."""
+"""What could act at contacts, and how strongly it shows beside free flight and all that a fit absorbs.
 
-from collections.abc import Callable, Iterator, Sequence
+Contacts of bodies with each other and with stated walls are asked alike, each kind beside the other. Where a cube's yaw
+is not measured its contacts may do anything: the direction of their impulse is known from the motion after them alone.
+"""
+
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float
 
 from vrdp_prob.discovery.residuals.fitted_contacts import FittedContacts
-from vrdp_prob.discovery.residuals.free_flight_patterns import Scales
-from vrdp_prob.discovery.residuals.residual_model import ResidualModel
+from vrdp_prob.discovery.residuals.free_flight import FreeFlight
+from vrdp_prob.discovery.residuals.linear import Score
+from vrdp_prob.discovery.residuals.residual_model import ResidualModel, joined
 from vrdp_prob.models.simulator.events import RolloutEventKind
 
-SYMBOLS = (
-    "SI units; n the normal, towards the body that is pushed, l is n turned to the left, s against the slip w of the "
-    "touching points, v_n approach speed, J_n normal impulse, J_0 the impulse that ends the approach, m reduced mass, "
-    "t time since the first frame"
-)
-"""What the symbols of formulas mean."""
-KINDS = {RolloutEventKind.COLLISION: "", RolloutEventKind.WALL: " [wall]"}
-"""What bodies touch, and how a formula says so."""
-
-Factor = Callable[[FittedContacts], Float[np.ndarray, "contact"]]
+AT_CONTACTS, AT_WALLS = "at contacts", "at walls"
+WHERE = {AT_CONTACTS: RolloutEventKind.COLLISION, AT_WALLS: RolloutEventKind.WALL}
+"""Where bodies touch each other, and stated walls."""
+GROW = "grow"
 
 
 @dataclass(frozen=True)
-class ContactPattern:
-    """A pattern of impulses.
+class ContactScore:
+    """How strongly patterns of what acts at contacts show.
 
     Parameters
     ----------
-    kind
-        What the bodies touch.
-    impulse
-        Impulses (kg m/s) on the second body or wall of each contact, for amplitude 1.
-    formula
-        The impulse as part of a formula in SI units (see `SYMBOLS`).
+    clear
+        The contacts of each video whose normal is known, by where they are.
+    vague
+        All others.
+    turning
+        Whether turning is measured in all videos.
+    score, places
+        How strongly all patterns show, and the places of each set of them.
     """
 
-    kind: RolloutEventKind
-    impulse: Callable[[FittedContacts], Float[np.ndarray, "contact 2"]]
-    formula: str
-
-
-@dataclass(frozen=True)
-class ContactRows:
-    """Patterns of impulses, and what they do to the residuals.
-
-    Parameters
-    ----------
-    patterns
-        The patterns.
-    rows
-        What each does to the data's residuals of each video.
-    anything
-        What kicks of all bodies do at contacts of which nobody knows the direction.
-    """
-
-    patterns: tuple[ContactPattern, ...]
-    rows: Sequence[Float[np.ndarray, "_ pattern"]]
-    anything: Sequence[Float[np.ndarray, "_ _"]]
+    clear: Mapping[str, Sequence[FittedContacts]]
+    vague: Mapping[str, Sequence[FittedContacts]]
+    turning: bool
+    score: Score
+    places: Mapping[str, Sequence[int]]
 
     @classmethod
-    def of(cls, model: ResidualModel, scales: Scales) -> "ContactRows":
-        """All patterns that the contacts of some videos can show."""
+    def of(cls, model: ResidualModel, flight: FreeFlight, *, each: bool = False) -> "ContactScore | None":
+        """All patterns in the residuals of a fit, where the patterns of free flight may show; None without contacts.
+
+        Parameters
+        ----------
+        model, flight
+            The residuals, and the patterns of free flight.
+        each
+            Whether spins and rebounds are also to be told at each contact by itself.
+        """
         motions = [video.motion for video in model.videos]
-        found = {kind: [FittedContacts.of(motion, kind) for motion in motions] for kind in KINDS}
-        clear = {kind: [one.where(one.known_normal) for one in some] for kind, some in found.items()}
-        chosen = [one for kind, some in clear.items() if any(map(len, some)) for one in _patterns(kind, some, scales)]
-        rows, anything = [], []
-        for index, video in enumerate(model.videos):
-            columns = [
-                (some := clear[one.kind][index]).pushed_apart(one.impulse(some)[..., None])[..., 0] for one in chosen
-            ]
-            empty = np.zeros((*video.motion.speed.shape, 3, 0))
-            rows.append(video.rows(np.stack(columns, axis=-1) if columns else empty))
-            vague = [one[index].where(~one[index].known_normal).pushed_anyhow() for one in found.values()]
-            anything.append(video.rows(np.concatenate(vague, axis=-1)))
-        return cls(tuple(chosen), rows, anything)
+        contacts = {
+            where: found
+            for where, kind in WHERE.items()
+            if any(map(len, found := [FittedContacts.of(motion, kind) for motion in motions]))
+        }
+        if not contacts:
+            return None
+        clear = {where: [one.where(one.known_normal) for one in some] for where, some in contacts.items()}
+        vague = {where: [one.where(~one.known_normal) for one in some] for where, some in contacts.items()}
+        changes = {GROW: [motion.growth[..., None] for motion in motions]}
+        for where, some in clear.items():
+            changes |= {
+                f"anything {where}": _one_after_another([one.pushed_anyhow() for one in vague[where]]),
+                f"rub {where}": _one_after_another([_rubbing_each(one) for one in some]),
+                f"slip {where}": [_slipping(one) for one in some],
+                f"turn {where}": [_slipping(one, moving=False) for one in some],
+            }
+            if where == AT_CONTACTS:
+                changes["together"] = _one_after_another([one.pushed_together(unbalanced(one)) for one in some])
+            else:
+                changes["bounce"] = [_bouncing(one) for one in some]
+            if each:
+                changes[f"turn each {where}"] = _one_after_another([_rubbing_each(one, moving=False) for one in some])
+            if each and where == AT_WALLS:
+                changes["bounce each"] = _one_after_another([_bouncing_each(one) for one in some])
+        rows = {
+            name: [video.rows(one) for video, one in zip(model.videos, parts, strict=True)]
+            for name, parts in changes.items()
+        }
+        score, places = joined(model.sharing(flight.rows), rows)
+        return cls(clear, vague, all(motion.tracks.turning_told for motion in motions), score, places)
+
+    @property
+    def rubbing(self) -> tuple[str, ...]:
+        """The tangential impulses of all contacts, each by itself."""
+        return tuple(f"rub {where}" for where in self.clear)
+
+    def part(self, name: str, *given: str) -> Score:
+        """The score of a set of patterns, where some others may show as well."""
+        return self.score.of(self.places[name], self._beside(*given))
+
+    def _beside(self, *given: str) -> list[int]:
+        return [k for name in (*(f"anything {where}" for where in self.clear), *given) for k in self.places[name]]
+
+    def tangential(self, name: str, where: str) -> Score:
+        """The score of what acts along the tangent of contacts, beside all sizes and what acts at the other ones."""
+        word = "slip" if self.turning else "rub"
+        return self.part(f"{name} {where}", GROW, *(f"{word} {other}" for other in self.clear if other != where))
+
+    def normal(self, name: str) -> Score:
+        """The score of what acts beside tangential impulses of any size at each contact, and beside all sizes."""
+        return self.part(name, *self.rubbing, GROW)
+
+    @property
+    def rebounds(self) -> Score:
+        """The score of restitution at each contact with a wall, whatever it is on average."""
+        _, average = self.places["bounce"]
+        return self.score.of(self.places["bounce each"], [*self._beside(*self.rubbing, GROW), average])
 
 
-def _patterns(kind: RolloutEventKind, contacts: Sequence[FittedContacts], scales: Scales) -> Iterator[ContactPattern]:
-    """Patterns of the contacts of one kind."""
-    usual = float(np.median(np.concatenate([one.events.closing_speed for one in contacts])))
-    for factor, words in _restitutions(max(usual, 1e-3), scales):
-        yield _along_normal(kind, factor, f"{words} J_0 n".strip())
-    yield _along_tangent(kind, lambda one: one.rubbing * one.events.impulse, "J_n s")
-    yield _along_tangent(kind, lambda one: -one.slip * one.common_mass, "m |w| s")
-    yield _along_tangent(kind, lambda one: one.events.impulse, "J_n l")
+def unbalanced(contacts: FittedContacts) -> list[Float[np.ndarray, "contact 2"]]:
+    """Directions in which momentum can be seen to be lost: along the normal only where the masses are known."""
+    weighed = all(body.mass is not None for body in contacts.motion.tracks.bodies)
+    return [contacts.tangent, contacts.events.normal] if weighed else [contacts.tangent]
 
 
-def _restitutions(usual: float, scales: Scales) -> Iterator[tuple[Factor, str]]:
-    """What restitution may depend on, and the words of a formula for it."""
-    yield lambda one: np.ones(len(one)), ""
-    yield lambda one: one.log_speed, "log(v_n)"
-    yield lambda one: np.exp(-((one.events.closing_speed / usual) ** 2)), f"exp(-(v_n/{usual:.2g})^2)"
-    for axis in scales.axes:
-        yield _place(scales, axis), scales.place_words[axis]
-    yield lambda one: one.events.time - one.motion.times[0], "t"
+def _slipping(contacts: FittedContacts, *, moving: bool = True) -> Float[np.ndarray, "time body 3 column"]:
+    """Impulses against the slip, as large as the normal ones, and such as stop the slip of what does not turn."""
+    sizes = np.stack([contacts.rubbing * contacts.events.impulse, -contacts.slip * contacts.common_mass], axis=1)
+    chosen = sizes if moving else sizes[:, :1]
+    return contacts.pushed_apart(contacts.tangent[:, :, None] * chosen[:, None], moving=moving)
 
 
-def _place(scales: Scales, axis: int) -> Factor:
-    return lambda one: one.events.point[:, axis] - scales.middle[axis]
+def _rubbing_each(contacts: FittedContacts, *, moving: bool = True) -> Float[np.ndarray, "time body 3 column"]:
+    """Impulses to the left of the normal, as large as the normal one, at each contact by itself."""
+    sizes = np.eye(len(contacts)) * contacts.events.impulse
+    return contacts.pushed_apart(contacts.tangent[:, :, None] * sizes[:, None], moving=moving)
 
 
-def _along_normal(kind: RolloutEventKind, factor: Factor, words: str) -> ContactPattern:
-    def impulse(contacts: FittedContacts) -> Float[np.ndarray, "contact 2"]:
-        return (factor(contacts) * contacts.stopping)[:, None] * contacts.events.normal
+def _bouncing(contacts: FittedContacts) -> Float[np.ndarray, "time body 3 column"]:
+    """Impulses along the normal of a restitution that goes with a power of the approach speed, and of a larger one."""
+    sizes = contacts.bounce[:, None] * np.stack([contacts.log_speed, np.ones(len(contacts))], axis=1)
+    return contacts.pushed_apart(contacts.events.normal[:, :, None] * sizes[:, None])
 
-    return ContactPattern(kind, impulse, words + KINDS[kind])
+
+def _bouncing_each(contacts: FittedContacts) -> Float[np.ndarray, "time body 3 column"]:
+    """Impulses along the normal of a restitution twice as large, at each contact by itself."""
+    sizes = np.eye(len(contacts)) * contacts.bounce
+    return contacts.pushed_apart(contacts.events.normal[:, :, None] * sizes[:, None])
 
 
-def _along_tangent(kind: RolloutEventKind, size: Factor, words: str) -> ContactPattern:
-    return ContactPattern(kind, lambda one: size(one)[:, None] * one.tangent, words + KINDS[kind])
+def _one_after_another(
+    changes: Sequence[Float[np.ndarray, "_ _ 3 _"]],
+) -> list[Float[np.ndarray, "_ _ 3 column"]]:
+    """Patterns of single videos side by side, so that each has an amplitude of its own."""
+    widths = [one.shape[-1] for one in changes]
+    total, result, first = sum(widths), [], 0
+    for one, width in zip(changes, widths, strict=True):
+        wide = np.zeros((*one.shape[:-1], total))
+        wide[..., first : first + width] = one
+        result.append(wide)
+        first += width
+    return result

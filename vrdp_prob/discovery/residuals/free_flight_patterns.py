@@ -184,7 +184,7 @@ def _factors(scales: Scales) -> Iterator[tuple[str, Factor, str]]:
     squares = " + ".join(f"{word}^2" for word in words)
     yield "distance", _square_distance(scales), f"({squares})"
     yield "time", _clock, "t"
-    yield "way", _way, "s"
+    yield "way", way_travelled, "s"
     if scales.turning:
         yield "spin", lambda m: np.abs(m.spin), "|omega|"
     if not scales.own_friction:  # the friction of spheres is another number in any case
@@ -240,7 +240,7 @@ def _clock(motion: FittedMotion) -> Float[np.ndarray, "time body"]:
     return np.broadcast_to((motion.times - motion.times[0])[:, None], motion.speed.shape)
 
 
-def _way(motion: FittedMotion) -> Float[np.ndarray, "time body"]:
+def way_travelled(motion: FittedMotion) -> Float[np.ndarray, "time body"]:
     """Way travelled since the first frame in m."""
     steps = np.diff(motion.times, prepend=motion.times[0])[:, None]
     return np.cumsum(steps * motion.speed, axis=0)

@@ -9,8 +9,10 @@ from jaxtyping import Float
 
 from vrdp_prob.discovery.candidates.scores import happens_once
 from vrdp_prob.discovery.checks.bodies import REBOUND, friction_against
-from vrdp_prob.discovery.checks.contacts import DISTANCE, KICK, REBOUND_AT_WALLS, RUBBING, RUBBING_AT_WALLS
-from vrdp_prob.discovery.checks.measurement import DISTORTION, LOST, SINGLE
+from vrdp_prob.discovery.checks.clock import LOST, SINGLE
+from vrdp_prob.discovery.checks.contacts import DISTANCE, REBOUND_AT_WALLS, RUBBING, RUBBING_AT_WALLS
+from vrdp_prob.discovery.checks.kicks import KICK
+from vrdp_prob.discovery.checks.measurement import DISTORTION
 from vrdp_prob.discovery.finding import Check
 from vrdp_prob.discovery.selection.estimates import surprise
 from vrdp_prob.discovery.selection.trials import Trial

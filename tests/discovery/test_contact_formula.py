@@ -8,9 +8,9 @@ import pytest
 from tests.discovery.fitted import fitted, moved
 from tests.discovery.scenes import Setting
 from vrdp_prob.discovery.describe import description_of
-from vrdp_prob.discovery.residuals.missing_impulse import MissingImpulse
 from vrdp_prob.discovery.residuals.fitted_contacts import FittedContacts
 from vrdp_prob.discovery.residuals.free_flight import FreeFlight
+from vrdp_prob.discovery.residuals.missing_impulse import MissingImpulse
 from vrdp_prob.discovery.residuals.residual_model import ResidualModel
 from vrdp_prob.models.simulator.events import RolloutEventKind
 from vrdp_prob.scene import Shape

@@ -9,11 +9,11 @@ from vrdp_prob.discovery.checks.flight import BESIDE
 from vrdp_prob.discovery.checks.measurement import GENERAL
 from vrdp_prob.discovery.checks.neighbours import roughness
 from vrdp_prob.discovery.finding import Check, Description
-from vrdp_prob.discovery.residuals.missing_impulse import SYMBOLS as CONTACT_SYMBOLS
-from vrdp_prob.discovery.residuals.missing_impulse import MissingImpulse
 from vrdp_prob.discovery.residuals.free_flight import FreeFlight
 from vrdp_prob.discovery.residuals.free_flight_patterns import SYMBOLS, Pattern, spanned
 from vrdp_prob.discovery.residuals.missing_acceleration import Separate, Windows, missing_acceleration
+from vrdp_prob.discovery.residuals.missing_impulse import SYMBOLS as CONTACT_SYMBOLS
+from vrdp_prob.discovery.residuals.missing_impulse import MissingImpulse
 from vrdp_prob.discovery.residuals.residual_model import ResidualModel
 from vrdp_prob.discovery.sparse_formula import SparseFormula, sparse_formula
 from vrdp_prob.discovery.words import number

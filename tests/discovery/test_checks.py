@@ -11,7 +11,7 @@ from tests.discovery.fitted import fitted
 from tests.discovery.hidden import hide
 from tests.discovery.measurement import Measurement
 from tests.discovery.scenes import Setting
-from vrdp_prob.discovery.checks import contacts
+from vrdp_prob.discovery.checks import kicks
 from vrdp_prob.discovery.checks.battery import run_checks
 from vrdp_prob.discovery.checks.flight import QUESTIONS
 from vrdp_prob.discovery.checks.measurement import GENERAL
@@ -182,13 +182,13 @@ def test_a_kick_is_looked_for_piece_by_piece_and_nowhere_where_none_would_show(m
     _, fit = fitted(seed=1)
     model = ResidualModel.of(fit).without_beliefs
     replicas = FreeFlight.of(model).beside.replicas(50, np.random.default_rng(0))
-    (whole,) = contacts._kick_without_partner(model, replicas)
-    monkeypatch.setattr(contacts, "PLACES_AT_ONCE", 7)
-    (pieces,) = contacts._kick_without_partner(model, replicas)
+    (whole,) = kicks.kick_check(model, replicas)
+    monkeypatch.setattr(kicks, "PLACES_AT_ONCE", 7)
+    (pieces,) = kicks.kick_check(model, replicas)
     assert pieces.sentence == whole.sentence
     assert pieces.p_value == pytest.approx(whole.p_value, rel=1e-6)
-    monkeypatch.setattr(contacts, "_shows", lambda *_: False)
-    assert not list(contacts._kick_without_partner(model, replicas))
+    monkeypatch.setattr(kicks, "_shows", lambda *_: False)
+    assert not list(kicks.kick_check(model, replicas))
 
 
 def test_what_was_believed_of_bodies_is_no_observation() -> None:

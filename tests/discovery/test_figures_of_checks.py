@@ -10,12 +10,20 @@ from jaxtyping import Float
 
 from tests.discovery.fitted import SMALL, fitted, moved
 from tests.discovery.measurement import Measurement
+from tests.discovery.scenes import Setting
 from tests.discovery.test_checks_fire import Changes, bent, irregular, kicked, larger, lost, null
 from tests.discovery.test_wall_contacts import with_effect
 from vrdp_prob.discovery.checks.battery import run_checks
 from vrdp_prob.discovery.checks.bodies import friction_against
 from vrdp_prob.discovery.checks.clock import LOST, SINGLE
-from vrdp_prob.discovery.checks.contacts import DISTANCE, MOMENTUM, REBOUND_AT_WALLS, RUBBING_AT_WALLS, TURNING
+from vrdp_prob.discovery.checks.contacts import (
+    DISTANCE,
+    DURATION,
+    MOMENTUM,
+    REBOUND_AT_WALLS,
+    RUBBING_AT_WALLS,
+    TURNING,
+)
 from vrdp_prob.discovery.checks.flight import QUESTIONS, SHAKING
 from vrdp_prob.discovery.checks.kicks import KICK, kick_places
 from vrdp_prob.discovery.checks.measurement import DISTORTION, MEMORY, OUTLIERS, SIZE
@@ -115,8 +123,8 @@ def _pushes(motion: FittedMotion) -> dict[str, Float[np.ndarray, "time body 2"]]
 @pytest.mark.parametrize(
     ("setting", "measurement"), [(SMALL, None), (BETWEEN_WALLS, TURNING_BODIES)], ids=["plain", "walls and spins"]
 )
-def test_every_check_that_is_made_has_a_figure(setting: object, measurement: Measurement | None) -> None:
-    _, fit = fitted(seed=1, setting=setting, measurement=measurement)  # type: ignore[arg-type]
+def test_every_check_that_is_made_has_a_figure(setting: Setting, measurement: Measurement | None) -> None:
+    _, fit = fitted(seed=1, setting=setting, measurement=measurement)
     checks = {check.name for check in run_checks(fit, seed=0)}
     assert checks <= SHOWN_BY.keys() | WHERE_CHECKS_FAIL.keys()
     for after in (None, fit):
@@ -127,7 +135,7 @@ def test_every_check_that_is_made_has_a_figure(setting: object, measurement: Mea
 
 def test_every_check_that_there_is_has_a_figure_and_none_is_of_a_check_that_there_is_not() -> None:
     named = {question.name for question in QUESTIONS} | {SHAKING, DISTANCE, KICK, LOST, SINGLE, DISTORTION, OUTLIERS}
-    named |= {RUBBING_AT_WALLS, REBOUND_AT_WALLS, MOMENTUM, MEMORY, SIZE, *TURNING.values()}
+    named |= {RUBBING_AT_WALLS, REBOUND_AT_WALLS, MOMENTUM, MEMORY, SIZE, *TURNING.values(), *DURATION.values()}
     named |= {friction_against(what) for what in ("material", "shape", "mass")}
     assert named - SHOWN_BY.keys() == WHERE_CHECKS_FAIL.keys()
     assert not SHOWN_BY.keys() & WHERE_CHECKS_FAIL.keys()

@@ -13,7 +13,7 @@ from vrdp_prob.discovery.outcome import outcome_of
 from vrdp_prob.discovery.page.figures import residual_figures
 from vrdp_prob.discovery.residuals.free_flight import NORMAL_95
 from vrdp_prob.discovery.selection.believed import extended_model, models_of_the_others
-from vrdp_prob.discovery.selection.doubts import Doubt
+from vrdp_prob.discovery.selection.doubts import Doubt, rivals_outside
 from vrdp_prob.discovery.selection.estimates import mass_scale_notes, upper_bounds
 from vrdp_prob.discovery.selection.mimics import Unlisted
 from vrdp_prob.discovery.selection.search import Search
@@ -106,6 +106,7 @@ def discover(
         description=describe(found.best.fit, outcome.after) if doubtful else None,
         notes=(
             *_notes(found, outcome.reasons, outcome.unlisted, doubtful=doubtful and bool(causes)),
+            *rivals_outside((cause.effect for cause in causes if cause.named), outcome.checks),
             *mass_scale_notes(_told(found, causes), videos),
             *_limits(videos),
             *_not_asked(videos),

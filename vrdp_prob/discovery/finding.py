@@ -213,6 +213,8 @@ class Check:
         Whether it counts after false discovery rate control over all checks.
     sentence
         What was seen, for a reader.
+    rival
+        What else would leave the same, in a sentence; empty where nothing is known that would, or the videos tell.
     """
 
     name: str
@@ -220,6 +222,7 @@ class Check:
     p_value: float
     significant: bool
     sentence: str
+    rival: str = ""
 
 
 @dataclass(frozen=True)

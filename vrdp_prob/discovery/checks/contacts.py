@@ -5,9 +5,11 @@ is asked here, since one body meets walls at many speeds.
 """
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 from jaxtyping import Float
+from scipy.special import expit
 
 from vrdp_prob.discovery.checks.bodies import REBOUND
 from vrdp_prob.discovery.checks.flight import SEEN
@@ -26,7 +28,10 @@ RUBBING_AT_WALLS = f"{RUBBING} {AT_WALLS}"
 REBOUND_AT_WALLS = f"{REBOUND} {AT_WALLS}"
 RUBBING_OF = {AT_CONTACTS: RUBBING, AT_WALLS: RUBBING_AT_WALLS}
 TURNING = {where: f"spin change {where}" for where in WHERE}
-"""Names of the checks of tangential impulses and of spins, by where bodies touch."""
+DURATION = {where: f"duration of touch {where}" for where in WHERE}
+"""Names of the checks of tangential impulses, of spins and of how long bodies touch, by where they do."""
+APART = 0.01
+"""Probability below which of two explanations one is told from the other."""
 
 
 def contact_checks(
@@ -57,6 +62,7 @@ def _patterns(contacts: ContactScore) -> Iterator[Check]:
             yield from _turn_check(contacts.tangential("turn", where), where)
         else:
             yield from _rub_check(contacts.tangential("rub", where), where)
+        yield from _duration_check(contacts.durations(f"last {where}", GROW), where)
     if AT_CONTACTS in contacts.clear:
         yield from _distance_check(contacts.part(GROW, *contacts.rubbing), contacts)
         yield from _momentum_check(contacts.normal("together"), sum(map(len, contacts.clear[AT_CONTACTS])))
@@ -129,7 +135,33 @@ def _distance_check(score: Score, contacts: ContactScore) -> Iterator[Check]:
         f"Bodies touch {number(abs(size))} m {opposite(size, 'nearer', 'farther apart')} than the sum of their radii, "
         f"{number(100 * abs(share))} % of it."
     )
-    yield _check(DISTANCE, size, score.p_value, found, f"{number(NORMAL_95 * sd)} m")
+    check = _check(DISTANCE, size, score.p_value, found, f"{number(NORMAL_95 * sd)} m")
+    yield replace(check, rival=_lasting_instead(score, contacts.durations(f"last {AT_CONTACTS}")))
+
+
+def _duration_check(score: Score, where: str) -> Iterator[Check]:
+    """How long bodies touch, whatever their size; what is negative no contact does, and is a misfit of another kind."""
+    if not score.degrees:
+        return
+    size, sd = float(score.estimate[0]), float(score.sd[0])
+    if size >= 0:
+        found = f"{where.capitalize()} bodies touch for {number(size)} s, and give way meanwhile."
+    else:
+        found = f"{where.capitalize()} bodies part earlier than they can, by {number(-size / 2)} s."
+    yield _check(DURATION[where], size, score.p_value, found, f"{number(NORMAL_95 * sd)} s")
+
+
+def _lasting_instead(distance: Score, duration: Score) -> str:
+    """What contacts that last explain of a wrong distance at which bodies touch, where that may be as well."""
+    if not duration.degrees or duration.estimate[0] <= 0 or distance.p_value > SEEN:
+        return ""
+    share = float(expit((duration.chi_square - distance.chi_square) / 2))
+    if not APART < share < 1 - APART:
+        return ""
+    return (
+        f"Contacts that last {number(float(duration.estimate[0]))} s would look like that, with a probability of "
+        f"{100 * share:.0f} % by these videos: faster and slower contacts would tell."
+    )
 
 
 def _momentum_check(score: Score, contacts: int) -> Iterator[Check]:

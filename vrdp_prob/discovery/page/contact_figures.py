@@ -6,7 +6,7 @@ from functools import partial
 import numpy as np
 from jaxtyping import Float
 
-from vrdp_prob.discovery.checks.contacts import MOMENTUM, REBOUND_AT_WALLS, RUBBING_OF, TURNING
+from vrdp_prob.discovery.checks.contacts import DURATION, MOMENTUM, REBOUND_AT_WALLS, RUBBING_OF, TURNING
 from vrdp_prob.discovery.checks.kicks import KICK, KickScan
 from vrdp_prob.discovery.checks.own_values import Rebounds
 from vrdp_prob.discovery.page.scatter import Banded, Points, with_bands, with_bars
@@ -84,6 +84,24 @@ def _rebounds_from_walls(seen: Sequence[Seen]) -> str:
     )
 
 
+def _durations(seen: Sequence[Seen], where: str) -> str:
+    """How long bodies touch, contact by contact."""
+
+    def points(contacts: ContactScore) -> Points:
+        speed = _each(contacts, where, lambda one: np.exp(one.log_speed))
+        score = contacts.durations(f"last each {where}")
+        return Points(speed, score.estimate, score.sd)
+
+    return with_bars(
+        seen,
+        {"": _at_contacts(seen, where, points)},
+        ("approach speed (m/s)", "duration (s)"),
+        f"How long bodies would have to touch {where} to part as late as they do, against the approach speed. What is "
+        "soft touches as long at all speeds; where radii are wrong the duration falls as one over the speed.",
+        level=0.0,
+    )
+
+
 def _momentum(seen: Sequence[Seen]) -> str:
     """Velocity that both bodies gain at each contact."""
     found = zip(*(_gained(one.at_contacts) for one in seen), strict=True)
@@ -152,6 +170,7 @@ CONTACT_FIGURES: Mapping[str, Figure] = {
     RUBBING_OF[AT_WALLS]: partial(tangential_impulses, where=AT_WALLS),
     REBOUND_AT_WALLS: _rebounds_from_walls,
     **{TURNING[where]: partial(_spins, where=where) for where in WHERE},
+    **{DURATION[where]: partial(_durations, where=where) for where in WHERE},
     MOMENTUM: _momentum,
     KICK: _kick,
 }

@@ -199,7 +199,7 @@ def _fails(check: Check | None) -> bool:
 def _check(check: Check, after: Check | None) -> dict[str, Any]:
     return {
         "name": sentence(check.name),
-        "sentence": typeset(check.sentence),
+        "sentence": typeset(f"{check.sentence} {check.rival}".strip()),
         "p": p_words(check.p_value),
         "fails": check.significant,
         "p_after": UNDEFINED if after is None else p_words(after.p_value),

@@ -53,7 +53,7 @@ class ContactScore:
         model, flight
             The residuals, and the patterns of free flight.
         each
-            Whether spins and rebounds are also to be told at each contact by itself.
+            Whether spins, rebounds and durations are also to be told at each contact by itself.
         """
         motions = [video.motion for video in model.videos]
         contacts = {
@@ -72,6 +72,7 @@ class ContactScore:
                 f"rub {where}": _one_after_another([_rubbing_each(one) for one in some]),
                 f"slip {where}": [_slipping(one) for one in some],
                 f"turn {where}": [_slipping(one, moving=False) for one in some],
+                f"last {where}": [one.lasting(np.ones((len(one), 1))) for one in some],
             }
             if where == AT_CONTACTS:
                 changes["together"] = _one_after_another([one.pushed_together(unbalanced(one)) for one in some])
@@ -79,6 +80,7 @@ class ContactScore:
                 changes["bounce"] = [_bouncing(one) for one in some]
             if each:
                 changes[f"turn each {where}"] = _one_after_another([_rubbing_each(one, moving=False) for one in some])
+                changes[f"last each {where}"] = _one_after_another([one.lasting(np.eye(len(one))) for one in some])
             if each and where == AT_WALLS:
                 changes["bounce each"] = _one_after_another([_bouncing_each(one) for one in some])
         rows = {
@@ -108,6 +110,10 @@ class ContactScore:
     def normal(self, name: str) -> Score:
         """The score of what acts beside tangential impulses of any size at each contact, and beside all sizes."""
         return self.part(name, *self.rubbing, GROW)
+
+    def durations(self, name: str, *given: str) -> Score:
+        """The score of contacts that last, beside tangential impulses of any size and perhaps some others."""
+        return self.part(name, *self.rubbing, *given)
 
     @property
     def rebounds(self) -> Score:

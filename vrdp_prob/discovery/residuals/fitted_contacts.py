@@ -157,6 +157,26 @@ class FittedContacts:
         """Changes of what is measured by kicks of all bodies along x and along y, each by itself."""
         return self.motion.kicked(Kicks.single(self._times, self.bodies.ravel()))
 
+    def lasting(self, durations: Float[np.ndarray, "contact column"]) -> Float[np.ndarray, "time body 3 column"]:
+        """Changes of what is measured where contacts last, so that bodies yield and push back meanwhile.
+
+        A spring of no friction takes half of the duration to end the approach and the other half to part the bodies,
+        which is as if they met at once, and half of the duration later: each body is displaced by that time and by
+        what its velocity changes, the way it came. Source: collinear collision with a linear spring (W. J. Stronge,
+        Impact Mechanics, 2nd ed., section 2.2).
+
+        Parameters
+        ----------
+        durations
+            How long each contact lasts, in s.
+        """
+        change = self.sides[:, None] * (self.events.impulse[:, None] * self.events.normal)[:, None]
+        velocity = change / self.motion.mass[self.bodies][..., None]
+        moves = np.zeros((*self.bodies.shape, 3, durations.shape[1]))
+        moves[:, :, :2] = -velocity[..., None] * durations[:, None, None] / 2
+        flat = moves.reshape(self.bodies.size, 3, durations.shape[1])
+        return self.motion.kicked(Kicks(self._times, self.bodies.ravel(), np.zeros_like(flat), flat))
+
     def _kicked(self, changes: Float[np.ndarray, "contact side 3 column"]) -> Float[np.ndarray, "time body 3 column"]:
         flat = changes.reshape(self.bodies.size, 3, changes.shape[-1])
         return self.motion.kicked(Kicks(self._times, self.bodies.ravel(), flat))

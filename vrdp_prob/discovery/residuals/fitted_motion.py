@@ -49,11 +49,14 @@ class Kicks:
         When (s) and to which body each kick happens.
     changes
         Change of vx and vy in m/s and of the spin in rad/s, for each pattern.
+    moves
+        Change of x and y in m and of the angle in rad at the same time; none where None.
     """
 
     times: Float[np.ndarray, "kick"]
     bodies: Int[np.ndarray, "kick"]
     changes: Float[np.ndarray, "kick 3 column"]
+    moves: Float[np.ndarray, "kick 3 column"] | None = None
 
     @classmethod
     def single(cls, times: Float[np.ndarray, "kick"], bodies: Int[np.ndarray, "kick"]) -> "Kicks":
@@ -179,6 +182,7 @@ class FittedMotion:
     def kicked(self, kicks: "Kicks") -> Float[np.ndarray, "time body 3 column"]:
         """Changes of all places (m) and angles (rad) by kicks."""
         changes = kicks.changes
+        moves = np.zeros_like(changes) if kicks.moves is None else kicks.moves
         change = np.zeros((*self.speed.shape, STATE, changes.shape[-1]))
         last = len(self.times) - 1
         waiting = np.append(np.flatnonzero(self.restart), last)
@@ -190,7 +194,7 @@ class FittedMotion:
                 )
             for kick in np.flatnonzero((kicks.times <= self.times[frame]) & (begin >= frame)):
                 since = self.times[frame] - kicks.times[kick]
-                change[frame, kicks.bodies[kick], PLACES] += since * changes[kick]
+                change[frame, kicks.bodies[kick], PLACES] += moves[kick] + since * changes[kick]
                 change[frame, kicks.bodies[kick], RATES] += changes[kick]
         return change[:, :, SEEN]
 

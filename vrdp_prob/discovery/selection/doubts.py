@@ -1,7 +1,7 @@
 """Reasons to doubt that what was found is the cause that it is called."""
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,7 +10,7 @@ from jaxtyping import Float
 from vrdp_prob.discovery.candidates.scores import happens_once
 from vrdp_prob.discovery.checks.bodies import REBOUND, friction_against
 from vrdp_prob.discovery.checks.clock import LOST, SINGLE
-from vrdp_prob.discovery.checks.contacts import DISTANCE, REBOUND_AT_WALLS, RUBBING, RUBBING_AT_WALLS
+from vrdp_prob.discovery.checks.contacts import DISTANCE, DURATION, REBOUND_AT_WALLS, RUBBING, RUBBING_AT_WALLS
 from vrdp_prob.discovery.checks.kicks import KICK
 from vrdp_prob.discovery.checks.measurement import DISTORTION
 from vrdp_prob.discovery.finding import Check
@@ -32,7 +32,7 @@ SURPRISING = 0.01
 OWN_CHECKS: Mapping[str, tuple[str, ...]] = {
     SpeedDependentRestitution.name: (REBOUND, REBOUND_AT_WALLS),
     ContactFriction.name: (RUBBING, RUBBING_AT_WALLS),
-    ContactRadiusError.name: (DISTANCE,),
+    ContactRadiusError.name: (DISTANCE, *DURATION.values()),
     ExternalImpulse.name: (KICK,),
     ClockError.name: (LOST,),
     IrregularFrames.name: (SINGLE,),
@@ -93,6 +93,20 @@ def causes_with_own_check_failing(checks: Sequence[Check]) -> set[str]:
     """Names of causes whose very traces some checks have found."""
     failing = {check.name for check in checks if check.significant}
     return {name for name, own in OWN_CHECKS.items() if failing.intersection(own)}
+
+
+def rivals_outside(causes: Iterable[str], checks: Sequence[Check]) -> list[str]:
+    """What is not in the catalogue and would leave the same as some named causes do, in sentences.
+
+    Parameters
+    ----------
+    causes
+        Names of the effects.
+    checks
+        Checks of the model that was given.
+    """
+    own = {name for cause in causes for name in OWN_CHECKS.get(cause, ())}
+    return [check.rival for check in checks if check.name in own and check.rival]
 
 
 def with_doubts(

@@ -1,5 +1,7 @@
 """First guesses of hidden walls and discs, from kicks."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -8,11 +10,16 @@ from vrdp_prob.discovery.candidates import proposals
 from vrdp_prob.discovery.candidates.kicked_at_contact import kicked_at_contact
 from vrdp_prob.discovery.candidates.proposals import hidden_things
 from vrdp_prob.discovery.candidates.scores import score_causes
+from vrdp_prob.discovery.finding import UpperBound
+from vrdp_prob.discovery.page.wording import cause_title, title
 from vrdp_prob.discovery.residuals.residual_model import ResidualModel
+from vrdp_prob.discovery.selection.refits import Refits
 from vrdp_prob.discovery.selection.trials import Trial
 from vrdp_prob.models.effects.external_impulse import ExternalImpulse
 from vrdp_prob.models.effects.hidden_obstacle import HiddenObstacle
-from vrdp_prob.models.effects.wall import Wall
+from vrdp_prob.models.effects.surface_tilt import SurfaceTilt
+from vrdp_prob.models.effects.wall import SecondWall, ThirdWall, Wall
+from vrdp_prob.models.model_file import known_effects
 from vrdp_prob.models.simulator.events import EventTable, RolloutEventKind
 
 WAY, SEED = "hidden_obstacle", 1
@@ -48,6 +55,40 @@ def test_a_wall_is_guessed_square_to_the_kick(kicked: Trial) -> None:
     guesses = hidden_things(kicked.fit, [Wall()], 0.0)
     assert guesses
     assert all(0 < one.start["hidden_wall_restitution"] < 1 for one in guesses)
+
+
+def test_a_second_wall_is_guessed_with_numbers_of_its_own(kicked: Trial) -> None:
+    first, second = (hidden_things(kicked.fit, [effect], 0.0) for effect in (Wall(), SecondWall()))
+    assert [list(one.start.values()) for one in second] == [list(one.start.values()) for one in first]
+    assert all(name.startswith("second_hidden_wall_") for one in second for name in one.start)
+
+
+def test_a_second_wall_is_looked_for_beside_the_first_alone(kicked: Trial) -> None:
+    catalogue = (Wall(), SecondWall(), ThirdWall(), SurfaceTilt())
+    refits = Refits(catalogue, seed=0, needed=6.0, advance=lambda _count: None)
+    assert [one.name for one in refits.further(kicked)] == ["wall", "surface_tilt"]
+    model = kicked.fit.model
+    for there, further in ((catalogue[:1], "second_wall"), (catalogue[:2], "third_wall")):
+        extended = model
+        for effect in there:
+            extended = extended.with_effect(effect)
+        trial = replace(kicked, fit=replace(kicked.fit, model=extended))
+        assert [one.name for one in refits.further(trial)] == [further, "surface_tilt"]
+
+
+def test_further_things_are_ways_of_their_cause_and_change_no_threshold() -> None:
+    further = [effect for effect in known_effects().values() if effect.follows is not None]
+    assert {effect.name for effect in further} == {
+        "second_wall",
+        "third_wall",
+        "fourth_wall",
+        "second_hidden_obstacle",
+    }
+    for effect in further:
+        assert effect.way() == effect.name
+        assert cause_title(UpperBound(effect.cause_name(), "any", None, "m", way=effect.way())) == title(effect.name)
+        names = [parameter.name for parameter in effect.parameters]
+        assert len({*names, *(one.name for one in known_effects()[effect.cause_name()].parameters)}) == 2 * len(names)
 
 
 @pytest.mark.parametrize(

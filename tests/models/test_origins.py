@@ -29,7 +29,7 @@ LOOKED_FOR = [
 ]
 
 
-SIZES = {"patch_radius", "obstacle_radius", "pair_softening"}
+SIZES = {"patch_radius", "obstacle_radius", "second_obstacle_radius", "pair_softening"}
 """Parameters that are expected to go with the size of the scene; they are stated for one of a half width of 3 m."""
 
 

@@ -205,7 +205,7 @@ def _bounds(found: Search, told: Sequence[FoundCause]) -> list[UpperBound]:
     return [
         bound
         for effect in left
-        if effect.cause_name() not in estimated
+        if effect.cause_name() not in estimated and effect.follows is None
         for bound in upper_bounds(effect, scores.get(effect.name), widening=widening, videos=videos)
     ]
 

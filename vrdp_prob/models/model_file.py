@@ -19,7 +19,7 @@ import json
 import math
 import pkgutil
 import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import cache
 from typing import Any
@@ -38,9 +38,14 @@ def known_effects() -> Mapping[str, type[Effect]]:
     """All effects by name: every file of `vrdp_prob.models.effects` that defines one."""
     for module in pkgutil.iter_modules(catalogue.__path__, catalogue.__name__ + "."):
         importlib.import_module(module.name)
-    return {
-        effect.name: effect for effect in Effect.__subclasses__() if effect.__module__.startswith(__package__ or "")
-    }
+    return {effect.name: effect for effect in _kinds_of(Effect) if effect.__module__.startswith(__package__ or "")}
+
+
+def _kinds_of(effect: type[Effect]) -> Iterator[type[Effect]]:
+    """All classes that derive from one."""
+    for kind in effect.__subclasses__():
+        yield kind
+        yield from _kinds_of(kind)
 
 
 def text(name: str, effects: Sequence[Effect], parameters: Mapping[str, Parameter]) -> str:

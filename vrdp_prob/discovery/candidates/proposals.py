@@ -46,7 +46,7 @@ def hidden_things(kicked: SharedFit, catalogue: Sequence[Effect], p_value: float
     return [
         CauseScore(effect, start, (), 0.0, 0, p_value, {})
         for effect in catalogue
-        if isinstance(effect, (Wall, HiddenObstacle))
+        if isinstance(effect, Wall | HiddenObstacle)
         for kick in _kicks(kicked)
         for start in _surfaces(kicked, kick, effect)
     ]
@@ -75,7 +75,7 @@ def _kicks(fit: SharedFit) -> list[_Kick]:
     return sorted(found, key=lambda one: -float(np.linalg.norm(one.change)))[:MOST_KICKS]
 
 
-def _surfaces(fit: SharedFit, kick: _Kick, effect: Effect) -> Iterator[dict[str, float]]:
+def _surfaces(fit: SharedFit, kick: _Kick, effect: Wall | HiddenObstacle) -> Iterator[dict[str, float]]:
     """What may have thrown a body back."""
     video = fit.joint.videos[kick.video]
     tracks = video.likelihood.tracks
@@ -91,18 +91,9 @@ def _surfaces(fit: SharedFit, kick: _Kick, effect: Effect) -> Iterator[dict[str,
         factor = float(np.clip(leaving / arriving / RESTITUTION.default, 0.05, 0.95))
     radius = (tracks.bodies[kick.body].radius or 0.0) - EARLY
     if isinstance(effect, Wall):
-        yield {
-            "hidden_wall_distance": float(place @ into) + radius,
-            "hidden_wall_direction": math.atan2(into[1], into[0]),
-            "hidden_wall_restitution": factor,
-        }
+        yield effect.start(float(place @ into) + radius, math.atan2(into[1], into[0]), factor)
         return
     unit = Region.of(fit.tracks).half_width
     for size in (share * unit for share in RADII):
         x, y = place + (radius + size) * into
-        yield {
-            "obstacle_x": float(x),
-            "obstacle_y": float(y),
-            "obstacle_radius": size,
-            "obstacle_restitution": factor,
-        }
+        yield effect.start((float(x), float(y)), size, factor)

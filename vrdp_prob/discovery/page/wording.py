@@ -168,7 +168,9 @@ def title(name: str) -> str:
 
 def cause_title(cause: FoundCause | TriedCause | UpperBound) -> str:
     """Name of a cause as words, with the way in which it acts where that is a further one."""
-    return title(cause.name) if cause.way is None else f"{title(cause.name)} by {title(cause.way)}"
+    if cause.way is None or cause.way.endswith(cause.name):  # a second wall
+        return title(cause.way or cause.name)
+    return f"{title(cause.name)} by {title(cause.way)}"
 
 
 def effect_of(name: str, model: PhysicsModel) -> Effect | type[Effect] | None:

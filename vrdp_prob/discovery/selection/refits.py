@@ -86,13 +86,18 @@ class Refits:
     def left(self, trial: Trial) -> Left:
         """What a model leaves."""
         if trial not in self._left:
-            further = [effect for effect in self.catalogue if effect.name not in trial.names]
+            further = self.further(trial)
             found = trial.unexplained
             scores = beside = score_causes(trial.fit, found.plain, further, seed=self.seed)
             if found.accelerated:
                 beside = score_causes(trial.fit, found.model, further, seed=self.seed)
             self._left[trial] = Left(tuple(scores), tuple(beside), overdispersion(found.model, seed=self.seed))
         return self._left[trial]
+
+    def further(self, trial: Trial) -> list[Effect]:
+        """Causes that may be added to a model: those that it lacks, a second thing of a kind only beside the first."""
+        there = {effect.name for effect in trial.fit.model.effects}
+        return [one for one in self.catalogue if one.name not in there and one.follows in {None, *there}]
 
     def checks(self, trial: Trial) -> tuple[Check, ...]:
         """Checks of what a model leaves."""
@@ -206,7 +211,7 @@ class Refits:
         """
         if trial.choices:
             return []
-        left = [effect for effect in self.catalogue if effect.name not in trial.names]
+        left = self.further(trial)
         likely = {one.effect.name for one in _shortlist(self.left(trial).scores)}
         reached = {one.causes[-1].name: one.brought(trial) for one in reversed(found)}
         best = next((one.fit for one in found if not _mends_several(one)), trial.fit)
@@ -248,7 +253,7 @@ class Refits:
         known
             Names of causes whose fits are there already.
         """
-        left = [effect for effect in self.catalogue if effect.name not in {*kicked.names, *known}]
+        left = [effect for effect in self.further(kicked) if effect.name not in known]
         starts = hidden_things(kicked.fit, left, p_value)
         return self._all(partial(kicked.with_cause_in_place, least=trial.fit.joint.log_density), starts)
 

@@ -147,7 +147,7 @@ def search(
     progress
         Told how far the work is.
     """
-    needed = gain_needed(len(catalogue))
+    needed = gain_needed(sum(effect.follows is None for effect in catalogue))
     with (progress or SilentProgress()).stage("Trying causes", total=None) as advance:
         searcher = _Searcher(Refits(tuple(catalogue), seed, needed, advance))
         chain = [Trial((), with_own_population(fit), stated=fit.model.beliefs).continued()]

@@ -115,6 +115,8 @@ class Effect:
     """Name in the catalogue of causes."""
     cause: ClassVar[str | None] = None
     """Name of the cause that the effect is a further way of; None where the effect is the cause itself."""
+    follows: ClassVar[str | None] = None
+    """Name of the effect beside which alone it is looked for, as a second wall is beside a first one; None without."""
     sentence: ClassVar[str]
     """One sentence a person can read."""
     signed_sentences: ClassVar[tuple[str, str] | None] = None

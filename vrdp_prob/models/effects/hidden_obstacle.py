@@ -14,12 +14,18 @@ from vrdp_prob.models.parameters import Parameter, Prior, Transform, restitution
 from vrdp_prob.models.simulator.obstacle import Obstacle
 from vrdp_prob.scene import Tracks
 
-OBSTACLE_X = Parameter("obstacle_x", "m", "x of the obstacle", Transform.IDENTITY, Prior(0.0, 2.0), default=0.0)
-OBSTACLE_Y = Parameter("obstacle_y", "m", "y of the obstacle", Transform.IDENTITY, Prior(0.0, 2.0), default=0.0)
-OBSTACLE_RADIUS = Parameter(
-    "obstacle_radius", "m", "radius of the obstacle", Transform.LOG, Prior(math.log(0.2), 0.7), default=0.2
-)
-OBSTACLE_RESTITUTION = restitution_parameter("obstacle_restitution", "restitution factor of the obstacle")
+
+def _parameters(which: str = "") -> tuple[Parameter, Parameter, Parameter, Parameter]:
+    """Place, radius and restitution of a disc, the names with a word that tells it from others."""
+    x, y = (
+        Parameter(f"{which}obstacle_{axis}", "m", f"{axis} of the obstacle", Transform.IDENTITY, Prior(0.0, 2.0), 0.0)
+        for axis in "xy"
+    )
+    radius = Parameter(
+        f"{which}obstacle_radius", "m", "radius of the obstacle", Transform.LOG, Prior(math.log(0.2), 0.7), default=0.2
+    )
+    return x, y, radius, restitution_parameter(f"{which}obstacle_restitution", "restitution factor of the obstacle")
+
 
 REACH, SIZE = 1.0, 0.07
 """Standard deviation of each coordinate of its place, and its radius, in half widths of the region where bodies were
@@ -33,18 +39,31 @@ class HiddenObstacle(Effect):
     sentence: ClassVar = "Something that cannot be seen stands in the way."
     law: ClassVar = "a fixed disc at (obstacle_x, obstacle_y) with obstacle_radius; e = r obstacle_restitution"
     source: ClassVar = "contact with a body of infinite mass"
-    parameters: ClassVar = (OBSTACLE_X, OBSTACLE_Y, OBSTACLE_RADIUS, OBSTACLE_RESTITUTION)
+    parameters: ClassVar = _parameters()
+
+    def start(self, place: tuple[float, float], radius: float, restitution: float) -> dict[str, float]:
+        """Values of its parameters in m and 1."""
+        return dict(zip((one.name for one in self.parameters), (*place, radius, restitution), strict=True))
 
     def expected(self, videos: Sequence[Tracks]) -> Mapping[str, Parameter]:
         """The obstacle is somewhere where bodies were seen, and small beside that."""
-        region = Region.of(videos)
-        return region.expected(OBSTACLE_X, OBSTACLE_Y, REACH) | region.expected_size(OBSTACLE_RADIUS, SIZE)
+        region, (x, y, radius, _) = Region.of(videos), self.parameters
+        return region.expected(x, y, REACH) | region.expected_size(radius, SIZE)
 
     def unmet(self, videos: Sequence[Tracks]) -> Mapping[str, Unmet]:
         """A disc is met by all that pass within its radius."""
-        return {OBSTACLE_RADIUS.name: largest_disc(videos)}
+        return {self.parameters[2].name: largest_disc(videos)}
 
     def obstacles(self, parameters: Mapping[str, Float[Tensor, "..."]]) -> Sequence[Obstacle]:
         """The disc."""
-        names = ("obstacle_x", "obstacle_y", "obstacle_radius", "obstacle_restitution")
-        return (Obstacle.disc(*(parameters[name] for name in names)),)
+        return (Obstacle.disc(*(parameters[one.name] for one in self.parameters)),)
+
+
+class SecondHiddenObstacle(HiddenObstacle):
+    """A second disc beside the first."""
+
+    name: ClassVar = "second_hidden_obstacle"
+    cause: ClassVar = HiddenObstacle.name
+    follows: ClassVar = HiddenObstacle.name
+    sentence: ClassVar = "A second thing that cannot be seen stands in the way."
+    parameters: ClassVar = _parameters("second_")

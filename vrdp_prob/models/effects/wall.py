@@ -17,23 +17,29 @@ from vrdp_prob.scene import Tracks
 HALF_LENGTH = 20.0
 """Half the length of the wall in m: it ends nowhere that a body gets to."""
 
-WALL_DISTANCE = Parameter(
-    "hidden_wall_distance",
-    "m",
-    "distance of the wall from the origin",
-    Transform.IDENTITY,
-    Prior(0.0, 3.0),
-    default=3.0,
-)
-WALL_DIRECTION = Parameter(
-    "hidden_wall_direction",
-    "rad",
-    "direction from the origin to the wall, square to it",
-    Transform.IDENTITY,
-    Prior(0.0, 2.0),
-    default=0.0,
-)
-HIDDEN_WALL_RESTITUTION = restitution_parameter("hidden_wall_restitution", "restitution factor of the wall")
+
+def _parameters(which: str = "") -> tuple[Parameter, Parameter, Parameter]:
+    """Distance, direction and restitution of a wall, the names with a word that tells it from others."""
+    return (
+        Parameter(
+            f"{which}hidden_wall_distance",
+            "m",
+            "distance of the wall from the origin",
+            Transform.IDENTITY,
+            Prior(0.0, 3.0),
+            default=3.0,
+        ),
+        Parameter(
+            f"{which}hidden_wall_direction",
+            "rad",
+            "direction from the origin to the wall, square to it",
+            Transform.IDENTITY,
+            Prior(0.0, 2.0),
+            default=0.0,
+        ),
+        restitution_parameter(f"{which}hidden_wall_restitution", "restitution factor of the wall"),
+    )
+
 
 REACH = 1.5
 """Standard deviation of its distance from the middle of the region where bodies were seen, in half widths of that."""
@@ -49,23 +55,57 @@ class Wall(Effect):
         "e = r hidden_wall_restitution"
     )
     source: ClassVar = "contact with a body of infinite mass"
-    parameters: ClassVar = (WALL_DISTANCE, WALL_DIRECTION, HIDDEN_WALL_RESTITUTION)
+    parameters: ClassVar = _parameters()
+
+    def start(self, distance: float, direction: float, restitution: float) -> dict[str, float]:
+        """Values of its parameters in m, rad and 1."""
+        return dict(zip((one.name for one in self.parameters), (distance, direction, restitution), strict=True))
 
     def expected(self, videos: Sequence[Tracks]) -> Mapping[str, Parameter]:
         """The wall is somewhere in or around the region where bodies were seen."""
-        return Region.of(videos).expected_distance(WALL_DISTANCE, REACH)
+        return Region.of(videos).expected_distance(self.parameters[0], REACH)
 
     def unmet(self, videos: Sequence[Tracks]) -> Mapping[str, Unmet]:
         """No path goes through a wall."""
-        return {WALL_DISTANCE.name: deepest_wall(videos)}
+        return {self.parameters[0].name: deepest_wall(videos)}
 
     def obstacles(self, parameters: Mapping[str, Float[Tensor, "..."]]) -> Sequence[Obstacle]:
         """The wall."""
-        distance, direction = parameters["hidden_wall_distance"], parameters["hidden_wall_direction"]
+        distance, direction, restitution = (parameters[one.name] for one in self.parameters)
         x, y = torch.cos(direction), torch.sin(direction)
         ends = [
             coordinate
             for side in (-HALF_LENGTH, HALF_LENGTH)
             for coordinate in (distance * x - side * y, distance * y + side * x)
         ]
-        return (Obstacle.walls(torch.stack(ends, dim=-1)[:, None], parameters["hidden_wall_restitution"][:, None]),)
+        return (Obstacle.walls(torch.stack(ends, dim=-1)[:, None], restitution[:, None]),)
+
+
+class SecondWall(Wall):
+    """A second wall beside the first."""
+
+    name: ClassVar = "second_wall"
+    cause: ClassVar = Wall.name
+    follows: ClassVar = Wall.name
+    sentence: ClassVar = "A second wall that cannot be seen throws bodies back."
+    parameters: ClassVar = _parameters("second_")
+
+
+class ThirdWall(Wall):
+    """A third wall beside the second."""
+
+    name: ClassVar = "third_wall"
+    cause: ClassVar = Wall.name
+    follows: ClassVar = SecondWall.name
+    sentence: ClassVar = "A third wall that cannot be seen throws bodies back."
+    parameters: ClassVar = _parameters("third_")
+
+
+class FourthWall(Wall):
+    """A fourth wall beside the third, with which a table is enclosed."""
+
+    name: ClassVar = "fourth_wall"
+    cause: ClassVar = Wall.name
+    follows: ClassVar = ThirdWall.name
+    sentence: ClassVar = "A fourth wall that cannot be seen throws bodies back."
+    parameters: ClassVar = _parameters("fourth_")

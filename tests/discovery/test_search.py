@@ -364,7 +364,7 @@ def test_a_cause_with_which_no_joint_world_can_begin_is_left_out(monkeypatch: py
     monkeypatch.setattr(refits, "causes_of_lost_videos", lambda *_given, **_named: [(SurfaceTilt(), 50.0)])
     monkeypatch.setattr(refits.Refits, "left", lambda _self, _trial: Mock(scores=()))
     trial = _refit("", 0.0)
-    trial.choices, trial.names, trial.fit = {}, (), Mock(fits=[])
+    trial.choices, trial.names, trial.fit = {}, (), Mock(fits=[], model=Mock(effects=()))
     assert _refits()._lost(trial, []) == []
 
 

@@ -14,6 +14,8 @@ from vrdp_prob.scene import Shape, Wall
 
 SPINNING = ("magnus_curl", "contact_friction")
 """Causes that act by the spin, which is seen only where angles are measured."""
+WHICH = ("", "second_", "third_", "fourth_")
+"""How names of parameters tell several walls apart."""
 ROUGH = Measurement(outliers=0.05, dropout=0.1)
 """A poor tracker: gross errors and missing frames."""
 
@@ -81,11 +83,10 @@ def true_values(truth: Truth, found: Mapping[str, float]) -> dict[str, float]:
                     f"impulse_x[{body} in {name}]": laws.kick_x,
                     f"impulse_y[{body} in {name}]": laws.kick_y,
                 }
-        elif cause.way == "wall" and "hidden_wall_distance" in found:
-            walls = [_placed(wall, found) for wall in truth.videos[0].hidden_walls]
-            values |= min(
-                walls, key=lambda one: math.dist(*zip(*((one[name], found[name]) for name in one), strict=True))
-            )
+        elif cause.way == "wall":
+            for which in WHICH:
+                if f"{which}hidden_wall_distance" in found:
+                    values |= _nearest_wall(truth.videos[0].hidden_walls, found, which)
     return {name: float(value) for name, value in values.items() if name in found}
 
 
@@ -93,15 +94,20 @@ def _named(truth: Truth) -> dict[str, Video]:
     return {f"v{k + 1:02d}": video for k, video in enumerate(truth.videos)}
 
 
-def _placed(wall: Wall, found: Mapping[str, float]) -> dict[str, float]:
-    """Distance (m) and direction (rad) of a wall, of the equal directions the one that is nearest to what was found."""
+def _nearest_wall(walls: Sequence[Wall], found: Mapping[str, float], which: str) -> dict[str, float]:
+    """Distance (m) and direction (rad) of the wall that is nearest to one that was found, by its names."""
+    names = [f"{which}{name}" for name in ("hidden_wall_distance", "hidden_wall_direction")]
+    estimated = [found[name] for name in names]
+    placed = [_placed(wall, estimated[1]) for wall in walls]
+    return dict(zip(names, min(placed, key=lambda one: math.dist(one, estimated)), strict=True))
+
+
+def _placed(wall: Wall, near: float) -> tuple[float, float]:
+    """Distance (m) and direction (rad) of a wall, of the equal directions the one that is nearest to a given one."""
     direction = math.atan2(wall.x1 - wall.x2, wall.y2 - wall.y1)
     distance = wall.x1 * math.cos(direction) + wall.y1 * math.sin(direction)
-    turns = round((found["hidden_wall_direction"] - direction) / math.pi)
-    return {
-        "hidden_wall_distance": distance * (-1) ** turns,
-        "hidden_wall_direction": direction + turns * math.pi,
-    }
+    turns = round((near - direction) / math.pi)
+    return distance * (-1) ** turns, direction + turns * math.pi
 
 
 def _laws(**numbers: str) -> Callable[[Video], dict[str, float]]:

@@ -82,6 +82,9 @@ def test_bounds_and_units() -> None:
     slip = UpperBound("slip_to_roll", "slip_friction", 3e-4, "1", "rolling_resistance")
     assert bound_words(slip) == "within 0.0003 of the rolling resistance"
     assert with_unit("3", "1") == "3"
+    wall = UpperBound("wall", "hidden_wall_distance", 0.0, "m", measure="depth of a wall")
+    assert bound_words(wall) == "none"
+    assert bound_words(replace(wall, bound=0.2)) == "≤ 0.2 m"
 
 
 def test_p_values_and_probabilities() -> None:

@@ -1,5 +1,6 @@
 """First guesses of hidden walls and discs, from kicks."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -88,6 +89,7 @@ def test_further_things_are_ways_of_their_cause_and_change_no_threshold() -> Non
         assert effect.way() == effect.name
         assert cause_title(UpperBound(effect.cause_name(), "any", None, "m", way=effect.way())) == title(effect.name)
         names = [parameter.name for parameter in effect.parameters]
+        assert all(re.search(rf"\b{name}\b", effect.law) for name in names)
         assert len({*names, *(one.name for one in known_effects()[effect.cause_name()].parameters)}) == 2 * len(names)
 
 

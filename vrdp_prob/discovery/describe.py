@@ -77,8 +77,8 @@ def _at_contacts(
     """The sparse formula of what is missing at contacts, beside that of free flight; empty where nothing is."""
     contacts = MissingImpulse.of(model, flight.scales)
     beside = model.freed(contacts.anything).sharing([rows[:, chosen] for rows in flight.rows])
-    kept = [video.linear.name in windows.lost for video in model.videos]
-    found = sparse_formula(Separate.of(beside, contacts.rows, noise).without(kept))
+    lost = [video.linear.name in windows.lost for video in model.videos]
+    found = sparse_formula(Separate.of(beside, contacts.rows, noise).without(lost))
     terms = [contacts.patterns[k].formula for k in found.terms]
     return found, _formula("J", terms, found.coefficients) if terms else ""
 

@@ -92,7 +92,7 @@ def discover(
             better = fit.with_other_courses(seed=seed) if explained(fit.fits) else fit
             outcome = outcome if better is fit else outcome_of(better, looked_for, seed=seed, progress=progress)
         found, causes = outcome.found, outcome.causes
-        tried = tried_causes(found, {cause.name for cause in causes}, seed=seed)
+        tried = tried_causes(found, _names_of(found, causes), seed=seed)
     doubtful = outcome.verdict is Verdict.UNKNOWN
     return Finding(
         verdict=outcome.verdict,
@@ -196,16 +196,24 @@ def _told(found: Search, causes: Sequence[FoundCause]) -> list[Effect]:
     return [effect for effect in found.refits.catalogue if effect.cause_name() in names]
 
 
+def _names_of(found: Search, causes: Sequence[FoundCause]) -> set[str]:
+    """Names of the effects as which some causes act, all ways of a cause, and no second thing of one that is told."""
+    further = {effect.name for effect in found.refits.catalogue if effect.follows is not None}
+    ways = {effect.name for effect in _told(found, causes)} - further
+    return ways | {cause.effect for cause in causes}
+
+
 def _bounds(found: Search, told: Sequence[FoundCause]) -> list[UpperBound]:
     """Bounds of the causes that are not told of, which have estimates instead."""
     estimated = {cause.name for cause in told}
     scores = {score.effect.name: score for score in found.left.beside_chance}
     left = sorted(found.refits.catalogue, key=lambda effect: effect.name not in scores)
+    catalogue = {effect.name for effect in left}
     widening, videos = float(np.sqrt(found.overdispersion.mean())), found.base.fit.tracks
     return [
         bound
         for effect in left
-        if effect.cause_name() not in estimated and effect.follows is None
+        if effect.cause_name() not in estimated and effect.follows not in catalogue
         for bound in upper_bounds(effect, scores.get(effect.name), widening=widening, videos=videos)
     ]
 

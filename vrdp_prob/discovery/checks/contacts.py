@@ -10,6 +10,7 @@ from dataclasses import replace
 import numpy as np
 from jaxtyping import Float
 from scipy.special import expit
+from scipy.stats import norm
 
 from vrdp_prob.discovery.checks.bodies import REBOUND
 from vrdp_prob.discovery.checks.flight import SEEN
@@ -30,6 +31,8 @@ RUBBING_OF = {AT_CONTACTS: RUBBING, AT_WALLS: RUBBING_AT_WALLS}
 TURNING = {where: f"spin change {where}" for where in WHERE}
 DURATION = {where: f"duration of touch {where}" for where in WHERE}
 """Names of the checks of tangential impulses, of spins and of how long bodies touch, by where they do."""
+ONE_SIDED_95 = 1.645
+"""Standard deviations from the middle of a normal distribution to the end of its lower 95 %."""
 APART = 0.01
 """Probability below which of two explanations one is told from the other."""
 
@@ -62,7 +65,7 @@ def _patterns(contacts: ContactScore) -> Iterator[Check]:
             yield from _turn_check(contacts.tangential("turn", where), where)
         else:
             yield from _rub_check(contacts.tangential("rub", where), where)
-        yield from _duration_check(contacts.durations(f"last {where}", GROW), where)
+        yield from _duration_check(contacts.durations("last", where, GROW), where)
     if AT_CONTACTS in contacts.clear:
         yield from _distance_check(contacts.part(GROW, *contacts.rubbing), contacts)
         yield from _momentum_check(contacts.normal("together"), sum(map(len, contacts.clear[AT_CONTACTS])))
@@ -136,19 +139,16 @@ def _distance_check(score: Score, contacts: ContactScore) -> Iterator[Check]:
         f"{number(100 * abs(share))} % of it."
     )
     check = _check(DISTANCE, size, score.p_value, found, f"{number(NORMAL_95 * sd)} m")
-    yield replace(check, rival=_lasting_instead(score, contacts.durations(f"last {AT_CONTACTS}")))
+    yield replace(check, rival=_lasting_instead(score, contacts.durations("last", AT_CONTACTS)))
 
 
 def _duration_check(score: Score, where: str) -> Iterator[Check]:
-    """How long bodies touch, whatever their size; what is negative no contact does, and is a misfit of another kind."""
+    """How long bodies touch, whatever their size; no contact lasts less than no time, so it is asked to one side."""
     if not score.degrees:
         return
     size, sd = float(score.estimate[0]), float(score.sd[0])
-    if size >= 0:
-        found = f"{where.capitalize()} bodies touch for {number(size)} s, and give way meanwhile."
-    else:
-        found = f"{where.capitalize()} bodies part earlier than they can, by {number(-size / 2)} s."
-    yield _check(DURATION[where], size, score.p_value, found, f"{number(NORMAL_95 * sd)} s")
+    found = f"{where.capitalize()} bodies touch for {number(max(size, 0.0))} s, and give way meanwhile."
+    yield _check(DURATION[where], size, float(norm.sf(size / sd)), found, f"{number(ONE_SIDED_95 * sd)} s")
 
 
 def _lasting_instead(distance: Score, duration: Score) -> str:
@@ -156,11 +156,14 @@ def _lasting_instead(distance: Score, duration: Score) -> str:
     if not duration.degrees or duration.estimate[0] <= 0 or distance.p_value > SEEN:
         return ""
     share = float(expit((duration.chi_square - distance.chi_square) / 2))
-    if not APART < share < 1 - APART:
+    lasting = f"Contacts that last {number(float(duration.estimate[0]))} s"
+    if share <= APART:
         return ""
+    if share >= 1 - APART:
+        return f"{lasting} explain it better."
     return (
-        f"Contacts that last {number(float(duration.estimate[0]))} s would look like that, with a probability of "
-        f"{100 * share:.0f} % by these videos: faster and slower contacts would tell."
+        f"{lasting} would look like that, with a probability of {100 * share:.0f} % by these videos: faster and slower "
+        "contacts would tell."
     )
 
 

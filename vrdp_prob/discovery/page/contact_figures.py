@@ -89,7 +89,7 @@ def _durations(seen: Sequence[Seen], where: str) -> str:
 
     def points(contacts: ContactScore) -> Points:
         speed = _each(contacts, where, lambda one: np.exp(one.log_speed))
-        score = contacts.durations(f"last each {where}")
+        score = contacts.durations("last each", where)
         return Points(speed, score.estimate, score.sd)
 
     return with_bars(

@@ -137,6 +137,7 @@ def _evidence(checks: Sequence[Check]) -> list[dict[str, Any]]:
             "significant": check.significant,
             "statistic": check.statistic,
             "sentence": check.sentence,
+            "rival": check.rival or None,
         }
         for check in checks
     ]

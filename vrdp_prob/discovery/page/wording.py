@@ -120,6 +120,8 @@ def bound_words(bound: UpperBound) -> str:
     """An upper bound with its unit, from where it counts if that is not 0, and where; or that there is none."""
     if bound.bound is None or not math.isfinite(bound.bound):
         return "no bound"
+    if bound.measure is not None and bound.bound <= 0:
+        return "none"
     where = f" at {bound.told} of {bound.places} places, the others tell nothing" if bound.told < bound.places else ""
     return f"{_bound_size(bound)}{where}"
 

@@ -111,9 +111,10 @@ class ContactScore:
         """The score of what acts beside tangential impulses of any size at each contact, and beside all sizes."""
         return self.part(name, *self.rubbing, GROW)
 
-    def durations(self, name: str, *given: str) -> Score:
-        """The score of contacts that last, beside tangential impulses of any size and perhaps some others."""
-        return self.part(name, *self.rubbing, *given)
+    def durations(self, name: str, where: str, *given: str) -> Score:
+        """The score of contacts that last, beside tangential impulses of any size, other contacts and perhaps more."""
+        others = (f"last {one}" for one in self.clear if one != where)
+        return self.part(f"{name} {where}", *self.rubbing, *others, *given)
 
     @property
     def rebounds(self) -> Score:

@@ -17,14 +17,15 @@ def tried_causes(found: Search, told: Collection[str], *, seed: int) -> list[Tri
     found
         The search.
     told
-        Names of causes that are told of otherwise.
+        Names of effects that are told of otherwise.
     seed
         Of the drawing of videos.
     """
     best_of: dict[str, Trial] = {}
     for trial in found.refits.made(found.best):
-        if (name := trial.causes[-1].cause_name()) not in told:
-            best_of.setdefault(name, trial)
+        cause = trial.causes[-1]
+        if cause.name not in told:
+            best_of.setdefault(cause.name if cause.follows else cause.cause_name(), trial)
     return sorted((_tried(found, trial, seed) for trial in best_of.values()), key=lambda one: -one.gain)
 
 

@@ -27,6 +27,13 @@ def _parameters(which: str = "") -> tuple[Parameter, Parameter, Parameter, Param
     return x, y, radius, restitution_parameter(f"{which}obstacle_restitution", "restitution factor of the obstacle")
 
 
+def _law(which: str = "") -> str:
+    return (
+        f"a fixed disc at ({which}obstacle_x, {which}obstacle_y) with {which}obstacle_radius; "
+        f"e = r {which}obstacle_restitution"
+    )
+
+
 REACH, SIZE = 1.0, 0.07
 """Standard deviation of each coordinate of its place, and its radius, in half widths of the region where bodies were
 seen."""
@@ -37,7 +44,7 @@ class HiddenObstacle(Effect):
 
     name: ClassVar = "hidden_obstacle"
     sentence: ClassVar = "Something that cannot be seen stands in the way."
-    law: ClassVar = "a fixed disc at (obstacle_x, obstacle_y) with obstacle_radius; e = r obstacle_restitution"
+    law: ClassVar = _law()
     source: ClassVar = "contact with a body of infinite mass"
     parameters: ClassVar = _parameters()
 
@@ -65,5 +72,6 @@ class SecondHiddenObstacle(HiddenObstacle):
     name: ClassVar = "second_hidden_obstacle"
     cause: ClassVar = HiddenObstacle.name
     follows: ClassVar = HiddenObstacle.name
-    sentence: ClassVar = "A second thing that cannot be seen stands in the way."
+    sentence: ClassVar = "Something further that cannot be seen stands in the way."
+    law: ClassVar = _law("second_")
     parameters: ClassVar = _parameters("second_")

@@ -18,6 +18,8 @@ REACH_IN_TIME = 0.6
 
 AROUND = 5
 """Positions in a row whose middle is where a body was."""
+LONGEST_STEP = 3
+"""Frames between two positions up to which a body is taken to have gone straight from one to the other."""
 
 
 @dataclass(frozen=True)
@@ -113,17 +115,20 @@ def _bounds(videos: Sequence[Tracks]) -> tuple[Float[np.ndarray, "2"], Float[np.
     return paths.min(axis=0), paths.max(axis=0)
 
 
-def paths_of_bodies(videos: Sequence[Tracks]) -> list[tuple[float, Float[np.ndarray, "place 2"]]]:
+def paths_of_bodies(videos: Sequence[Tracks]) -> list[tuple[float, list[Float[np.ndarray, "place 2"]]]]:
     """Radius and path in m of each body of each video: a radius that nobody states is 0, and no outlier counts.
 
-    Each place is that in the middle of those around it.
+    Each place is that in the middle of those around it. A path has several parts where a body was not seen for a while.
     """
-    return [
-        (body.radius or 0.0, _without_outliers(tracks.positions[tracks.seen[:, index], index]))
-        for tracks in videos
-        for index, body in enumerate(tracks.bodies)
-        if tracks.seen[:, index].any()
-    ]
+    found = []
+    for tracks in videos:
+        for index, body in enumerate(tracks.bodies):
+            frames = np.flatnonzero(tracks.seen[:, index])
+            if len(frames):
+                path = _without_outliers(tracks.positions[frames, index])
+                gaps = np.flatnonzero(np.diff(frames) > LONGEST_STEP) + 1
+                found.append((body.radius or 0.0, np.split(path, gaps)))
+    return found
 
 
 def _without_outliers(path: Float[np.ndarray, "place 2"]) -> Float[np.ndarray, "place 2"]:
@@ -134,4 +139,4 @@ def _without_outliers(path: Float[np.ndarray, "place 2"]) -> Float[np.ndarray, "
 
 def _paths(videos: Sequence[Tracks]) -> Float[np.ndarray, "place 2"]:
     """Where bodies were seen in m."""
-    return np.concatenate([path for _, path in paths_of_bodies(videos)])
+    return np.concatenate([part for _, path in paths_of_bodies(videos) for part in path])

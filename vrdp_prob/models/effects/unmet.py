@@ -21,7 +21,7 @@ ROUNDING = 1e-9
 NOISE = 3.0
 """Standard deviations of the noise by which a body may seem to have been inside of what it touched."""
 DIRECTIONS = 360
-"""Directions, half a degree apart, in which walls and the edge of the region are looked for."""
+"""Directions in which walls (over half a turn) and the edge of the region (over a whole turn) are looked for."""
 
 
 @dataclass(frozen=True)
@@ -50,10 +50,11 @@ def largest_disc(videos: Sequence[Tracks]) -> Unmet:
 
     Returns
     -------
-    Its radius in m, at most by the size of a cell too large.
+    Its radius in m, rather too large than too small: by the size of a cell, and by up to a tenth of what radii of
+    bodies differ by. Where a body was not seen for a while nobody knows where it went.
     """
     bodies = _passages(videos)
-    everywhere = np.concatenate([path for _, path in bodies])
+    everywhere = np.concatenate([part for _, path in bodies for part in path])
     low, high = everywhere.min(axis=0), everywhere.max(axis=0)
     cell = float((high - low).max()) / CELLS
     middles = _grid(low, high, cell)
@@ -63,7 +64,7 @@ def largest_disc(videos: Sequence[Tracks]) -> Unmet:
     step = float(np.ptp(reaches)) / SIZES or 1.0
     size_of = np.floor((reaches - reaches.min()) / step)
     for size in np.unique(size_of):
-        places = np.concatenate([_dense(bodies[k][1], cell) for k in np.flatnonzero(size_of == size)])
+        places = np.concatenate([_dense(part, cell) for k in np.flatnonzero(size_of == size) for part in bodies[k][1]])
         distance, _ = KDTree(places).query(middles)
         room = np.minimum(room, distance - (reaches.min() + size * step))
     # between two points of the grid there is at most half a diagonal of a cell more room than at the nearest of them
@@ -84,15 +85,15 @@ def deepest_wall(videos: Sequence[Tracks]) -> Unmet:
     """
     turns = np.pi * np.arange(DIRECTIONS) / DIRECTIONS
     normals = np.stack([np.cos(turns), np.sin(turns)])
-    along = [(reach, path @ normals) for reach, path in _passages(videos)]
+    along = [(reach, np.concatenate(path) @ normals) for reach, path in _passages(videos)]
     first = np.array([heights.min(axis=0) - reach for reach, heights in along])
     last = np.array([heights.max(axis=0) + reach for reach, heights in along])
     words = "depth of a wall in the region where bodies were, between all paths"
     return Unmet(max(map(_depth, first.T, last.T)), words)
 
 
-def _passages(videos: Sequence[Tracks]) -> list[tuple[float, Float[np.ndarray, "place 2"]]]:
-    """How far around its middle nothing else was, and the path, in m, of each body of each video."""
+def _passages(videos: Sequence[Tracks]) -> list[tuple[float, list[Float[np.ndarray, "place 2"]]]]:
+    """How far around its middle nothing else was, and the path in its parts, in m, of each body of each video."""
     return [
         (radius - NOISE * noise, path)
         for tracks, noise in ((one, np.nan_to_num(noise_scale(one))) for one in videos)

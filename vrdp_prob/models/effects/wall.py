@@ -41,6 +41,13 @@ def _parameters(which: str = "") -> tuple[Parameter, Parameter, Parameter]:
     )
 
 
+def _law(which: str = "") -> str:
+    return (
+        f"bodies touch the line x cos(a) + y sin(a) = {which}hidden_wall_distance with "
+        f"a = {which}hidden_wall_direction; e = r {which}hidden_wall_restitution"
+    )
+
+
 REACH = 1.5
 """Standard deviation of its distance from the middle of the region where bodies were seen, in half widths of that."""
 
@@ -50,10 +57,7 @@ class Wall(Effect):
 
     name: ClassVar = "wall"
     sentence: ClassVar = "A wall that cannot be seen throws bodies back."
-    law: ClassVar = (
-        "bodies touch the line x cos(a) + y sin(a) = hidden_wall_distance with a = hidden_wall_direction; "
-        "e = r hidden_wall_restitution"
-    )
+    law: ClassVar = _law()
     source: ClassVar = "contact with a body of infinite mass"
     parameters: ClassVar = _parameters()
 
@@ -87,7 +91,8 @@ class SecondWall(Wall):
     name: ClassVar = "second_wall"
     cause: ClassVar = Wall.name
     follows: ClassVar = Wall.name
-    sentence: ClassVar = "A second wall that cannot be seen throws bodies back."
+    sentence: ClassVar = "A further wall that cannot be seen throws bodies back."
+    law: ClassVar = _law("second_")
     parameters: ClassVar = _parameters("second_")
 
 
@@ -97,7 +102,8 @@ class ThirdWall(Wall):
     name: ClassVar = "third_wall"
     cause: ClassVar = Wall.name
     follows: ClassVar = SecondWall.name
-    sentence: ClassVar = "A third wall that cannot be seen throws bodies back."
+    sentence: ClassVar = "A further wall that cannot be seen throws bodies back."
+    law: ClassVar = _law("third_")
     parameters: ClassVar = _parameters("third_")
 
 
@@ -107,5 +113,6 @@ class FourthWall(Wall):
     name: ClassVar = "fourth_wall"
     cause: ClassVar = Wall.name
     follows: ClassVar = ThirdWall.name
-    sentence: ClassVar = "A fourth wall that cannot be seen throws bodies back."
+    sentence: ClassVar = "A further wall that cannot be seen throws bodies back."
+    law: ClassVar = _law("fourth_")
     parameters: ClassVar = _parameters("fourth_")

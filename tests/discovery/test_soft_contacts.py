@@ -95,7 +95,13 @@ def test_contacts_that_last_are_not_called_a_wrong_radius() -> None:
     finding = discover(videos(0.06, seed=1), catalogue=[ContactRadiusError()], processes=1)
     assert finding.verdict is Verdict.UNKNOWN
     assert not finding.named
-    assert any(DURATION in note for note in finding.notes)
+    assert DURATION in {check.name for check in finding.checks if check.significant}
+    assert finding.description is not None
+    assert any(one.startswith("At contacts bodies touch for 0.0") for one in finding.description.sentences)
+    share = next(
+        one for one in finding.description.sentences if one.endswith("of what is unexplained begins at contacts.")
+    )
+    assert float(share.split()[0]) > 50
 
 
 @pytest.mark.slow

@@ -5,10 +5,12 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from jaxtyping import Float
 
+from vrdp_prob.discovery.checks.contacts import DURATION
 from vrdp_prob.discovery.checks.flight import BESIDE
 from vrdp_prob.discovery.checks.measurement import GENERAL
 from vrdp_prob.discovery.checks.neighbours import roughness
 from vrdp_prob.discovery.finding import Check, Description
+from vrdp_prob.discovery.residuals.contact_patterns import durations_freed
 from vrdp_prob.discovery.residuals.free_flight import FreeFlight
 from vrdp_prob.discovery.residuals.free_flight_patterns import SYMBOLS, Pattern, spanned
 from vrdp_prob.discovery.residuals.missing_acceleration import Separate, Windows, missing_acceleration
@@ -61,10 +63,10 @@ def description_of(model: ResidualModel, checks: Sequence[Check]) -> Description
     formula = _formula("a", [flight.patterns[k].formula for k in places], found.coefficients)
     of_contacts, contact_formula = _at_contacts(model, flight, places, windows, noise)
     sentences = [
-        *_share_sentences(model, flight.model, noise),
+        *_share_sentences(model, durations_freed(flight.model), noise),
         *_window_sentences(windows),
         *_formula_sentences(found, formula),
-        *_contact_sentences(of_contacts, contact_formula),
+        *_contact_sentences(of_contacts, contact_formula, checks),
         *_check_sentences(checks),
     ]
     size = float(np.sqrt(2)) * windows.size
@@ -163,7 +165,8 @@ def _formula_sentences(found: SparseFormula, formula: str) -> Iterator[str]:
     )
 
 
-def _contact_sentences(found: SparseFormula, formula: str) -> Iterator[str]:
+def _contact_sentences(found: SparseFormula, formula: str, checks: Sequence[Check]) -> Iterator[str]:
+    yield from (check.sentence for check in checks if check.significant and check.name in DURATION.values())
     if found.terms:
         yield (
             f"At contacts an impulse {formula} is missing, which explains {100 * found.explained:.0f} % of what free "
@@ -172,7 +175,8 @@ def _contact_sentences(found: SparseFormula, formula: str) -> Iterator[str]:
 
 
 def _check_sentences(checks: Sequence[Check]) -> Iterator[str]:
-    specific = [check for check in checks if check.significant and check.name not in GENERAL]
+    told = (*GENERAL, *DURATION.values())
+    specific = [check for check in checks if check.significant and check.name not in told]
     telling = [check for check in specific if BESIDE not in check.sentence]
     for check in telling[:MOST_CHECKS]:
         yield check.sentence

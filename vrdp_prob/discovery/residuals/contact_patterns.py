@@ -123,6 +123,16 @@ class ContactScore:
         return self.score.of(self.places["bounce each"], [*self._beside(*self.rubbing, GROW), average])
 
 
+def durations_freed(model: ResidualModel) -> ResidualModel:
+    """The model of a fit in which every contact may last."""
+    columns = []
+    for video in model.videos:
+        contacts = [FittedContacts.of(video.motion, kind) for kind in WHERE.values()]
+        lasting = np.concatenate([one.lasting(np.eye(len(one))) for one in contacts], axis=-1)
+        columns.append(video.rows(lasting))
+    return model.freed(columns)
+
+
 def unbalanced(contacts: FittedContacts) -> list[Float[np.ndarray, "contact 2"]]:
     """Directions in which momentum can be seen to be lost: along the normal only where the masses are known."""
     weighed = all(body.mass is not None for body in contacts.motion.tracks.bodies)

@@ -39,6 +39,7 @@ DRAWN = (
     "Missing acceleration over the plane",
     "Missing acceleration against speed",
     "Tangential against normal impulse",
+    "Duration of touch at contacts",
 )
 """Figures of the page of a finding that are kept as files too."""
 WHITE = '<rect width="100%" height="100%" fill="white"/>'

@@ -126,16 +126,21 @@ def test_a_push_to_the_side_of_some_bodies_is_told_by_what_they_are(
     assert after[check].sentence.startswith(says)
 
 
-def test_positions_that_are_grossly_wrong_are_counted() -> None:
-    _, model = null()
+def grossly_wrong(model: ResidualModel, sd: float) -> ResidualModel:
+    """Residuals of which some positions are off by a normal number (m) of some standard deviation."""
     generator = np.random.default_rng(0)
     videos = []
     for video in model.videos:
         raw = video.raw.copy()
         wrong = generator.random(len(raw)) < 0.03
-        raw[wrong] += generator.normal(0, 0.3, (int(wrong.sum()), 2))
+        raw[wrong] += generator.normal(0, sd, (int(wrong.sum()), 2))
         videos.append(replace(video, raw=raw))
-    found = checked(replace(model, videos=tuple(videos)))[OUTLIERS]
+    return replace(model, videos=tuple(videos))
+
+
+def test_positions_that_are_grossly_wrong_are_counted() -> None:
+    _, model = null()
+    found = checked(grossly_wrong(model, 0.3))[OUTLIERS]
     assert found.p_value < 1e-6
     assert 0.01 < found.statistic < 0.05
 

@@ -11,7 +11,7 @@ from jaxtyping import Float
 from tests.discovery.fitted import SMALL, fitted, moved
 from tests.discovery.measurement import Measurement
 from tests.discovery.scenes import Setting
-from tests.discovery.test_checks_fire import Changes, bent, irregular, kicked, larger, lost, null
+from tests.discovery.test_checks_fire import Changes, bent, grossly_wrong, irregular, kicked, larger, lost, null
 from tests.discovery.test_wall_contacts import with_effect
 from vrdp_prob.discovery.checks.battery import run_checks
 from vrdp_prob.discovery.checks.bodies import friction_against
@@ -173,17 +173,10 @@ def test_a_kick_stands_out_at_its_time_of_the_body_that_it_hit() -> None:
 
 def test_positions_that_are_grossly_off_leave_the_line_of_the_noise() -> None:
     _, model = null()
-    generator = np.random.default_rng(0)
-    videos = []
-    for video in model.videos:
-        raw = video.raw.copy()
-        wrong = generator.random(len(raw)) < 0.03
-        raw[wrong] += generator.normal(0, 0.05, (int(wrong.sum()), 2))
-        videos.append(replace(video, raw=raw))
     (quiet,) = shown(OUTLIERS, model)
     assert len(quiet.outside) <= 0.2 * len(quiet.dots)
     seen = Seen(fitted(seed=1)[1], BEFORE, "a model")
-    vars(seen)["model"] = replace(model, videos=tuple(videos))
+    vars(seen)["model"] = grossly_wrong(model, 0.05)
     element = ElementTree.fromstring(WHERE_CHECKS_FAIL[OUTLIERS]([seen]))
     heights = [float(circle.get("cy", 0)) for circle in element.iter(f"{SVG}circle")]
     band = [

@@ -54,14 +54,12 @@ def description_of(model: ResidualModel, checks: Sequence[Check]) -> Description
     flight = FreeFlight.of(model)
     noise = roughness(model)
     windows = missing_acceleration(flight.model, noise)
+    lost = [video.linear.name in windows.lost for video in model.videos]
     shown = [k for k, one in enumerate(flight.patterns) if _may_show(flight, one)]
-    separate = Separate.of(flight.model, [rows[:, shown] for rows in flight.rows], noise).without(
-        [video.linear.name in windows.lost for video in flight.model.videos]
-    )
-    found = sparse_formula(separate)
+    found = sparse_formula(Separate.of(flight.model, [rows[:, shown] for rows in flight.rows], noise).without(lost))
     places = [shown[k] for k in found.terms]
     formula = _formula("a", [flight.patterns[k].formula for k in places], found.coefficients)
-    of_contacts, contact_formula = _at_contacts(model, flight, places, windows, noise)
+    of_contacts, contact_formula = _at_contacts(model, flight, places, lost, noise)
     sentences = [
         *_share_sentences(model, durations_freed(flight.model), noise),
         *_window_sentences(windows),
@@ -74,12 +72,11 @@ def description_of(model: ResidualModel, checks: Sequence[Check]) -> Description
 
 
 def _at_contacts(
-    model: ResidualModel, flight: FreeFlight, chosen: list[int], windows: Windows, noise: float
+    model: ResidualModel, flight: FreeFlight, chosen: list[int], lost: Sequence[bool], noise: float
 ) -> tuple[SparseFormula, str]:
     """The sparse formula of what is missing at contacts, beside that of free flight; empty where nothing is."""
     contacts = MissingImpulse.of(model, flight.scales)
     beside = model.freed(contacts.anything).sharing([rows[:, chosen] for rows in flight.rows])
-    lost = [video.linear.name in windows.lost for video in model.videos]
     found = sparse_formula(Separate.of(beside, contacts.rows, noise).without(lost))
     terms = [contacts.patterns[k].formula for k in found.terms]
     return found, _formula("J", terms, found.coefficients) if terms else ""

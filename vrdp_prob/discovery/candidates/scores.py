@@ -15,6 +15,7 @@ from jaxtyping import Float
 from scipy.stats import chi2
 
 from vrdp_prob.discovery.candidates.probes import Probe, probes
+from vrdp_prob.discovery.residuals.free_flight import ONE_SIDED_95
 from vrdp_prob.discovery.residuals.jitter import jitter
 from vrdp_prob.discovery.residuals.linear import RANK, Score
 from vrdp_prob.discovery.residuals.residual_model import ResidualModel
@@ -27,8 +28,6 @@ from vrdp_prob.models.parameters import Parameter, Scope, Transform
 REPLICATIONS = 400
 TAIL = 0.05
 """Tail probability at which the number of independent places of a scan is read off its null distribution."""
-ONE_SIDED = 1.644854
-"""Standard deviations from the middle of a normal distribution to the end of its lower 95 %."""
 SITE_LEVEL = 1e-3
 """An effect that happens once in a video is there if chance makes a statistic as large, anywhere, less often."""
 LEAST_START = 0.01
@@ -81,7 +80,7 @@ class Largest:
     def widened(self, factor: float) -> float | None:
         """The bound where standard deviations are larger by a factor than the residuals say."""
         if self.strengths:
-            return max(abs(estimate) + factor * ONE_SIDED * sd for estimate, sd in self.strengths)
+            return max(abs(estimate) + factor * ONE_SIDED_95 * sd for estimate, sd in self.strengths)
         return None if self.bound is None else factor * self.bound
 
 
@@ -217,7 +216,7 @@ def _largest(places: Sequence[Iterable[tuple[str, float, float]]], effect: Effec
         enough = max(expected[name], min((sd for *_, sd in seen), default=0.0))
         told = [row for row in seen if row[2] <= enough]
         each = tuple((estimate, sd) for _, estimate, sd in told)
-        bound = max((abs(estimate) + ONE_SIDED * sd for estimate, sd in each), default=None)
+        bound = max((abs(estimate) + ONE_SIDED_95 * sd for estimate, sd in each), default=None)
         largest[name] = Largest(bound, len({row[0] for row in rows}), len({row[0] for row in told}), each)
     return largest
 

@@ -17,7 +17,7 @@ from vrdp_prob.discovery.checks.flight import SEEN
 from vrdp_prob.discovery.checks.kicks import kick_check
 from vrdp_prob.discovery.finding import Check
 from vrdp_prob.discovery.residuals.contact_patterns import AT_CONTACTS, AT_WALLS, GROW, WHERE, ContactScore
-from vrdp_prob.discovery.residuals.free_flight import NORMAL_95, FreeFlight
+from vrdp_prob.discovery.residuals.free_flight import NORMAL_95, ONE_SIDED_95, FreeFlight
 from vrdp_prob.discovery.residuals.linear import Score
 from vrdp_prob.discovery.residuals.residual_model import ResidualModel
 from vrdp_prob.discovery.words import number, opposite
@@ -31,8 +31,6 @@ RUBBING_OF = {AT_CONTACTS: RUBBING, AT_WALLS: RUBBING_AT_WALLS}
 TURNING = {where: f"spin change {where}" for where in WHERE}
 DURATION = {where: f"duration of touch {where}" for where in WHERE}
 """Names of the checks of tangential impulses, of spins and of how long bodies touch, by where they do."""
-ONE_SIDED_95 = 1.645
-"""Standard deviations from the middle of a normal distribution to the end of its lower 95 %."""
 APART = 0.01
 """Probability below which of two explanations one is told from the other."""
 
@@ -147,7 +145,7 @@ def _duration_check(score: Score, where: str) -> Iterator[Check]:
     if not score.degrees:
         return
     size, sd = float(score.estimate[0]), float(score.sd[0])
-    found = f"{where.capitalize()} bodies touch for {number(max(size, 0.0))} s, and give way meanwhile."
+    found = f"{where.capitalize()} bodies touch for {number(size)} s, and give way meanwhile."
     yield _check(DURATION[where], size, float(norm.sf(size / sd)), found, f"{number(ONE_SIDED_95 * sd)} s")
 
 

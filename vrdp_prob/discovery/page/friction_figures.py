@@ -35,7 +35,7 @@ def _frictions(seen: Sequence[Seen], what: str) -> str:
         for places, factor, one in zip(at, factors, found, strict=True)
     ]
     told = all(body.mass is not None for one in found for body in one.bodies)
-    label = f"{what}" if names else ("mass (kg)" if told else "mass (of those that met, relative)")
+    label = what if names else ("mass (kg)" if told else "mass (of those that met, relative)")
     return with_bars(
         seen,
         {"": points},

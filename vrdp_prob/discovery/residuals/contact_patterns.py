@@ -22,6 +22,11 @@ WHERE = {AT_CONTACTS: RolloutEventKind.COLLISION, AT_WALLS: RolloutEventKind.WAL
 GROW = "grow"
 
 
+def contacts_of(model: ResidualModel) -> dict[str, list[FittedContacts]]:
+    """Contacts of each video, by where they are."""
+    return {where: [FittedContacts.of(video.motion, kind) for video in model.videos] for where, kind in WHERE.items()}
+
+
 @dataclass(frozen=True)
 class ContactScore:
     """How strongly patterns of what acts at contacts show.
@@ -56,11 +61,7 @@ class ContactScore:
             Whether spins, rebounds and durations are also to be told at each contact by itself.
         """
         motions = [video.motion for video in model.videos]
-        contacts = {
-            where: found
-            for where, kind in WHERE.items()
-            if any(map(len, found := [FittedContacts.of(motion, kind) for motion in motions]))
-        }
+        contacts = {where: some for where, some in contacts_of(model).items() if any(map(len, some))}
         if not contacts:
             return None
         clear = {where: [one.where(one.known_normal) for one in some] for where, some in contacts.items()}
@@ -126,10 +127,8 @@ class ContactScore:
 def durations_freed(model: ResidualModel) -> ResidualModel:
     """The model of a fit in which every contact may last."""
     columns = []
-    for video in model.videos:
-        contacts = [FittedContacts.of(video.motion, kind) for kind in WHERE.values()]
-        lasting = np.concatenate([one.lasting(np.eye(len(one))) for one in contacts], axis=-1)
-        columns.append(video.rows(lasting))
+    for video, *contacts in zip(model.videos, *contacts_of(model).values(), strict=True):
+        columns.append(video.rows(np.concatenate([one.lasting(np.eye(len(one))) for one in contacts], axis=-1)))
     return model.freed(columns)
 
 

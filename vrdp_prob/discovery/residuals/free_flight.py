@@ -18,7 +18,8 @@ from vrdp_prob.discovery.residuals.residual_model import ResidualModel
 from vrdp_prob.models.effects.body_friction import FRICTION_RATIO
 from vrdp_prob.models.simulator.events import CONTACTS, RolloutEventKind
 
-NORMAL_95 = 1.96
+NORMAL_95, ONE_SIDED_95 = 1.96, 1.644854
+"""Standard deviations from the middle of a normal distribution to the ends of its middle 95 %, and of its lower."""
 FRICTION = FRICTION_RATIO.name
 """Name of the parameter that is a body's own friction, in units of what the bodies share."""
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
+from vrdp_prob.discovery.residuals.contact_patterns import WHERE, contacts_of
 from vrdp_prob.discovery.residuals.fitted_contacts import FittedContacts
 from vrdp_prob.discovery.residuals.free_flight_patterns import Scales
 from vrdp_prob.discovery.residuals.residual_model import ResidualModel
@@ -63,8 +64,7 @@ class MissingImpulse:
     @classmethod
     def of(cls, model: ResidualModel, scales: Scales) -> "MissingImpulse":
         """All patterns that the contacts of some videos can show."""
-        motions = [video.motion for video in model.videos]
-        found = {kind: [FittedContacts.of(motion, kind) for motion in motions] for kind in KINDS}
+        found = {WHERE[where]: some for where, some in contacts_of(model).items()}
         clear = {kind: [one.where(one.known_normal) for one in some] for kind, some in found.items()}
         chosen = [one for kind, some in clear.items() if any(map(len, some)) for one in _patterns(kind, some, scales)]
         rows, anything = [], []

@@ -1,7 +1,7 @@
 """Refits with one more cause: which causes are tried on a model, and with what lost or hidden things beside them."""
 
-from collections.abc import Callable, Collection, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import partial
 
 import numpy as np
@@ -10,17 +10,19 @@ from jaxtyping import Float
 from vrdp_prob.discovery.candidates.proposals import hidden_things
 from vrdp_prob.discovery.candidates.scores import CauseScore, happens_once, score_causes
 from vrdp_prob.discovery.candidates.single_videos import causes_of_lost_videos, lost_videos
+from vrdp_prob.discovery.candidates.surfaces import believed_surfaces
 from vrdp_prob.discovery.checks.battery import run_checks
 from vrdp_prob.discovery.finding import Check
 from vrdp_prob.discovery.residuals.overdispersion import overdispersion
 from vrdp_prob.discovery.selection.doubts import causes_with_own_check_failing
-from vrdp_prob.discovery.selection.trials import Trial, gain
+from vrdp_prob.discovery.selection.trials import FIRST, Trial, gain
 from vrdp_prob.inference.runs.parallel import in_processes
 from vrdp_prob.inference.several_videos.ascent import ImpossibleStartError
 from vrdp_prob.inference.several_videos.fitting import fit_together
 from vrdp_prob.inference.several_videos.second_look import MOST, explained, may_take_another_course
 from vrdp_prob.models.effects.effect import Effect
 from vrdp_prob.models.effects.external_impulse import ExternalImpulse
+from vrdp_prob.models.parameters import Parameter
 from vrdp_prob.progress import Advance
 
 SHORTLIST_LEVEL = 0.01
@@ -107,7 +109,11 @@ class Refits:
 
     def of(self, trial: Trial) -> list[Trial]:
         """Refits of a model, the best first."""
-        return self._made[trial] if trial in self._made else self._keep(trial, self._new(trial))
+        if trial not in self._made:
+            met = self._met(trial)
+            enough = met is not None and met.brought(trial) > self.needed
+            self._keep(trial, [met] if met is not None and enough else self._new(trial))
+        return self._made[trial]
 
     def made(self, trial: Trial) -> list[Trial]:
         """Refits of a model as far as any were made, the best first."""
@@ -220,18 +226,47 @@ class Refits:
         told = causes_of_lost_videos(trial.fit, lost, left, likely, self.needed, seed=self.seed)
         again = [effect for effect, promised in told if reached.get(effect.name, 0.0) < promised]
 
-        def searched(effect: Effect) -> Trial | None:
-            model = trial.fit.extended(effect)
-            tracks = [part.clues.tracks for part in trial.fit.fits]
-            try:
-                fit = fit_together(tracks, model=model, shared=trial.fit.shared, seed=self.seed, model_error=False)
-                return trial.and_cause(effect, fit)
-            except ImpossibleStartError:  # what single videos say of the cause fits no world of all of them
-                return None
-            finally:
-                self.advance(1)
+        return [one for effect in again if (one := self._from_the_beginning(trial, [effect])) is not None]
 
-        return [one for one in map(searched, again) if one is not None]
+    def _met(self, trial: Trial) -> Trial | None:
+        """The fit from the beginning with the walls and discs that the tracks themselves show, all of them at once.
+
+        A fit without them has lost its way at the first that a body met, so that scores call for what mends its course.
+        None where tracks show nothing of the kind, or something unseen stands in the model's way already.
+        """
+        if trial.choices or any(effect.overrides("obstacles") for effect in trial.fit.model.effects):
+            return None
+        surfaces = believed_surfaces(trial.fit.tracks, self.catalogue)
+        near = {name: belief for _, beliefs in surfaces for name, belief in beliefs.items()}
+        return self._from_the_beginning(trial, [effect for effect, _ in surfaces], near) if surfaces else None
+
+    def _from_the_beginning(
+        self, trial: Trial, causes: Sequence[Effect], near: Mapping[str, Parameter] | None = None
+    ) -> Trial | None:
+        """The fit with further causes that owes nothing to that of a trial; None where videos have no world in common.
+
+        Parameters
+        ----------
+        trial
+            The model without the causes.
+        causes
+            The further ones.
+        near
+            What is believed of their parameters, by name, until a fit is found; as in every other one where None.
+        """
+        model = trial.fit.model
+        for cause in causes:
+            model = model.with_effect(cause, trial.fit.tracks)
+        first = model if near is None else replace(model, beliefs={**model.beliefs, **near})
+        tracks = [part.clues.tracks for part in trial.fit.fits]
+        try:
+            fit = fit_together(tracks, model=first, shared=trial.fit.shared, seed=self.seed, model_error=False)
+            fit = fit if near is None else fit.under(model, effort=FIRST, model_error=False)
+            return trial.and_causes(causes, fit)
+        except ImpossibleStartError:  # what single videos say of the causes fits no world of all of them
+            return None
+        finally:
+            self.advance(1)
 
     def _hidden(self, trial: Trial, found: Sequence[Trial], kicks: CauseScore) -> list[Trial]:
         """Fits with something unseen in the place of kicks."""

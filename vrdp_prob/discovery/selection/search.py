@@ -231,7 +231,9 @@ class _Searcher:
         """
         winner = next((one for one in step.tried[:1] if gain(one, trial)[0] >= self.needed), None)
         if winner is not None:
-            without = winner.without(winner.causes[-1])
+            without = winner
+            for cause in winner.causes[len(trial.causes) :]:
+                without = without.without(cause)
             if gain(without, trial)[0] > self.needed:
                 trial = without
             if happens_once(winner.causes[-1]):

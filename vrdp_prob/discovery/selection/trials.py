@@ -171,11 +171,11 @@ class Trial:
         ]
         model = self.fit.extended(effect)
         fit = self.fit.under(model, start=score.start, own=starts, effort=FIRST, model_error=False)
-        return self.and_cause(effect, fit)
+        return self.and_causes([effect], fit)
 
-    def and_cause(self, effect: Effect, fit: SharedFit) -> "Trial":
-        """The trial of a fit with one more cause, which believes what that fit says of bodies."""
-        return replace(self, causes=(*self.causes, effect), fit=with_own_population(fit))
+    def and_causes(self, effects: Sequence[Effect], fit: SharedFit) -> "Trial":
+        """The trial of a fit with further causes, which believes what that fit says of bodies."""
+        return replace(self, causes=(*self.causes, *effects), fit=with_own_population(fit))
 
     def _with_single_events(self, score: CauseScore) -> "Trial":
         """The fit with an effect that happens at most once in each video, where its scan has found it."""

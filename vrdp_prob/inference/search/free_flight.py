@@ -17,6 +17,8 @@ LONGEST_GAP = 6
 """Frames over which a hidden object's place is interpolated when contacts are looked for."""
 ACCELERATION_SD = 1.0
 """Prior standard deviation in m/s^2 of the acceleration between contacts."""
+SHIFTS = np.linspace(-2, 2, 17)
+"""Frames by which the time of a contact is moved to where it fits best."""
 SIGNIFICANT = 3.5
 """A velocity jump counts from this many standard deviations on."""
 SMALLEST_JUMP = 0.02
@@ -182,7 +184,7 @@ def _judge(tracks: Tracks, first: int, second: int, time: float, noise: float) -
         return None
     push = kink_first.jump - kink_second.jump
     push_sd = float(np.hypot(kink_first.jump_sd, kink_second.jump_sd))
-    fastest = max(float(np.linalg.norm(kink.before)) for kink in (kink_first, kink_second))
+    fastest = max(float(np.linalg.norm(one.before)) for one in (kink_first, kink_second))
     size = float(np.linalg.norm(push))
     if size < max(SIGNIFICANT * push_sd, SMALLEST_JUMP * fastest):
         return None
@@ -199,8 +201,11 @@ def _judge(tracks: Tracks, first: int, second: int, time: float, noise: float) -
 
 
 @dataclass(frozen=True)
-class _Kink:
-    """Two quadratic pieces that join at one place: position (m), velocity before, velocity jump (m/s) and its sd."""
+class Kink:
+    """Two quadratic pieces that join at one place: position (m), velocity before, velocity jump (m/s) and its sd.
+
+    `misfit` is the sum of the squares in m^2 that both leave.
+    """
 
     position: Float[np.ndarray, "2"]
     before: Float[np.ndarray, "2"]
@@ -211,23 +216,41 @@ class _Kink:
 
 def _best_kinks(
     tracks: Tracks, first: int, second: int, time: float, noise: float
-) -> tuple[_Kink | None, _Kink | None, float]:
+) -> tuple[Kink | None, Kink | None, float]:
     """Kinks of both bodies at the common time around `time` that fits best."""
     step = float(np.median(np.diff(tracks.times)))
-    best: tuple[_Kink | None, _Kink | None, float] = (None, None, time)
+    best: tuple[Kink | None, Kink | None, float] = (None, None, time)
     lowest = np.inf
-    for at in time + step * np.linspace(-2, 2, 17):
-        kinks = [_kink(tracks, body, float(at), noise) for body in (first, second)]
-        misfit = sum(np.inf if kink is None else kink.misfit for kink in kinks)
+    for at in time + step * SHIFTS:
+        kinks = [kink(tracks, body, float(at), noise) for body in (first, second)]
+        misfit = sum(np.inf if one is None else one.misfit for one in kinks)
         if misfit < lowest:
             lowest, best = misfit, (kinks[0], kinks[1], float(at))
     return best
 
 
-def _kink(tracks: Tracks, body: int, at: float, noise: float) -> _Kink | None:
+def kink(
+    tracks: Tracks, body: int, at: float, noise: float, *, start: float = -np.inf, stop: float = np.inf
+) -> Kink | None:
+    """Fit a kink at a time (s) to what was seen of a body around it, between two times (s); None where that is little.
+
+    Parameters
+    ----------
+    tracks
+        What was seen.
+    body
+        The body, by index.
+    at
+        Time in s of the kink.
+    noise
+        Measurement noise in m.
+    start, stop
+        Times in s before and after which nothing counts.
+    """
     times, positions = tracks.times, tracks.positions[:, body]
     offset = times - at
-    chosen = np.isfinite(positions).all(axis=1) & (np.abs(offset) <= SPAN)
+    inside = (np.abs(offset) <= SPAN) & (times >= start) & (times <= stop)
+    chosen = np.isfinite(positions).all(axis=1) & inside
     offset, seen = offset[chosen], positions[chosen]
     if (offset < 0).sum() < FEWEST_BEFORE or (offset >= 0).sum() < FEWEST_AFTER:
         return None
@@ -240,7 +263,7 @@ def _kink(tracks: Tracks, body: int, at: float, noise: float) -> _Kink | None:
     misfit = float(
         ((seen - design @ coefficients) ** 2).sum() + np.einsum("ik,ij,jk->", coefficients, prior, coefficients)
     )
-    return _Kink(coefficients[0], coefficients[1], coefficients[2], noise * float(np.sqrt(covariance[2, 2])), misfit)
+    return Kink(coefficients[0], coefficients[1], coefficients[2], noise * float(np.sqrt(covariance[2, 2])), misfit)
 
 
 def _interpolated(tracks: Tracks, body: int) -> Float[np.ndarray, "time 2"]:

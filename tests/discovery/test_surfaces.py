@@ -1,0 +1,145 @@
+"""Walls and discs that tracks themselves show, by where bodies turn."""
+
+import math
+
+import numpy as np
+import pytest
+from jaxtyping import Float
+
+from tests.discovery.hidden import hide
+from tests.discovery.laws import Laws
+from tests.discovery.measurement import Measurement, measure
+from tests.discovery.scenes import Setting
+from tests.discovery.videos import Disc, Video
+from vrdp_prob import discover
+from vrdp_prob.discovery.candidates.surfaces import Circle, Line, believed_surfaces, seen_surfaces
+from vrdp_prob.discovery.candidates.turns import sudden_turns
+from vrdp_prob.discovery.finding import Verdict
+from vrdp_prob.models.effects.effect import Effect
+from vrdp_prob.models.effects.external_impulse import ExternalImpulse
+from vrdp_prob.models.effects.hidden_obstacle import HiddenObstacle
+from vrdp_prob.models.effects.linear_drag import LinearDrag
+from vrdp_prob.models.effects.surface_tilt import SurfaceTilt
+from vrdp_prob.models.effects.wall import FourthWall, SecondWall, ThirdWall, Wall
+from vrdp_prob.scene import Shape, Tracks
+from vrdp_prob.scene import Wall as SceneWall
+
+HALF = 0.9
+"""Half side in m of the square of walls."""
+PILLAR = Disc(0.15, -0.1, 0.2, 0.8)
+WALLS: tuple[Effect, ...] = (Wall(), SecondWall(), ThirdWall(), FourthWall())
+
+
+def table(*, hidden: bool = True, discs: tuple[Disc, ...] = (), seed: int = 0, count: int = 8) -> list[Tracks]:
+    """Videos of a disc that bounces about a square of walls, which nobody states if they are hidden."""
+    generator = np.random.default_rng(seed)
+    corners = ((-HALF, -HALF), (HALF, -HALF), (HALF, HALF), (-HALF, HALF))
+    walls = tuple(SceneWall(*corners[k - 1], *corners[k], restitution=0.8) for k in range(4))
+    tracks = []
+    for number in range(count):
+        side, aim = generator.uniform(-0.6, 0.6, 2)
+        start = np.array([[-0.6, side]])
+        turn = (number + 0.5) * math.pi / 2 + aim
+        ahead = np.array([PILLAR.x, PILLAR.y + PILLAR.radius * aim]) - start[0] if discs else _direction(turn)
+        video = Video(
+            shapes=(Shape.CYLINDER,),
+            materials=("metal",),
+            position=start,
+            velocity=1.5 * ahead[None] / np.linalg.norm(ahead),
+            angle=np.zeros(1),
+            spin=np.zeros(1),
+            release=np.zeros(1),
+            mass=np.ones(1),
+            radius=np.array([0.1]),
+            restitution=np.array([0.9]),
+            friction=np.array([0.01]),
+            frames=75,
+            laws=Laws(drag=0.03),
+            hidden_walls=walls if hidden else (),
+            walls=() if hidden else walls,
+            hidden_discs=discs,
+        )
+        tracks.append(measure(video, f"v{number + 1}", Measurement(noise=0.002), generator)[0])
+    return tracks
+
+
+def _direction(turn: float) -> Float[np.ndarray, "2"]:
+    return np.array([math.cos(turn), math.sin(turn)])
+
+
+def sides(lines: list[Line]) -> list[tuple[float, float]]:
+    """Distances in m, and directions in quarter turns, of lines, in order of these."""
+    return sorted(
+        ((one.distance, one.direction / (math.pi / 2) % 4) for one in lines), key=lambda one: round(one[1]) % 4
+    )
+
+
+def test_four_walls_are_seen_where_they_are() -> None:
+    found = [one for one, _ in seen_surfaces(table(discs=()))]
+    assert len(found) == 4
+    assert all(isinstance(one, Line) for one in found)
+    placed = sides([one for one in found if isinstance(one, Line)])
+    assert [distance for distance, _ in placed] == pytest.approx([HALF] * 4, abs=0.01)
+    assert [round(turn) % 4 for _, turn in placed] == [0, 1, 2, 3]
+    assert [turn - round(turn) for _, turn in placed] == pytest.approx([0.0] * 4, abs=0.02)
+
+
+def test_a_pillar_is_seen_as_a_circle_and_not_as_walls() -> None:
+    found = [one for one, _ in seen_surfaces(table(hidden=False, discs=(PILLAR,), count=6))]
+    assert len(found) == 1
+    assert isinstance(found[0], Circle)
+    assert (found[0].x, found[0].y, found[0].radius) == pytest.approx((PILLAR.x, PILLAR.y, PILLAR.radius), abs=0.02)
+
+
+def test_stated_walls_are_nothing_unseen() -> None:
+    assert sudden_turns(table(hidden=False)) == []
+
+
+@pytest.mark.parametrize("way", [None, "external_impulse"])
+def test_nothing_is_seen_where_no_surface_is(way: str | None) -> None:
+    data = hide([] if way is None else [way], seed=1, effect_size=5.0, setting=Setting(videos=6, bodies=3))
+    assert seen_surfaces(data.tracks) == []
+
+
+def test_a_line_that_bodies_cross_is_none() -> None:
+    """Two kicks alike at a line that another path goes through."""
+    times, generator = np.arange(50) / 25, np.random.default_rng(0)
+
+    def video(name: str, y: float, *, turns: bool) -> Tracks:
+        x = np.where(times < 1, times - 1, (1 - times) * 0.8) if turns else times - 1
+        body = table(count=1)[0].bodies[0]
+        places = np.stack([x, np.full(len(times), y)], axis=-1)[:, None]
+        return Tracks.from_arrays(name, (body,), times, places + 0.002 * generator.standard_normal(places.shape))
+
+    turning = [video(f"v{k}", 0.3 * k, turns=True) for k in range(3)]
+    assert len(seen_surfaces(turning)) == 1
+    assert seen_surfaces([*turning, video("straight", -0.5, turns=False)]) == []
+
+
+def test_walls_and_discs_take_the_places_that_the_catalogue_has() -> None:
+    tracks = table()
+    assert believed_surfaces(tracks, [SurfaceTilt(), HiddenObstacle()]) == []
+    found = believed_surfaces(tracks, [SurfaceTilt(), *WALLS[:2]])
+    assert [effect.name for effect, _ in found] == ["wall", "second_wall"]
+    for effect, beliefs in found:
+        distance, direction = (beliefs[one.name] for one in effect.parameters[:2])
+        assert abs(distance.default) == pytest.approx(HALF, abs=0.01)
+        assert distance.prior.sd < 0.05
+        assert math.sin(2 * direction.default) == pytest.approx(0.0, abs=0.05)
+
+
+@pytest.mark.slow
+def test_a_table_whose_walls_nobody_states_is_enclosed() -> None:
+    catalogue = (*WALLS, HiddenObstacle(), ExternalImpulse(), SurfaceTilt(), LinearDrag())
+    finding = discover(table(count=6, seed=1), seed=0, catalogue=catalogue)
+    named = {cause.effect for cause in finding.causes if cause.named}
+    assert named == {"wall", "second_wall", "third_wall", "fourth_wall"}
+    assert finding.verdict is Verdict.NAMED
+    assert not any(check.significant for check in finding.checks_after)
+    distances = [
+        abs(value.mean)
+        for cause in finding.causes
+        for name, value in cause.parameters.items()
+        if name.endswith("hidden_wall_distance")
+    ]
+    assert distances == pytest.approx([HALF] * 4, abs=0.01)

@@ -1,0 +1,219 @@
+"""Walls and discs that nobody states, where turns of several bodies or at several times fit one of them."""
+
+import itertools
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from jaxtyping import Bool, Float
+from scipy.optimize import least_squares
+
+from vrdp_prob.discovery.candidates.turns import Turn, sudden_turns
+from vrdp_prob.models.effects.effect import Effect
+from vrdp_prob.models.effects.hidden_obstacle import HiddenObstacle
+from vrdp_prob.models.effects.places import Region, paths_of_bodies
+from vrdp_prob.models.effects.wall import Wall
+from vrdp_prob.models.parameters import Parameter, Prior
+from vrdp_prob.scene import Tracks
+
+FEWEST_AT_WALL, FEWEST_AT_DISC = 2, 3
+"""Turns that a wall, and a disc, must explain: a single one has any number of either."""
+MOST_TURNS = 200
+"""Turns, the plainest first, that are looked at."""
+MOST_OF_THEM = 2 / 3
+"""Share of the turns that all walls and discs must explain, for it to be these that bodies meet."""
+NOISES, SIZES = 4.0, 0.1
+"""Standard deviations of a position, and share of a body's size, by which a surface may be missed."""
+RUBBED, DEVIATIONS = 0.2, 3.0
+"""Angle in rad by which friction turns a rebound from square, and standard deviations of its direction beyond that."""
+CROSSINGS = 0.002
+"""Share of all positions that may lie behind a surface."""
+DIRECTION_SD, SIZE_SD = 0.1, 0.3
+"""Standard deviations of the direction of a wall in rad, and of the log radius of a disc, where a search begins."""
+
+
+@dataclass(frozen=True)
+class Line:
+    """A straight line, by its distance in m from the origin and the direction to it in rad."""
+
+    distance: float
+    direction: float
+
+    @property
+    def normal(self) -> Float[np.ndarray, "2"]:
+        """Unit vector along the direction."""
+        return np.array([math.cos(self.direction), math.sin(self.direction)])
+
+    def towards(
+        self, places: Float[np.ndarray, "place 2"]
+    ) -> tuple[Float[np.ndarray, "place 2"], Float[np.ndarray, "place"]]:
+        """Unit vectors from places to the line, and distances in m."""
+        ahead = self.distance - places @ self.normal
+        return np.where(ahead >= 0, 1.0, -1.0)[:, None] * self.normal, np.abs(ahead)
+
+    def behind(self, path: Float[np.ndarray, "place 2"], within: float) -> int:
+        """Places of a path that lie across the line from the others, or nearer to it than `within` m."""
+        ahead = self.distance - path @ self.normal
+        return int(min((ahead < within).sum(), (ahead > -within).sum()))
+
+
+@dataclass(frozen=True)
+class Circle:
+    """A circle, by its middle and its radius in m."""
+
+    x: float
+    y: float
+    radius: float
+
+    def towards(
+        self, places: Float[np.ndarray, "place 2"]
+    ) -> tuple[Float[np.ndarray, "place 2"], Float[np.ndarray, "place"]]:
+        """Unit vectors from places to the circle, and distances in m."""
+        ahead = np.array([self.x, self.y]) - places
+        far = np.maximum(np.linalg.norm(ahead, axis=1), 1e-12)
+        return ahead / far[:, None], far - self.radius
+
+    def behind(self, path: Float[np.ndarray, "place 2"], within: float) -> int:
+        """Places of a path that lie inside, or nearer to it than `within` m."""
+        return int((self.towards(path)[1] < within).sum())
+
+
+Surface = Line | Circle
+
+
+def seen_surfaces(videos: Sequence[Tracks]) -> list[tuple[Surface, float]]:
+    """What bodies bounce off, that which explains most turns first, and how far in m it may be missed.
+
+    Nothing where a good part of the turns has no part in any of it: then it is something else that turns bodies.
+    """
+    seen = sudden_turns(videos)[:MOST_TURNS]
+    if len(seen) < FEWEST_AT_WALL:
+        return []
+    paths, largest = paths_of_bodies(videos), Region.of(videos).half_width
+    left, found = np.ones(len(seen), dtype=bool), []
+    while True:
+        # Stable sorting: of those that explain equally many a wall comes before a disc, which has more parameters.
+        candidates: list[Surface] = [*_lines(seen, left), *_circles(seen, left, largest)]
+        ranked = [(one, mine) for one in candidates if _enough(one, mine := _met(one, seen) & left)]
+        ranked.sort(key=lambda pair: -int(pair[1].sum()))
+        chosen = next(((one, mine) for one, mine in ranked if not _crossed(one, paths, seen)), None)
+        if chosen is None:
+            break
+        surface, mine = chosen
+        touching = list(itertools.compress(seen, mine))
+        refined = _refined(surface, touching)
+        moved_away = not _met(refined, touching).all() or _crossed(refined, paths, seen)
+        slack = float(np.median([_slack(one) for one in touching]))
+        found.append((surface if moved_away else refined, slack))
+        left &= ~mine
+    return found if (~left).sum() >= MOST_OF_THEM * len(seen) else []
+
+
+def believed_surfaces(
+    videos: Sequence[Tracks], catalogue: Sequence[Effect]
+) -> list[tuple[Wall | HiddenObstacle, dict[str, Parameter]]]:
+    """Walls and discs of a catalogue that stand where tracks show them, and what is believed of each at first.
+
+    Parameters
+    ----------
+    videos
+        What was seen.
+    catalogue
+        Causes that are looked for; of further walls and discs than it holds nothing is said.
+    """
+    walls = [effect for effect in catalogue if isinstance(effect, Wall)]
+    discs = [effect for effect in catalogue if isinstance(effect, HiddenObstacle)]
+    found: list[tuple[Wall | HiddenObstacle, dict[str, Parameter]]] = []
+    for surface, slack in seen_surfaces(videos) if walls or discs else []:
+        if isinstance(surface, Line) and walls:
+            effect: Wall | HiddenObstacle = walls.pop(0)
+            middles = {0: Prior(surface.distance, slack), 1: Prior(surface.direction, DIRECTION_SD)}
+        elif isinstance(surface, Circle) and discs:
+            effect = discs.pop(0)
+            place = {0: Prior(surface.x, slack), 1: Prior(surface.y, slack)}
+            middles = place | {2: Prior(math.log(surface.radius), SIZE_SD)}
+        else:
+            continue
+        stated = [(effect.parameters[k], prior) for k, prior in middles.items()]
+        found.append((effect, {one.name: _around(one, prior) for one, prior in stated}))
+    return found
+
+
+def _around(parameter: Parameter, prior: Prior) -> Parameter:
+    """A parameter with another prior, and the middle of that as its default."""
+    return replace(parameter, prior=prior, default=parameter.transform.to_value(prior.mean))
+
+
+def _slack(one: Turn) -> float:
+    """Distance in m by which a surface may miss the edge of a body."""
+    return NOISES * one.place_sd + SIZES * one.least
+
+
+def _met(surface: Surface, seen: Sequence[Turn]) -> Bool[np.ndarray, "turn"]:
+    """Which turns are at a surface, and away from it."""
+    directions, far = surface.towards(np.array([one.place for one in seen]))
+    cosines = (directions * np.array([one.into for one in seen])).sum(axis=1)
+    turned = np.arccos(np.clip(cosines, -1.0, 1.0))
+    allowed = np.array([RUBBED + DEVIATIONS * one.direction_sd for one in seen])
+    slack = np.array([_slack(one) for one in seen])
+    least, most = np.array([one.least for one in seen]), np.array([one.most for one in seen])
+    met: np.ndarray = (turned < allowed) & (far > least - slack) & (far < most + slack)
+    return met
+
+
+def _enough(surface: Surface, met: Bool[np.ndarray, "turn"]) -> bool:
+    return int(met.sum()) >= (FEWEST_AT_WALL if isinstance(surface, Line) else FEWEST_AT_DISC)
+
+
+def _crossed(
+    surface: Surface, paths: Sequence[tuple[float, list[Float[np.ndarray, "place 2"]]]], seen: Sequence[Turn]
+) -> bool:
+    """Whether bodies go through a surface."""
+    slack = float(np.median([_slack(one) for one in seen]))
+    behind = sum(surface.behind(part, radius - slack) for radius, parts in paths for part in parts)
+    return behind > CROSSINGS * sum(len(part) for _, parts in paths for part in parts)
+
+
+def _lines(seen: Sequence[Turn], left: Bool[np.ndarray, "turn"]) -> Iterator[Line]:
+    """Lines square to one of the turns that are left, and those that touch two of them."""
+    for one in itertools.compress(seen, left):
+        yield Line(float(one.place @ one.into) + one.least, math.atan2(one.into[1], one.into[0]))
+    for one, other in _pairs(seen, left):
+        aligned = float(one.into @ other.into)
+        apart = other.place - one.place
+        far = float(np.linalg.norm(apart))
+        if abs(aligned) < math.cos(2 * RUBBED + DEVIATIONS * (one.direction_sd + other.direction_sd)) or far == 0:
+            continue
+        higher = one.least - math.copysign(other.least, aligned)  # of the other place, along the normal
+        if abs(higher) > far:
+            continue
+        across, turn = math.atan2(apart[1], apart[0]), math.acos(higher / far)
+        directions = [across + turn, across - turn]
+        direction = max(directions, key=lambda at: one.into @ np.array([math.cos(at), math.sin(at)]))
+        yield Line(float(one.place @ Line(0.0, direction).normal) + one.least, direction)
+
+
+def _circles(seen: Sequence[Turn], left: Bool[np.ndarray, "turn"], largest: float) -> Iterator[Circle]:
+    """Circles that touch two of the turns that are left, each where it was turned squarely."""
+    for one, other in _pairs(seen, left):
+        design = np.concatenate([np.column_stack([np.eye(2), -turned.into]) for turned in (one, other)])
+        edges = np.concatenate([turned.place + turned.least * turned.into for turned in (one, other)])
+        (x, y, radius), *_ = np.linalg.lstsq(design, edges, rcond=None)
+        if 0 < radius < largest:
+            yield Circle(float(x), float(y), float(radius))
+
+
+def _pairs(seen: Sequence[Turn], left: Bool[np.ndarray, "turn"]) -> Iterator[tuple[Turn, Turn]]:
+    return itertools.combinations(itertools.compress(seen, left), 2)
+
+
+def _refined(surface: Surface, touching: Sequence[Turn]) -> Surface:
+    """The line or circle of the same kind that the edges of bodies are nearest to."""
+    places = np.array([one.place for one in touching])
+    edges = np.array([(one.least + one.most) / 2 for one in touching])
+    noise = np.array([_slack(one) + (one.most - one.least) / 2 for one in touching])
+    kind = type(surface)
+    start = [getattr(surface, name) for name in surface.__dataclass_fields__]
+    found = least_squares(lambda values: (kind(*values).towards(places)[1] - edges) / noise, start).x
+    return kind(*found.tolist())

@@ -10,6 +10,7 @@ from tests.discovery.test_describe import PAIRS
 from vrdp_prob.discovery.checks.contacts import DISTANCE
 from vrdp_prob.discovery.checks.measurement import MEMORY
 from vrdp_prob.discovery.checks.neighbours import roughness
+from vrdp_prob.discovery.describe import description_of
 from vrdp_prob.discovery.page.figures import residual_figures, title_of
 from vrdp_prob.discovery.page.plots import Plot, side_by_side
 from vrdp_prob.discovery.residuals.free_flight import FreeFlight
@@ -49,6 +50,22 @@ def test_a_video_that_lost_its_course_says_nothing_of_accelerations() -> None:
     assert found.lost == (model.videos[1].linear.name,)
     assert set(found.video) == {0.0, 2.0}
     assert found.size == pytest.approx(windows(tilted).size, rel=0.5)
+
+
+def test_no_video_says_anything_of_accelerations_that_its_own_tracks_rule_out() -> None:
+    """As where the contacts of all videos last: then none stands out among them."""
+    _, tilted = fitted("surface_tilt", seed=2, setting=PAIRS)
+    model = ResidualModel.of(tilted)
+    changes = [np.zeros((*video.motion.speed.shape, 2)) for video in model.videos]
+    for change, video in zip(changes, model.videos, strict=True):
+        change[:, 0, 0] = 20.0 * video.motion.times**2
+    spoilt = moved(model, changes)
+    found = missing_acceleration(FreeFlight.of(spoilt).model, roughness(model))
+    assert len(found.lost) == len(model.videos)
+    assert len(found.time) == 0
+    description = description_of(spoilt, [])
+    assert description.size == 0.0
+    assert any(sentence.startswith("Far more is missing in") for sentence in description.sentences)
 
 
 def test_there_is_a_figure_of_each_aspect_and_it_is_an_svg_element() -> None:

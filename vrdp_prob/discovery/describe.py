@@ -122,11 +122,11 @@ def _window_sentences(windows: Windows) -> Iterator[str]:
     """Size and direction of the missing acceleration, and where in speed, time and place there is more of it."""
     if windows.lost:
         yield (
-            f"Far more is missing in {listed(windows.lost)} than in the other videos, as where a contact is missed; it "
-            "is left out of what is said of accelerations."
+            f"Far more is missing in {listed(windows.lost)} than the tracks show where nothing touches, or than in the "
+            "other videos, as where a contact is missed or lasts; that is left out of what is said of accelerations."
         )
     if windows.size == 0 or len(windows.time) < 6:
-        yield "No missing acceleration shows in free flight."
+        yield "No missing acceleration shows in free flight" + (" of the others." if windows.lost else ".")
         return
     squares = (windows.acceleration**2).sum(axis=1)
     total = float(squares.sum())

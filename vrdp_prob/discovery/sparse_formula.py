@@ -42,6 +42,8 @@ def sparse_formula(separate: Separate) -> SparseFormula:
     IEEE Trans. Inf. Theory 53 (2007); the rule of one standard error: Breiman et al., Classification and regression
     trees (1984), section 3.4.3.
     """
+    if not separate.patterns:
+        return SparseFormula((), np.zeros(0), 0.0)
     whole = sum((one**2).sum(axis=0) for one in separate.patterns)
     usable = np.flatnonzero(whole > 0)
     scale = np.sqrt(whole[usable])

@@ -13,16 +13,17 @@ from jaxtyping import Float
 
 from vrdp_prob.discovery.residuals.fitted_motion import FittedMotion
 from vrdp_prob.discovery.residuals.residual_model import ABSORBED, ResidualModel
+from vrdp_prob.inference.search.clues import Clues
 
 LENGTH = 0.5
 """Longest window in s."""
 FEWEST = 3
 """Frames that a window has at least."""
-SIZES = np.concatenate([[0.0], np.geomspace(1e-5, 10.0, 61)])
+SIZES = np.concatenate([[0.0], np.geomspace(1e-5, 1e4, 91)])
 """Sizes (m/s^2) of the missing acceleration among which the most probable one is chosen."""
 FAR, EXTREME = 10.0, 3.0
-"""A video is lost that asks for so many times what the one in the middle does, and for more than so many m/s^2: its fit
-misses a contact."""
+"""A video is lost that asks for so many times what the one in the middle does, or its own tracks show where nothing
+touches, and for more than so many m/s^2: its fit misses a contact, or the contact lasts."""
 
 
 @dataclass(frozen=True)
@@ -137,9 +138,10 @@ def missing_acceleration(model: ResidualModel, noise: float) -> Windows:
     ]
     own = [_size(*part) for part in parts]
     middle = float(np.median([one for one, mine in zip(own, windows, strict=True) if mine] or [0.0]))
-    lost = [one > max(FAR * middle, EXTREME) for one in own]
+    shown = [Clues.of(video.motion.tracks).acceleration for video in model.videos]
+    lost = [one > max(FAR * min(middle, most), EXTREME) for one, most in zip(own, shown, strict=True)]
     usual = [part for part, far in zip(parts, lost, strict=True) if not far]
-    size = _size(*(np.concatenate(rows) for rows in zip(*usual, strict=True)))
+    size = _size(*(np.concatenate(rows) for rows in zip(*usual, strict=True))) if usual else 0.0
     means, spreads = [], []
     for (left, values, right), residuals in zip(decomposed, separate.residuals, strict=True):
         shrunk = size**2 / (size**2 * values**2 + noise)
@@ -178,7 +180,8 @@ def _gathered(
 ) -> Windows:
     """The windows of the videos that are not lost."""
     rows = [(k, body, frames) for k, mine in enumerate(windows) if not lost[k] for body, frames in mine]
-    mean, sd = (np.concatenate([one for one, far in zip(part, lost, strict=True) if not far]) for part in found)
+    kept = [[one for one, far in zip(part, lost, strict=True) if not far] for part in found]
+    mean, sd = (np.concatenate([np.zeros(0), *part]) for part in kept)
     motions = [video.motion for video in model.videos]
     return Windows(
         size,

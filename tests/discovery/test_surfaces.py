@@ -1,6 +1,8 @@
 """Walls and discs that tracks themselves show, by where bodies turn."""
 
 import math
+from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,6 +14,7 @@ from tests.discovery.measurement import Measurement, measure
 from tests.discovery.scenes import Setting
 from tests.discovery.videos import Disc, Video
 from vrdp_prob import discover
+from vrdp_prob.datasets import load_all
 from vrdp_prob.discovery.candidates.surfaces import Circle, Line, believed_surfaces, seen_surfaces
 from vrdp_prob.discovery.candidates.turns import sudden_turns
 from vrdp_prob.discovery.finding import Verdict
@@ -99,6 +102,17 @@ def test_stated_walls_are_nothing_unseen() -> None:
 def test_nothing_is_seen_where_no_surface_is(way: str | None) -> None:
     data = hide([] if way is None else [way], seed=1, effect_size=5.0, setting=Setting(videos=6, bodies=3))
     assert seen_surfaces(data.tracks) == []
+
+
+def test_cushions_of_a_billiard_table_are_seen_to_millimetres(shared_data: Path) -> None:
+    """Rolling balls, friction at cushions that give way, and an engine of another kind."""
+    shots = load_all(shared_data / "billiards_three_cushion")[:12]
+    assert seen_surfaces(shots) == []
+    lines = [one for one, _ in seen_surfaces([replace(one, walls=()) for one in shots])]
+    assert all(isinstance(one, Line) for one in lines)
+    placed = sides([one for one in lines if isinstance(one, Line)])
+    assert [distance for distance, _ in placed] == pytest.approx([1.42, 0.71, 1.42, 0.71], abs=0.005)
+    assert [turn - round(turn) for _, turn in placed] == pytest.approx([0.0] * 4, abs=0.02)
 
 
 def test_a_line_that_bodies_cross_is_none() -> None:

@@ -4,6 +4,7 @@ import itertools
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import cache
 
 import numpy as np
 from jaxtyping import Bool, Float
@@ -90,22 +91,29 @@ def seen_surfaces(videos: Sequence[Tracks]) -> list[tuple[Surface, float]]:
     seen = sudden_turns(videos)[:MOST_TURNS]
     if len(seen) < FEWEST_AT_WALL:
         return []
-    paths, largest = paths_of_bodies(videos), Region.of(videos).half_width
+    paths, edges = paths_of_bodies(videos), _Edges.of(seen)
+    # Sorting is stable: of those that explain equally many a wall comes before a disc, which has more parameters.
+    candidates: list[Surface] = [*_lines(seen), *_circles(seen, Region.of(videos).half_width)]
+    met = np.array([edges.met(one) for one in candidates])
+    fewest = np.array([FEWEST_AT_WALL if isinstance(one, Line) else FEWEST_AT_DISC for one in candidates])
     left, found = np.ones(len(seen), dtype=bool), []
+
+    @cache
+    def crossed(number: int) -> bool:
+        return _crossed(candidates[number], paths, edges)
+
     while True:
-        # Stable sorting: of those that explain equally many a wall comes before a disc, which has more parameters.
-        candidates: list[Surface] = [*_lines(seen, left), *_circles(seen, left, largest)]
-        ranked = [(one, mine) for one in candidates if _enough(one, mine := _met(one, seen) & left)]
-        ranked.sort(key=lambda pair: -int(pair[1].sum()))
-        chosen = next(((one, mine) for one, mine in ranked if not _crossed(one, paths, seen)), None)
+        counts = (met & left).sum(axis=1)
+        ranked = [k for k in np.argsort(-counts, kind="stable").tolist() if counts[k] >= fewest[k]]
+        chosen = next((k for k in ranked if not crossed(k)), None)
         if chosen is None:
             break
-        surface, mine = chosen
+        mine = met[chosen] & left
         touching = list(itertools.compress(seen, mine))
-        refined = _refined(surface, touching)
-        moved_away = not _met(refined, touching).all() or _crossed(refined, paths, seen)
-        slack = float(np.median([_slack(one) for one in touching]))
-        found.append((surface if moved_away else refined, slack))
+        refined = _refined(candidates[chosen], touching)
+        moved_away = not _Edges.of(touching).met(refined).all() or _crossed(refined, paths, edges)
+        slack = float(np.median(edges.slack[mine]))
+        found.append((candidates[chosen] if moved_away else refined, slack))
         left &= ~mine
     return found if (~left).sum() >= MOST_OF_THEM * len(seen) else []
 
@@ -145,41 +153,63 @@ def _around(parameter: Parameter, prior: Prior) -> Parameter:
     return replace(parameter, prior=prior, default=parameter.transform.to_value(prior.mean))
 
 
-def _slack(one: Turn) -> float:
-    """Distance in m by which a surface may miss the edge of a body."""
-    return NOISES * one.place_sd + SIZES * one.least
+@dataclass(frozen=True)
+class _Edges:
+    """Turns as a surface meets them.
 
+    Parameters
+    ----------
+    place, into
+        Where the centre of each body was in m, and in which direction its velocity was taken.
+    slack
+        Distance in m by which a surface may miss its edge.
+    least, most
+        Smallest and largest distance in m from its centre to its edge.
+    leaning
+        Angle in rad by which it may have turned from square.
+    """
 
-def _met(surface: Surface, seen: Sequence[Turn]) -> Bool[np.ndarray, "turn"]:
-    """Which turns are at a surface, and away from it."""
-    directions, far = surface.towards(np.array([one.place for one in seen]))
-    cosines = (directions * np.array([one.into for one in seen])).sum(axis=1)
-    turned = np.arccos(np.clip(cosines, -1.0, 1.0))
-    allowed = np.array([RUBBED + DEVIATIONS * one.direction_sd for one in seen])
-    slack = np.array([_slack(one) for one in seen])
-    least, most = np.array([one.least for one in seen]), np.array([one.most for one in seen])
-    met: np.ndarray = (turned < allowed) & (far > least - slack) & (far < most + slack)
-    return met
+    place: Float[np.ndarray, "turn 2"]
+    into: Float[np.ndarray, "turn 2"]
+    slack: Float[np.ndarray, "turn"]
+    least: Float[np.ndarray, "turn"]
+    most: Float[np.ndarray, "turn"]
+    leaning: Float[np.ndarray, "turn"]
 
+    @classmethod
+    def of(cls, seen: Sequence[Turn]) -> "_Edges":
+        """The edges of some turns."""
+        return cls(
+            np.array([one.place for one in seen]),
+            np.array([one.into for one in seen]),
+            np.array([NOISES * one.place_sd + SIZES * one.least for one in seen]),
+            np.array([one.least for one in seen]),
+            np.array([one.most for one in seen]),
+            np.array([RUBBED + DEVIATIONS * one.direction_sd for one in seen]),
+        )
 
-def _enough(surface: Surface, met: Bool[np.ndarray, "turn"]) -> bool:
-    return int(met.sum()) >= (FEWEST_AT_WALL if isinstance(surface, Line) else FEWEST_AT_DISC)
+    def met(self, surface: Surface) -> Bool[np.ndarray, "turn"]:
+        """Which turns are at a surface, and away from it."""
+        directions, far = surface.towards(self.place)
+        turned = np.arccos(np.clip((directions * self.into).sum(axis=1), -1.0, 1.0))
+        near: np.ndarray = (far > self.least - self.slack) & (far < self.most + self.slack)
+        return near & (turned < self.leaning)
 
 
 def _crossed(
-    surface: Surface, paths: Sequence[tuple[float, list[Float[np.ndarray, "place 2"]]]], seen: Sequence[Turn]
+    surface: Surface, paths: Sequence[tuple[float, list[Float[np.ndarray, "place 2"]]]], edges: _Edges
 ) -> bool:
     """Whether bodies go through a surface."""
-    slack = float(np.median([_slack(one) for one in seen]))
+    slack = float(np.median(edges.slack))
     behind = sum(surface.behind(part, radius - slack) for radius, parts in paths for part in parts)
-    return behind > CROSSINGS * sum(len(part) for _, parts in paths for part in parts)
+    return bool(behind > CROSSINGS * sum(len(part) for _, parts in paths for part in parts))
 
 
-def _lines(seen: Sequence[Turn], left: Bool[np.ndarray, "turn"]) -> Iterator[Line]:
-    """Lines square to one of the turns that are left, and those that touch two of them."""
-    for one in itertools.compress(seen, left):
+def _lines(seen: Sequence[Turn]) -> Iterator[Line]:
+    """Lines square to one of the turns, and those that touch two of them."""
+    for one in seen:
         yield Line(float(one.place @ one.into) + one.least, math.atan2(one.into[1], one.into[0]))
-    for one, other in _pairs(seen, left):
+    for one, other in itertools.combinations(seen, 2):
         aligned = float(one.into @ other.into)
         apart = other.place - one.place
         far = float(np.linalg.norm(apart))
@@ -194,9 +224,9 @@ def _lines(seen: Sequence[Turn], left: Bool[np.ndarray, "turn"]) -> Iterator[Lin
         yield Line(float(one.place @ Line(0.0, direction).normal) + one.least, direction)
 
 
-def _circles(seen: Sequence[Turn], left: Bool[np.ndarray, "turn"], largest: float) -> Iterator[Circle]:
-    """Circles that touch two of the turns that are left, each where it was turned squarely."""
-    for one, other in _pairs(seen, left):
+def _circles(seen: Sequence[Turn], largest: float) -> Iterator[Circle]:
+    """Circles that touch two of the turns, each where it was turned squarely."""
+    for one, other in itertools.combinations(seen, 2):
         design = np.concatenate([np.column_stack([np.eye(2), -turned.into]) for turned in (one, other)])
         edges = np.concatenate([turned.place + turned.least * turned.into for turned in (one, other)])
         (x, y, radius), *_ = np.linalg.lstsq(design, edges, rcond=None)
@@ -204,16 +234,11 @@ def _circles(seen: Sequence[Turn], left: Bool[np.ndarray, "turn"], largest: floa
             yield Circle(float(x), float(y), float(radius))
 
 
-def _pairs(seen: Sequence[Turn], left: Bool[np.ndarray, "turn"]) -> Iterator[tuple[Turn, Turn]]:
-    return itertools.combinations(itertools.compress(seen, left), 2)
-
-
 def _refined(surface: Surface, touching: Sequence[Turn]) -> Surface:
     """The line or circle of the same kind that the edges of bodies are nearest to."""
-    places = np.array([one.place for one in touching])
-    edges = np.array([(one.least + one.most) / 2 for one in touching])
-    noise = np.array([_slack(one) + (one.most - one.least) / 2 for one in touching])
+    edges = _Edges.of(touching)
+    middle, noise = (edges.least + edges.most) / 2, edges.slack + (edges.most - edges.least) / 2
     kind = type(surface)
     start = [getattr(surface, name) for name in surface.__dataclass_fields__]
-    found = least_squares(lambda values: (kind(*values).towards(places)[1] - edges) / noise, start).x
+    found = least_squares(lambda values: (kind(*values).towards(edges.place)[1] - middle) / noise, start).x
     return kind(*found.tolist())

@@ -138,7 +138,7 @@ def test_walls_and_discs_take_the_places_that_the_catalogue_has() -> None:
     for effect, beliefs in found:
         distance, direction = (beliefs[one.name] for one in effect.parameters[:2])
         assert abs(distance.default) == pytest.approx(HALF, abs=0.01)
-        assert distance.prior.sd < 0.05
+        assert distance.prior.sd < 0.1
         assert math.sin(2 * direction.default) == pytest.approx(0.0, abs=0.05)
 
 

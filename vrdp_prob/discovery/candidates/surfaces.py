@@ -31,7 +31,8 @@ RUBBED, DEVIATIONS = 0.2, 3.0
 CROSSINGS = 0.002
 """Share of all positions that may lie behind a surface."""
 DIRECTION_SD, SIZE_SD = 0.1, 0.3
-"""Standard deviations of the direction of a wall in rad, and of the log radius of a disc, where a search begins."""
+"""Largest standard deviation of the direction of a wall in rad, and that of the log radius of a disc, where a search
+begins."""
 
 
 @dataclass(frozen=True)
@@ -40,6 +41,11 @@ class Line:
 
     distance: float
     direction: float
+
+    @property
+    def values(self) -> tuple[float, float]:
+        """Its numbers in the order of the parameters of a wall."""
+        return self.distance, self.direction
 
     @property
     def normal(self) -> Float[np.ndarray, "2"]:
@@ -52,6 +58,12 @@ class Line:
         """Unit vectors from places to the line, and distances in m."""
         ahead = self.distance - places @ self.normal
         return np.where(ahead >= 0, 1.0, -1.0)[:, None] * self.normal, np.abs(ahead)
+
+    def spread(self, places: Float[np.ndarray, "place 2"], slack: float) -> tuple[float, float]:
+        """How far off distance and direction may be where the line may miss some places by `slack` m each."""
+        along = places @ np.array([-self.normal[1], self.normal[0]])
+        turned = min(DIRECTION_SD, slack / max(float(along.std()), 1e-12))
+        return math.hypot(slack, float(along.mean()) * turned), turned
 
     def behind(self, path: Float[np.ndarray, "place 2"], within: float) -> int:
         """Places of a path that lie across the line from the others, or nearer to it than `within` m."""
@@ -67,6 +79,11 @@ class Circle:
     y: float
     radius: float
 
+    @property
+    def values(self) -> tuple[float, float, float]:
+        """Its numbers in the order of the parameters of a disc."""
+        return self.x, self.y, self.radius
+
     def towards(
         self, places: Float[np.ndarray, "place 2"]
     ) -> tuple[Float[np.ndarray, "place 2"], Float[np.ndarray, "place"]]:
@@ -74,6 +91,10 @@ class Circle:
         ahead = np.array([self.x, self.y]) - places
         far = np.maximum(np.linalg.norm(ahead, axis=1), 1e-12)
         return ahead / far[:, None], far - self.radius
+
+    def spread(self, places: Float[np.ndarray, "place 2"], slack: float) -> tuple[float, float, float]:
+        """How far off the middle and the log radius may be where the circle may miss some places by `slack` m each."""
+        return slack, slack, SIZE_SD
 
     def behind(self, path: Float[np.ndarray, "place 2"], within: float) -> int:
         """Places of a path that lie inside, or nearer to it than `within` m."""
@@ -83,8 +104,8 @@ class Circle:
 Surface = Line | Circle
 
 
-def seen_surfaces(videos: Sequence[Tracks]) -> list[tuple[Surface, float]]:
-    """What bodies bounce off, that which explains most turns first, and how far in m it may be missed.
+def seen_surfaces(videos: Sequence[Tracks]) -> list[tuple[Surface, tuple[float, ...]]]:
+    """What bodies bounce off, that which explains most turns first, and how far off its numbers may be.
 
     Nothing where a good part of the turns has no part in any of it: then it is something else that turns bodies.
     """
@@ -112,8 +133,8 @@ def seen_surfaces(videos: Sequence[Tracks]) -> list[tuple[Surface, float]]:
         touching = list(itertools.compress(seen, mine))
         refined = _refined(candidates[chosen], touching)
         moved_away = not _Edges.of(touching).met(refined).all() or _crossed(refined, paths, edges)
-        slack = float(np.median(edges.slack[mine]))
-        found.append((candidates[chosen] if moved_away else refined, slack))
+        surface = candidates[chosen] if moved_away else refined
+        found.append((surface, surface.spread(edges.place[mine], float(np.median(edges.slack[mine])))))
         left &= ~mine
     return found if (~left).sum() >= MOST_OF_THEM * len(seen) else []
 
@@ -133,24 +154,21 @@ def believed_surfaces(
     walls = [effect for effect in catalogue if isinstance(effect, Wall)]
     discs = [effect for effect in catalogue if isinstance(effect, HiddenObstacle)]
     found: list[tuple[Wall | HiddenObstacle, dict[str, Parameter]]] = []
-    for surface, slack in seen_surfaces(videos) if walls or discs else []:
+    for surface, spread in seen_surfaces(videos) if walls or discs else []:
         if isinstance(surface, Line) and walls:
             effect: Wall | HiddenObstacle = walls.pop(0)
-            middles = {0: Prior(surface.distance, slack), 1: Prior(surface.direction, DIRECTION_SD)}
         elif isinstance(surface, Circle) and discs:
             effect = discs.pop(0)
-            place = {0: Prior(surface.x, slack), 1: Prior(surface.y, slack)}
-            middles = place | {2: Prior(math.log(surface.radius), SIZE_SD)}
         else:
             continue
-        stated = [(effect.parameters[k], prior) for k, prior in middles.items()]
-        found.append((effect, {one.name: _around(one, prior) for one, prior in stated}))
+        numbers = zip(effect.parameters, surface.values, spread, strict=False)  # restitution is none of a surface
+        found.append((effect, {one.name: _around(one, value, sd) for one, value, sd in numbers}))
     return found
 
 
-def _around(parameter: Parameter, prior: Prior) -> Parameter:
-    """A parameter with another prior, and the middle of that as its default."""
-    return replace(parameter, prior=prior, default=parameter.transform.to_value(prior.mean))
+def _around(parameter: Parameter, value: float, sd: float) -> Parameter:
+    """A parameter that is believed to be near a value."""
+    return replace(parameter, prior=Prior(parameter.transform.to_coordinate(value), sd), default=value)
 
 
 @dataclass(frozen=True)
@@ -239,6 +257,5 @@ def _refined(surface: Surface, touching: Sequence[Turn]) -> Surface:
     edges = _Edges.of(touching)
     middle, noise = (edges.least + edges.most) / 2, edges.slack + (edges.most - edges.least) / 2
     kind = type(surface)
-    start = [getattr(surface, name) for name in surface.__dataclass_fields__]
-    found = least_squares(lambda values: (kind(*values).towards(edges.place)[1] - middle) / noise, start).x
+    found = least_squares(lambda values: (kind(*values).towards(edges.place)[1] - middle) / noise, surface.values).x
     return kind(*found.tolist())

@@ -30,6 +30,11 @@ def test_checks_come_in_the_order_of_their_p_values() -> None:
     assert [(check.name, check.significant) for check in found] == [("1e-05", True), ("0.04", False), ("0.5", False)]
 
 
+def test_a_check_that_saw_nothing_does_not_count_because_others_do() -> None:
+    found = controlled([Check(str(p), 0.0, p, False, "") for p in (*[1e-9] * 9, 0.02)])
+    assert [check.significant for check in found] == [True] * 9 + [False]
+
+
 def test_a_scan_of_independent_places_has_as_many() -> None:
     generator = np.random.default_rng(0)
     largest = generator.chisquare(2, (2000, 40)).max(axis=1)

@@ -10,7 +10,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from jaxtyping import Float
 
-from vrdp_prob.discovery.checks.flight import SEEN
+from vrdp_prob.discovery.checks.false_discovery import SEEN
 from vrdp_prob.discovery.checks.own_values import BodyFrictions, Rebounds
 from vrdp_prob.discovery.checks.scatter_regression import Dependence, dependence
 from vrdp_prob.discovery.finding import Check

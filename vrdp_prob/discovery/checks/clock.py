@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, Int
 
-from vrdp_prob.discovery.checks.flight import SEEN
+from vrdp_prob.discovery.checks.false_discovery import SEEN
 from vrdp_prob.discovery.checks.replications import sum_p_value
 from vrdp_prob.discovery.finding import Check
 from vrdp_prob.discovery.residuals.residual_model import ResidualModel

@@ -13,7 +13,7 @@ from scipy.special import expit
 from scipy.stats import norm
 
 from vrdp_prob.discovery.checks.bodies import REBOUND
-from vrdp_prob.discovery.checks.flight import SEEN
+from vrdp_prob.discovery.checks.false_discovery import SEEN
 from vrdp_prob.discovery.checks.kicks import kick_check
 from vrdp_prob.discovery.finding import Check
 from vrdp_prob.discovery.residuals.contact_patterns import AT_CONTACTS, AT_WALLS, GROW, WHERE, ContactScore

@@ -10,6 +10,8 @@ from vrdp_prob.discovery.finding import Check
 
 RATE = 0.05
 """Largest share of false ones among the checks that count (and probability of any where nothing is wrong)."""
+SEEN = 0.01
+"""Probability by chance below which something was seen, however many other checks count."""
 
 
 def significant(p_values: Float[np.ndarray, "check"], rate: float = RATE) -> Bool[np.ndarray, "check"]:
@@ -29,7 +31,12 @@ def significant(p_values: Float[np.ndarray, "check"], rate: float = RATE) -> Boo
 
 
 def controlled(checks: Sequence[Check]) -> tuple[Check, ...]:
-    """The same checks, those marked that count, the most significant first."""
-    marks = significant(np.array([check.p_value for check in checks], dtype=float))
+    """The same checks, those marked that count, the most significant first.
+
+    Where most checks fail by far, the control of false discoveries lets p-values near its rate count as well; what such
+    a check asks for was not seen.
+    """
+    p_values = np.array([check.p_value for check in checks], dtype=float)
+    marks = significant(p_values) & (p_values < SEEN)
     marked = [replace(check, significant=bool(mark)) for check, mark in zip(checks, marks, strict=True)]
     return tuple(sorted(marked, key=lambda check: check.p_value))

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from vrdp_prob.discovery.checks.false_discovery import SEEN
 from vrdp_prob.discovery.checks.replications import anywhere
 from vrdp_prob.discovery.finding import Check
 from vrdp_prob.discovery.residuals.free_flight import FreeFlight, Part
@@ -17,8 +18,6 @@ from vrdp_prob.scene import Shape
 
 BESIDE = "Nothing is left of it beside"
 """How the sentence of a check begins that another check explains."""
-SEEN = 0.01
-"""Probability by chance below which a sentence says what was seen."""
 
 
 @dataclass(frozen=True)

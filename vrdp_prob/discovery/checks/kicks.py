@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Float, Int
 from scipy.stats import chi2
 
-from vrdp_prob.discovery.checks.flight import SEEN
+from vrdp_prob.discovery.checks.false_discovery import SEEN
 from vrdp_prob.discovery.checks.replications import anywhere, independent_places
 from vrdp_prob.discovery.finding import Check
 from vrdp_prob.discovery.residuals.fitted_motion import REACH, FittedMotion, Kicks

@@ -7,7 +7,7 @@ from jaxtyping import Float
 from scipy.stats import chi2, poisson
 
 from vrdp_prob.discovery.checks.clock import clock_checks
-from vrdp_prob.discovery.checks.flight import SEEN
+from vrdp_prob.discovery.checks.false_discovery import SEEN
 from vrdp_prob.discovery.checks.neighbours import (
     FEWEST,
     FramesApart,

@@ -215,12 +215,12 @@ class _Edges:
 
 
 def _crossed(
-    surface: Surface, paths: Sequence[tuple[float, list[Float[np.ndarray, "place 2"]]]], edges: _Edges
+    surface: Surface, paths: Sequence[tuple[float, list[Float[np.ndarray, "_ 2"]]]], edges: _Edges
 ) -> bool:
     """Whether bodies go through a surface."""
     slack = float(np.median(edges.slack))
     behind = sum(surface.behind(part, radius - slack) for radius, parts in paths for part in parts)
-    return bool(behind > CROSSINGS * sum(len(part) for _, parts in paths for part in parts))
+    return behind > CROSSINGS * sum(len(part) for _, parts in paths for part in parts)
 
 
 def _lines(seen: Sequence[Turn]) -> Iterator[Line]:

@@ -15,7 +15,7 @@ from tests.discovery.scenes import Setting
 from tests.discovery.videos import Disc, Video
 from vrdp_prob import discover
 from vrdp_prob.datasets import load_all
-from vrdp_prob.discovery.candidates.surfaces import Circle, Line, believed_surfaces, seen_surfaces
+from vrdp_prob.discovery.candidates.surfaces import Circle, Line, placed_surfaces, seen_surfaces
 from vrdp_prob.discovery.candidates.turns import sudden_turns
 from vrdp_prob.discovery.finding import Verdict
 from vrdp_prob.models.effects.effect import Effect
@@ -161,11 +161,14 @@ def test_a_line_that_bodies_cross_is_none() -> None:
 
 def test_walls_and_discs_take_the_places_that_the_catalogue_has() -> None:
     tracks = table()
-    assert believed_surfaces(tracks, [SurfaceTilt(), HiddenObstacle()]) == []
-    found = believed_surfaces(tracks, [SurfaceTilt(), *WALLS[:2]])
-    assert [effect.name for effect, _ in found] == ["wall", "second_wall"]
-    for effect, beliefs in found:
-        distance, direction = (beliefs[one.name] for one in effect.parameters[:2])
+    assert placed_surfaces(tracks, [SurfaceTilt(), HiddenObstacle()]) == []
+    found = placed_surfaces(tracks, [SurfaceTilt(), *WALLS[:2]])
+    assert [one.effect.name for one in found] == ["wall", "second_wall"]
+    for one in found:
+        distance, direction = one.near.values()
+        assert list(one.start.values()) == [distance.default, direction.default]
+        assert one.wall is not None
+        assert one.wall.distance(np.zeros(2)) == pytest.approx(HALF, abs=0.01)
         assert abs(distance.default) == pytest.approx(HALF, abs=0.01)
         assert distance.prior.sd < 0.1
         assert math.sin(2 * direction.default) == pytest.approx(0.0, abs=0.05)

@@ -2,7 +2,7 @@
 
 import itertools
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 
@@ -14,9 +14,10 @@ from vrdp_prob.discovery.candidates.turns import Turn, sudden_turns
 from vrdp_prob.models.effects.effect import Effect
 from vrdp_prob.models.effects.hidden_obstacle import HiddenObstacle
 from vrdp_prob.models.effects.places import Region, paths_of_bodies
-from vrdp_prob.models.effects.wall import Wall
+from vrdp_prob.models.effects.wall import HALF_LENGTH, Wall
 from vrdp_prob.models.parameters import Parameter, Prior
 from vrdp_prob.scene import Tracks
+from vrdp_prob.scene import Wall as SceneWall
 
 FEWEST_AT_WALL, FEWEST_AT_DISC = 2, 3
 """Turns that a wall, and a disc, must explain: a single one has any number of either."""
@@ -46,6 +47,12 @@ class Line:
     def values(self) -> tuple[float, float]:
         """Its numbers in the order of the parameters of a wall."""
         return self.distance, self.direction
+
+    @property
+    def wall(self) -> SceneWall:
+        """It as a wall that ends nowhere that a body gets to."""
+        middle, along = self.distance * self.normal, HALF_LENGTH * np.array([-self.normal[1], self.normal[0]])
+        return SceneWall(*(middle - along).tolist(), *(middle + along).tolist())
 
     @property
     def normal(self) -> Float[np.ndarray, "2"]:
@@ -139,10 +146,30 @@ def seen_surfaces(videos: Sequence[Tracks]) -> list[tuple[Surface, tuple[float, 
     return found if (~left).sum() >= MOST_OF_THEM * len(seen) else []
 
 
-def believed_surfaces(
-    videos: Sequence[Tracks], catalogue: Sequence[Effect]
-) -> list[tuple[Wall | HiddenObstacle, dict[str, Parameter]]]:
-    """Walls and discs of a catalogue that stand where tracks show them, and what is believed of each at first.
+@dataclass(frozen=True)
+class Placed:
+    """A wall or disc of a catalogue where tracks show one.
+
+    Parameters
+    ----------
+    effect
+        The wall or disc.
+    start
+        Where its place (and size) are, by the names of its parameters.
+    near
+        The same as beliefs, as wide as it may be off.
+    wall
+        It as a stated wall; None for a disc, which nobody can state.
+    """
+
+    effect: Wall | HiddenObstacle
+    start: Mapping[str, float]
+    near: Mapping[str, Parameter]
+    wall: SceneWall | None
+
+
+def placed_surfaces(videos: Sequence[Tracks], catalogue: Sequence[Effect]) -> list[Placed]:
+    """Walls and discs of a catalogue that stand where tracks show them.
 
     Parameters
     ----------
@@ -153,16 +180,20 @@ def believed_surfaces(
     """
     walls = [effect for effect in catalogue if isinstance(effect, Wall)]
     discs = [effect for effect in catalogue if isinstance(effect, HiddenObstacle)]
-    found: list[tuple[Wall | HiddenObstacle, dict[str, Parameter]]] = []
+    found = []
     for surface, spread in seen_surfaces(videos) if walls or discs else []:
+        effect: Wall | HiddenObstacle
         if isinstance(surface, Line) and walls:
-            effect: Wall | HiddenObstacle = walls.pop(0)
+            effect = walls.pop(0)
         elif isinstance(surface, Circle) and discs:
             effect = discs.pop(0)
         else:
             continue
-        numbers = zip(effect.parameters, surface.values, spread, strict=False)  # restitution is none of a surface
-        found.append((effect, {one.name: _around(one, value, sd) for one, value, sd in numbers}))
+        # The last parameter is its restitution, of which no surface tells.
+        numbers = list(zip(effect.parameters[:-1], surface.values, spread, strict=True))
+        start = {one.name: value for one, value, _ in numbers}
+        near = {one.name: _around(one, value, sd) for one, value, sd in numbers}
+        found.append(Placed(effect, start, near, surface.wall if isinstance(surface, Line) else None))
     return found
 
 
@@ -214,9 +245,7 @@ class _Edges:
         return near & (turned < self.leaning)
 
 
-def _crossed(
-    surface: Surface, paths: Sequence[tuple[float, list[Float[np.ndarray, "_ 2"]]]], edges: _Edges
-) -> bool:
+def _crossed(surface: Surface, paths: Sequence[tuple[float, list[Float[np.ndarray, "_ 2"]]]], edges: _Edges) -> bool:
     """Whether bodies go through a surface."""
     slack = float(np.median(edges.slack))
     behind = sum(surface.behind(part, radius - slack) for radius, parts in paths for part in parts)

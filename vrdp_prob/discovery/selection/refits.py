@@ -1,6 +1,6 @@
 """Refits with one more cause: which causes are tried on a model, and with what lost or hidden things beside them."""
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 
@@ -10,20 +10,23 @@ from jaxtyping import Float
 from vrdp_prob.discovery.candidates.proposals import hidden_things
 from vrdp_prob.discovery.candidates.scores import CauseScore, happens_once, score_causes
 from vrdp_prob.discovery.candidates.single_videos import causes_of_lost_videos, lost_videos
-from vrdp_prob.discovery.candidates.surfaces import believed_surfaces
+from vrdp_prob.discovery.candidates.surfaces import placed_surfaces
 from vrdp_prob.discovery.checks.battery import run_checks
 from vrdp_prob.discovery.finding import Check
 from vrdp_prob.discovery.residuals.overdispersion import overdispersion
 from vrdp_prob.discovery.selection.doubts import causes_with_own_check_failing
 from vrdp_prob.discovery.selection.trials import FIRST, Trial, gain
+from vrdp_prob.errors import InputError
 from vrdp_prob.inference.runs.parallel import in_processes
 from vrdp_prob.inference.several_videos.ascent import ImpossibleStartError
-from vrdp_prob.inference.several_videos.fitting import fit_together
+from vrdp_prob.inference.several_videos.fitting import SharedFit, fit_together
+from vrdp_prob.inference.several_videos.learned import with_learned_walls
 from vrdp_prob.inference.several_videos.second_look import MOST, explained, may_take_another_course
 from vrdp_prob.models.effects.effect import Effect
 from vrdp_prob.models.effects.external_impulse import ExternalImpulse
-from vrdp_prob.models.parameters import Parameter
+from vrdp_prob.models.physics import PhysicsModel
 from vrdp_prob.progress import Advance
+from vrdp_prob.scene import Tracks
 
 SHORTLIST_LEVEL = 0.01
 """Causes whose score chance makes as large more often are not refitted."""
@@ -226,44 +229,54 @@ class Refits:
         told = causes_of_lost_videos(trial.fit, lost, left, likely, self.needed, seed=self.seed)
         again = [effect for effect, promised in told if reached.get(effect.name, 0.0) < promised]
 
-        return [one for effect in again if (one := self._from_the_beginning(trial, [effect])) is not None]
+        return [one for effect in again if (one := self._searched_with(trial, effect)) is not None]
+
+    def _searched_with(self, trial: Trial, effect: Effect) -> Trial | None:
+        """The fit from the beginning with one more cause; None where videos have no world in common."""
+        tracks = [part.clues.tracks for part in trial.fit.fits]
+        return self._began_anew(trial, [effect], lambda: self._fit(trial, tracks, trial.fit.extended(effect)))
 
     def _met(self, trial: Trial) -> Trial | None:
         """The fit from the beginning with the walls and discs that the tracks themselves show, all of them at once.
 
         A fit without them has lost its way at the first that a body met, so that scores call for what mends its course.
-        None where tracks show nothing of the kind, or something unseen stands in the model's way already.
+        Walls count as stated until a fit is found: twelve numbers more for four of them make every search longer, and
+        some lose their way. None where tracks show nothing of the kind, or something unseen stands in the model's way
+        already.
         """
         if trial.choices or any(effect.overrides("obstacles") for effect in trial.fit.model.effects):
             return None
-        surfaces = believed_surfaces(trial.fit.tracks, self.catalogue)
-        near = {name: belief for _, beliefs in surfaces for name, belief in beliefs.items()}
-        return self._from_the_beginning(trial, [effect for effect, _ in surfaces], near) if surfaces else None
-
-    def _from_the_beginning(
-        self, trial: Trial, causes: Sequence[Effect], near: Mapping[str, Parameter] | None = None
-    ) -> Trial | None:
-        """The fit with further causes that owes nothing to that of a trial; None where videos have no world in common.
-
-        Parameters
-        ----------
-        trial
-            The model without the causes.
-        causes
-            The further ones.
-        near
-            What is believed of their parameters, by name, until a fit is found; as in every other one where None.
-        """
-        model = trial.fit.model
-        for cause in causes:
-            model = model.with_effect(cause, trial.fit.tracks)
-        first = model if near is None else replace(model, beliefs={**model.beliefs, **near})
         tracks = [part.clues.tracks for part in trial.fit.fits]
+        placed = placed_surfaces(tracks, self.catalogue)
+        walls = [one.wall for one in placed if one.wall is not None]
+
+        def fitted() -> SharedFit:
+            first = model = trial.fit.model
+            for one in placed:
+                model = model.with_effect(one.effect, tracks)
+                if one.wall is None:
+                    first = first.with_effect(one.effect, tracks)
+                    first = replace(first, beliefs={**first.beliefs, **one.near})
+            stated = [replace(one, walls=(*one.walls, *walls)) for one in tracks]
+            fit = self._fit(trial, stated, first)
+            told = with_learned_walls(fit, stated[0]).walls[len(tracks[0].walls) :]
+            start = {name: value for one in placed for name, value in one.start.items()}
+            for effect, wall in zip((one.effect for one in placed if one.wall is not None), told, strict=True):
+                start |= {} if wall.restitution is None else {effect.parameters[-1].name: wall.restitution}
+            return fit.of_tracks(tracks).under(model, start=start, effort=FIRST, model_error=False)
+
+        return self._began_anew(trial, [one.effect for one in placed], fitted) if placed else None
+
+    def _fit(self, trial: Trial, tracks: Sequence[Tracks], model: PhysicsModel) -> SharedFit:
+        """The fit of a model that owes nothing to that of a trial but what is shared."""
+        return fit_together(tracks, model=model, shared=trial.fit.shared, seed=self.seed, model_error=False)
+
+    def _began_anew(self, trial: Trial, causes: Sequence[Effect], fitted: Callable[[], SharedFit]) -> Trial | None:
+        """A trial with further causes by a fit from the beginning; None where videos have no world in common."""
         try:
-            fit = fit_together(tracks, model=first, shared=trial.fit.shared, seed=self.seed, model_error=False)
-            fit = fit if near is None else fit.under(model, effort=FIRST, model_error=False)
-            return trial.and_causes(causes, fit)
-        except ImpossibleStartError:  # what single videos say of the causes fits no world of all of them
+            return trial.and_causes(causes, fitted())
+        except (ImpossibleStartError, InputError):
+            # What single videos say of the causes fits no world of all of them, or a wall overlaps what is seen.
             return None
         finally:
             self.advance(1)

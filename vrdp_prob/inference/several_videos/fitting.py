@@ -13,6 +13,7 @@ from vrdp_prob.inference.draws.mode import Mode
 from vrdp_prob.inference.map_fit import MapFit
 from vrdp_prob.inference.runs.journal import kept
 from vrdp_prob.inference.runs.parallel import in_processes
+from vrdp_prob.inference.search.clues import Clues
 from vrdp_prob.inference.search.misfit import judge
 from vrdp_prob.inference.search.model_error_fit import TURNS, next_model_error
 from vrdp_prob.inference.search.plan import IN_DOUBT, FitPlan
@@ -91,6 +92,17 @@ class SharedFit:
             return None
         mean = float(self.joint.gaussian.mean[place])
         return math.exp(mean) if self.joint.numbers.logarithms[place] else mean
+
+    def of_tracks(self, videos: Sequence[Tracks]) -> "SharedFit":
+        """The same fit for `under` to go on from, where a model has as causes what its own tracks state.
+
+        Parameters
+        ----------
+        videos
+            The same videos in the same order, of which less is stated (fewer walls).
+        """
+        fits = [replace(part, clues=Clues.of(tracks)) for part, tracks in zip(self.fits, videos, strict=True)]
+        return replace(self, fits=tuple(fits))
 
     @kept
     def under(

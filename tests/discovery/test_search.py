@@ -27,6 +27,12 @@ def _refit(cause: str, gained: float, *, patches: bool = False) -> Mock:
     return refit
 
 
+@pytest.fixture(autouse=True)
+def tracks_show_no_walls(monkeypatch: pytest.MonkeyPatch) -> None:
+    """No refit here has tracks to look at."""
+    monkeypatch.setattr(refits.Refits, "_met", lambda _self, _trial: None)
+
+
 def _searcher(needed: float = 0.0) -> search._Searcher:
     return search._Searcher(_refits(needed))
 
@@ -145,6 +151,30 @@ def _judge_by_gain(monkeypatch: pytest.MonkeyPatch) -> None:
 
     monkeypatch.setattr(refits.Refits, "left", Mock())
     monkeypatch.setattr(search._Searcher, "doubted", doubted)
+
+
+@pytest.mark.parametrize("brought", [20.0, 1.0], ids=["enough", "too little"])
+def test_where_walls_that_tracks_show_bring_enough_nothing_else_is_tried(
+    brought: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    plain, walls, drag = _refit("", 0.0), _refit("wall+second_wall", brought), _refit("drag", 5.0)
+    walls.brought.return_value = brought
+    monkeypatch.setattr(refits.Refits, "_met", lambda _self, _trial: walls)
+    monkeypatch.setattr(refits.Refits, "_new", lambda _self, _trial: [drag])
+    assert _refits(needed=6.0).of(plain) == ([walls] if brought > 6.0 else [drag])
+
+
+def test_of_several_walls_at_once_none_is_a_merit_of_a_better_course(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The model to go on from is that without any of them."""
+    tilt, walls = _refit("tilt", 0.0), _refit("tilt+wall+second_wall", 50.0)
+    one_left, none_left = _refit("tilt+second_wall", 20.0), _refit("tilt", 0.5)
+    walls.without.return_value, one_left.without.return_value = one_left, none_left
+    monkeypatch.setattr(search, "happens_once", lambda _cause: False)
+    _judge_by_gain(monkeypatch)
+    step = search.Step(Mock(spec=refits.Left), (walls,))
+    assert _searcher(needed=2.0).chosen(tilt, step) == (tilt, walls)
+    walls.without.assert_called_once_with("wall")
+    one_left.without.assert_called_once_with("second_wall")
 
 
 @pytest.mark.parametrize("enough", [True, False], ids=["enough", "too little"])

@@ -24,9 +24,7 @@ from vrdp_prob.inference.several_videos.learned import with_learned_walls
 from vrdp_prob.inference.several_videos.second_look import MOST, explained, may_take_another_course
 from vrdp_prob.models.effects.effect import Effect
 from vrdp_prob.models.effects.external_impulse import ExternalImpulse
-from vrdp_prob.models.physics import PhysicsModel
 from vrdp_prob.progress import Advance
-from vrdp_prob.scene import Tracks
 
 SHORTLIST_LEVEL = 0.01
 """Causes whose score chance makes as large more often are not refitted."""
@@ -233,8 +231,14 @@ class Refits:
 
     def _searched_with(self, trial: Trial, effect: Effect) -> Trial | None:
         """The fit from the beginning with one more cause; None where videos have no world in common."""
-        tracks = [part.clues.tracks for part in trial.fit.fits]
-        return self._began_anew(trial, [effect], lambda: self._fit(trial, tracks, trial.fit.extended(effect)))
+
+        def fitted() -> SharedFit:
+            tracks = [part.clues.tracks for part in trial.fit.fits]
+            return fit_together(
+                tracks, model=trial.fit.extended(effect), shared=trial.fit.shared, seed=self.seed, model_error=False
+            )
+
+        return self._began_anew(trial, [effect], fitted)
 
     def _met(self, trial: Trial) -> Trial | None:
         """The fit from the beginning with the walls and discs that the tracks themselves show, all of them at once.
@@ -258,7 +262,7 @@ class Refits:
                     first = first.with_effect(one.effect, tracks)
                     first = replace(first, beliefs={**first.beliefs, **one.near})
             stated = [replace(one, walls=(*one.walls, *walls)) for one in tracks]
-            fit = self._fit(trial, stated, first)
+            fit = fit_together(stated, model=first, shared=trial.fit.shared, seed=self.seed, model_error=False)
             told = with_learned_walls(fit, stated[0]).walls[len(tracks[0].walls) :]
             start = {name: value for one in placed for name, value in one.start.items()}
             for effect, wall in zip((one.effect for one in placed if one.wall is not None), told, strict=True):
@@ -266,10 +270,6 @@ class Refits:
             return fit.of_tracks(tracks).under(model, start=start, effort=FIRST, model_error=False)
 
         return self._began_anew(trial, [one.effect for one in placed], fitted) if placed else None
-
-    def _fit(self, trial: Trial, tracks: Sequence[Tracks], model: PhysicsModel) -> SharedFit:
-        """The fit of a model that owes nothing to that of a trial but what is shared."""
-        return fit_together(tracks, model=model, shared=trial.fit.shared, seed=self.seed, model_error=False)
 
     def _began_anew(self, trial: Trial, causes: Sequence[Effect], fitted: Callable[[], SharedFit]) -> Trial | None:
         """A trial with further causes by a fit from the beginning; None where videos have no world in common."""

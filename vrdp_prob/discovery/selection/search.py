@@ -232,8 +232,8 @@ class _Searcher:
         winner = next((one for one in step.tried[:1] if gain(one, trial)[0] >= self.needed), None)
         if winner is not None:
             without = winner
-            for cause in winner.causes[len(trial.causes) :]:
-                without = without.without(cause)
+            for cause in winner.causes:
+                without = without if cause in trial.causes else without.without(cause)
             if gain(without, trial)[0] > self.needed:
                 trial = without
             if happens_once(winner.causes[-1]):

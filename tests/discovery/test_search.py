@@ -22,6 +22,7 @@ def _refit(cause: str, gained: float, *, patches: bool = False) -> Mock:
     refit = create_autospec(Trial, instance=True)
     refit.causes, refit.log_density, refit.log_prior = tuple(cause.split("+")), np.full(3, gained), 0.0
     refit.fit = Mock(videos=(0, 1, 2))
+    refit.beyond = lambda base: tuple(one for one in refit.causes if one not in base.causes)
     refit.patches.return_value = patches
     refit.loses_videos_of.return_value = False
     return refit
@@ -30,7 +31,7 @@ def _refit(cause: str, gained: float, *, patches: bool = False) -> Mock:
 @pytest.fixture(autouse=True)
 def tracks_show_no_walls(monkeypatch: pytest.MonkeyPatch) -> None:
     """No refit here has tracks to look at."""
-    monkeypatch.setattr(refits.Refits, "_met", lambda _self, _trial: None)
+    monkeypatch.setattr(refits.Refits, "_placed", lambda _self, _trial: [])
 
 
 def _searcher(needed: float = 0.0) -> search._Searcher:
@@ -153,28 +154,32 @@ def _judge_by_gain(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(search._Searcher, "doubted", doubted)
 
 
-@pytest.mark.parametrize("brought", [20.0, 1.0], ids=["enough", "too little"])
-def test_where_walls_that_tracks_show_bring_enough_nothing_else_is_tried(
-    brought: float, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize(
+    ("turns", "doubted", "alone"),
+    [(6, False, True), (2, False, False), (6, True, False)],
+    ids=["plain", "of few turns", "doubted"],
+)
+def test_where_walls_that_tracks_show_are_plain_nothing_else_is_tried(
+    turns: int, *, doubted: bool, alone: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    plain, walls, drag = _refit("", 0.0), _refit("wall+second_wall", brought), _refit("drag", 5.0)
-    walls.brought.return_value = brought
-    monkeypatch.setattr(refits.Refits, "_met", lambda _self, _trial: walls)
+    plain, walls, drag = _refit("", 0.0), _refit("wall+second_wall", 20.0), _refit("drag", 5.0)
+    monkeypatch.setattr(refits.Refits, "_placed", lambda _self, _trial: [Mock(seen=Mock(turns=turns))])
+    monkeypatch.setattr(refits.Refits, "_met", lambda _self, _trial, _placed: walls)
     monkeypatch.setattr(refits.Refits, "_new", lambda _self, _trial: [drag])
-    assert _refits(needed=6.0).of(plain) == ([walls] if brought > 6.0 else [drag])
+    monkeypatch.setattr(refits.Refits, "left", Mock())
+    monkeypatch.setattr(refits.Refits, "doubted", lambda *_given: doubted)
+    assert _refits(needed=6.0).of(plain) == ([walls] if alone else [walls, drag])
 
 
 def test_of_several_walls_at_once_none_is_a_merit_of_a_better_course(monkeypatch: pytest.MonkeyPatch) -> None:
     """The model to go on from is that without any of them."""
     tilt, walls = _refit("tilt", 0.0), _refit("tilt+wall+second_wall", 50.0)
-    one_left, none_left = _refit("tilt+second_wall", 20.0), _refit("tilt", 0.5)
-    walls.without.return_value, one_left.without.return_value = one_left, none_left
+    walls.without.return_value = _refit("tilt", 0.5)
     monkeypatch.setattr(search, "happens_once", lambda _cause: False)
     _judge_by_gain(monkeypatch)
     step = search.Step(Mock(spec=refits.Left), (walls,))
     assert _searcher(needed=2.0).chosen(tilt, step) == (tilt, walls)
-    walls.without.assert_called_once_with("wall")
-    one_left.without.assert_called_once_with("second_wall")
+    walls.without.assert_called_once_with("wall", "second_wall")
 
 
 @pytest.mark.parametrize("enough", [True, False], ids=["enough", "too little"])

@@ -15,9 +15,18 @@ from tests.discovery.scenes import Setting
 from tests.discovery.videos import Disc, Video
 from vrdp_prob import discover
 from vrdp_prob.datasets import load_all
-from vrdp_prob.discovery.candidates.surfaces import Circle, Line, placed_surfaces, seen_surfaces
+from vrdp_prob.discovery.candidates.surfaces import (
+    Circle,
+    Line,
+    Placed,
+    Seen,
+    as_stated,
+    placed_surfaces,
+    seen_surfaces,
+)
 from vrdp_prob.discovery.candidates.turns import sudden_turns
 from vrdp_prob.discovery.finding import Verdict
+from vrdp_prob.errors import InputError
 from vrdp_prob.models.effects.effect import Effect
 from vrdp_prob.models.effects.external_impulse import ExternalImpulse
 from vrdp_prob.models.effects.hidden_obstacle import HiddenObstacle
@@ -101,7 +110,7 @@ def sides(lines: list[Line]) -> list[tuple[float, float]]:
 
 
 def test_four_walls_are_seen_where_they_are() -> None:
-    found = [one for one, _ in seen_surfaces(table(discs=()))]
+    found = [one.surface for one in seen_surfaces(table(discs=()))]
     assert len(found) == 4
     assert all(isinstance(one, Line) for one in found)
     placed = sides([one for one in found if isinstance(one, Line)])
@@ -111,14 +120,15 @@ def test_four_walls_are_seen_where_they_are() -> None:
 
 
 def test_a_pillar_is_seen_as_a_circle_and_not_as_walls() -> None:
-    found = [one for one, _ in seen_surfaces(table(hidden=False, discs=(PILLAR,), count=6))]
+    found = [one.surface for one in seen_surfaces(table(hidden=False, discs=(PILLAR,), count=6))]
     assert len(found) == 1
     assert isinstance(found[0], Circle)
     assert (found[0].x, found[0].y, found[0].radius) == pytest.approx((PILLAR.x, PILLAR.y, PILLAR.radius), abs=0.02)
 
 
 def test_a_floor_is_seen_where_bodies_fall_on_it() -> None:
-    ((line, _),) = seen_surfaces(floor())
+    (found,) = seen_surfaces(floor())
+    line = found.surface
     assert isinstance(line, Line)
     assert sides([line]) == [pytest.approx((0.8, 3.0), abs=0.02)]
 
@@ -137,7 +147,7 @@ def test_cushions_of_a_billiard_table_are_seen_within_a_centimetre(shared_data: 
     """Rolling balls, friction at cushions that give way, and an engine of another kind."""
     shots = load_all(shared_data / "billiards_three_cushion")[:12]
     assert seen_surfaces(shots) == []
-    lines = [one for one, _ in seen_surfaces([replace(one, walls=()) for one in shots])]
+    lines = [one.surface for one in seen_surfaces([replace(one, walls=()) for one in shots])]
     assert all(isinstance(one, Line) for one in lines)
     placed = sides([one for one in lines if isinstance(one, Line)])
     assert [distance for distance, _ in placed] == pytest.approx([1.42, 0.71, 1.42, 0.71], abs=0.01)
@@ -165,13 +175,46 @@ def test_walls_and_discs_take_the_places_that_the_catalogue_has() -> None:
     found = placed_surfaces(tracks, [SurfaceTilt(), *WALLS[:2]])
     assert [one.effect.name for one in found] == ["wall", "second_wall"]
     for one in found:
-        distance, direction = one.near.values()
-        assert list(one.start.values()) == [distance.default, direction.default]
+        distance, direction = one.start.values()
+        assert abs(distance) == pytest.approx(HALF, abs=0.01)
+        assert math.sin(2 * direction) == pytest.approx(0.0, abs=0.05)
         assert one.wall is not None
         assert one.wall.distance(np.zeros(2)) == pytest.approx(HALF, abs=0.01)
-        assert abs(distance.default) == pytest.approx(HALF, abs=0.01)
-        assert distance.prior.sd < 0.1
-        assert math.sin(2 * direction.default) == pytest.approx(0.0, abs=0.05)
+    assert placed_surfaces(tracks, [SecondWall(), ThirdWall()]) == []  # there is no second one without a first
+    assert placed_surfaces(tracks, [Wall()]) == []  # one of four explains too few turns
+
+
+def test_tracks_that_state_walls_are_as_uncertain_as_these() -> None:
+    tracks = table()[0]
+    placed = Placed(Wall(), Seen(Line(HALF, 0.0), slack=0.02, turns=3, share=1.0))
+    stated = as_stated(tracks, [placed])
+    assert len(stated.walls) == 1
+    assert stated.walls[0].x1 == pytest.approx(HALF)
+    sd = np.sqrt(stated.position_variance)
+    np.testing.assert_allclose(sd, np.hypot(0.002, 0.02 / 4), rtol=0.1)
+    with pytest.raises(InputError, match="overlaps the wall"):
+        as_stated(tracks, [replace(placed, seen=replace(placed.seen, surface=Line(-0.6, 0.0)))])
+
+
+def test_bodies_whose_radius_nobody_states_are_thrown_back_where_their_middle_is() -> None:
+    tracks = [replace(one, bodies=tuple(replace(body, radius=None) for body in one.bodies)) for one in table()]
+    lines = [one.surface for one in seen_surfaces(tracks)]
+    assert all(isinstance(one, Line) for one in lines)
+    placed = sides([one for one in lines if isinstance(one, Line)])
+    assert [distance for distance, _ in placed] == pytest.approx([HALF - 0.1] * 4, abs=0.01)
+
+
+def test_what_turns_smoothly_turns_at_nothing() -> None:
+    """A body that circles seven times a second times a radian: two quadratic pieces cannot follow it."""
+    times, generator = np.arange(75) / 25, np.random.default_rng(0)
+    body = table(count=1)[0].bodies[0]
+
+    def video(name: str, radius: float) -> Tracks:
+        turn = 7.0 * times + radius
+        places = radius * np.stack([np.cos(turn), np.sin(turn)], axis=-1)[:, None]
+        return Tracks.from_arrays(name, (body,), times, places + 0.002 * generator.standard_normal(places.shape))
+
+    assert seen_surfaces([video(f"v{k}", 0.3 + 0.1 * k) for k in range(4)]) == []
 
 
 @pytest.mark.slow

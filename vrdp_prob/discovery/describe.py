@@ -126,7 +126,8 @@ def _window_sentences(windows: Windows) -> Iterator[str]:
             "other videos, as where a contact is missed or lasts; that is left out of what is said of accelerations."
         )
     if windows.size == 0 or len(windows.time) < 6:
-        yield "No missing acceleration shows in free flight" + (" of the others." if windows.lost else ".")
+        if len(windows.time) or not windows.lost:
+            yield "No missing acceleration shows in free flight" + (" of the others." if windows.lost else ".")
         return
     squares = (windows.acceleration**2).sum(axis=1)
     total = float(squares.sum())

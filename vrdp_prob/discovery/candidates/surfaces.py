@@ -2,7 +2,7 @@
 
 import itertools
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 
@@ -16,6 +16,7 @@ from vrdp_prob.models.effects.hidden_obstacle import HiddenObstacle
 from vrdp_prob.models.effects.places import Region, paths_of_bodies
 from vrdp_prob.models.effects.wall import HALF_LENGTH, Wall
 from vrdp_prob.models.parameters import Parameter, Prior
+from vrdp_prob.models.roughness import noise_scale
 from vrdp_prob.scene import Tracks
 from vrdp_prob.scene import Wall as SceneWall
 
@@ -31,9 +32,8 @@ RUBBED, DEVIATIONS = 0.2, 3.0
 """Angle in rad by which friction turns a rebound from square, and standard deviations of its direction beyond that."""
 CROSSINGS = 0.002
 """Share of all positions that may lie behind a surface."""
-DIRECTION_SD, SIZE_SD = 0.1, 0.3
-"""Largest standard deviation of the direction of a wall in rad, and that of the log radius of a disc, where a search
-begins."""
+SIZE_SD = 0.3
+"""Standard deviation of the log radius of a disc where a search begins."""
 
 
 @dataclass(frozen=True)
@@ -60,17 +60,11 @@ class Line:
         return np.array([math.cos(self.direction), math.sin(self.direction)])
 
     def towards(
-        self, places: Float[np.ndarray, "place 2"]
+        self, places: Float[np.ndarray, "place 2"], into: Float[np.ndarray, "place 2"]
     ) -> tuple[Float[np.ndarray, "place 2"], Float[np.ndarray, "place"]]:
-        """Unit vectors from places to the line, and distances in m."""
-        ahead = self.distance - places @ self.normal
-        return np.where(ahead >= 0, 1.0, -1.0)[:, None] * self.normal, np.abs(ahead)
-
-    def spread(self, places: Float[np.ndarray, "place 2"], slack: float) -> tuple[float, float]:
-        """How far off distance and direction may be where the line may miss some places by `slack` m each."""
-        along = places @ np.array([-self.normal[1], self.normal[0]])
-        turned = min(DIRECTION_SD, slack / max(float(along.std()), 1e-12))
-        return math.hypot(slack, float(along.mean()) * turned), turned
+        """Unit vectors from places to the line, on whichever side they were pushed from, and distances in m."""
+        side = np.where(into @ self.normal >= 0, 1.0, -1.0)
+        return side[:, None] * self.normal, side * (self.distance - places @ self.normal)
 
     def behind(self, path: Float[np.ndarray, "place 2"], within: float) -> int:
         """Places of a path that lie across the line from the others, or nearer to it than `within` m."""
@@ -92,39 +86,54 @@ class Circle:
         return self.x, self.y, self.radius
 
     def towards(
-        self, places: Float[np.ndarray, "place 2"]
+        self, places: Float[np.ndarray, "place 2"], into: Float[np.ndarray, "place 2"]
     ) -> tuple[Float[np.ndarray, "place 2"], Float[np.ndarray, "place"]]:
-        """Unit vectors from places to the circle, and distances in m."""
+        """Unit vectors from places to the circle, from which bodies are pushed outwards, and distances in m."""
         ahead = np.array([self.x, self.y]) - places
         far = np.maximum(np.linalg.norm(ahead, axis=1), 1e-12)
         return ahead / far[:, None], far - self.radius
 
-    def spread(self, places: Float[np.ndarray, "place 2"], slack: float) -> tuple[float, float, float]:
-        """How far off the middle and the log radius may be where the circle may miss some places by `slack` m each."""
-        return slack, slack, SIZE_SD
-
     def behind(self, path: Float[np.ndarray, "place 2"], within: float) -> int:
         """Places of a path that lie inside, or nearer to it than `within` m."""
-        return int((self.towards(path)[1] < within).sum())
+        return int((np.linalg.norm(path - (self.x, self.y), axis=1) - self.radius < within).sum())
 
 
 Surface = Line | Circle
 
 
-def seen_surfaces(videos: Sequence[Tracks]) -> list[tuple[Surface, tuple[float, ...]]]:
-    """What bodies bounce off, that which explains most turns first, and how far off its numbers may be.
+@dataclass(frozen=True)
+class Seen:
+    """A surface that bodies bounce off.
 
-    Nothing where a good part of the turns has no part in any of it: then it is something else that turns bodies.
+    Parameters
+    ----------
+    surface
+        Where it is.
+    slack
+        Distance in m by which it may miss the edge of a body.
+    turns
+        Number of the turns that it explains.
+    share
+        The same as a share of all turns.
     """
+
+    surface: Surface
+    slack: float
+    turns: int
+    share: float
+
+
+def seen_surfaces(videos: Sequence[Tracks]) -> list[Seen]:
+    """What bodies bounce off, that which explains most turns first."""
     seen = sudden_turns(videos)[:MOST_TURNS]
     if len(seen) < FEWEST_AT_WALL:
         return []
-    paths, edges = paths_of_bodies(videos), _Edges.of(seen)
+    paths, edges, largest = paths_of_bodies(videos), _Edges.of(seen), Region.of(videos).half_width
     # Sorting is stable: of those that explain equally many a wall comes before a disc, which has more parameters.
-    candidates: list[Surface] = [*_lines(seen), *_circles(seen, Region.of(videos).half_width)]
+    candidates: list[Surface] = [*_lines(seen), *_circles(seen, largest)]
     met = np.array([edges.met(one) for one in candidates])
     fewest = np.array([FEWEST_AT_WALL if isinstance(one, Line) else FEWEST_AT_DISC for one in candidates])
-    left, found = np.ones(len(seen), dtype=bool), []
+    left, found = np.ones(len(seen), dtype=bool), list[Seen]()
 
     @cache
     def crossed(number: int) -> bool:
@@ -135,15 +144,16 @@ def seen_surfaces(videos: Sequence[Tracks]) -> list[tuple[Surface, tuple[float, 
         ranked = [k for k in np.argsort(-counts, kind="stable").tolist() if counts[k] >= fewest[k]]
         chosen = next((k for k in ranked if not crossed(k)), None)
         if chosen is None:
-            break
+            return found
         mine = met[chosen] & left
         touching = list(itertools.compress(seen, mine))
-        refined = _refined(candidates[chosen], touching)
-        moved_away = not _Edges.of(touching).met(refined).all() or _crossed(refined, paths, edges)
-        surface = candidates[chosen] if moved_away else refined
-        found.append((surface, surface.spread(edges.place[mine], float(np.median(edges.slack[mine])))))
+        surface, refined = candidates[chosen], _refined(candidates[chosen], touching)
+        is_one = not isinstance(refined, Circle) or 0 < refined.radius < largest
+        if is_one and _Edges.of(touching).met(refined).all() and not _crossed(refined, paths, edges):
+            surface = refined
+        turns = int(mine.sum())
+        found.append(Seen(surface, float(np.median(edges.slack[mine])), turns, turns / len(seen)))
         left &= ~mine
-    return found if (~left).sum() >= MOST_OF_THEM * len(seen) else []
 
 
 @dataclass(frozen=True)
@@ -154,22 +164,36 @@ class Placed:
     ----------
     effect
         The wall or disc.
-    start
-        Where its place (and size) are, by the names of its parameters.
-    near
-        The same as beliefs, as wide as it may be off.
-    wall
-        It as a stated wall; None for a disc, which nobody can state.
+    seen
+        Where, and by how many turns.
     """
 
     effect: Wall | HiddenObstacle
-    start: Mapping[str, float]
-    near: Mapping[str, Parameter]
-    wall: SceneWall | None
+    seen: Seen
+
+    @property
+    def wall(self) -> SceneWall | None:
+        """It as a stated wall; None for a disc, which nobody can state."""
+        return self.seen.surface.wall if isinstance(self.seen.surface, Line) else None
+
+    @property
+    def start(self) -> dict[str, float]:
+        """Where its place (and size) are, by the names of its parameters; no surface tells of its restitution."""
+        values = self.seen.surface.values
+        return {one.name: value for one, value in zip(self.effect.parameters[:-1], values, strict=True)}
+
+    @property
+    def near(self) -> dict[str, Parameter]:
+        """The same of a disc as beliefs, with which a search begins."""
+        spread = (self.seen.slack, self.seen.slack, SIZE_SD)
+        numbers = zip(self.effect.parameters[:-1], self.seen.surface.values, spread, strict=True)
+        return {one.name: _around(one, value, sd) for one, value, sd in numbers}
 
 
 def placed_surfaces(videos: Sequence[Tracks], catalogue: Sequence[Effect]) -> list[Placed]:
     """Walls and discs of a catalogue that stand where tracks show them.
+
+    None where a good part of the turns has no part in any of them: then it is something else that turns bodies.
 
     Parameters
     ----------
@@ -178,23 +202,34 @@ def placed_surfaces(videos: Sequence[Tracks], catalogue: Sequence[Effect]) -> li
     catalogue
         Causes that are looked for; of further walls and discs than it holds nothing is said.
     """
-    walls = [effect for effect in catalogue if isinstance(effect, Wall)]
-    discs = [effect for effect in catalogue if isinstance(effect, HiddenObstacle)]
-    found = []
-    for surface, spread in seen_surfaces(videos) if walls or discs else []:
-        effect: Wall | HiddenObstacle
-        if isinstance(surface, Line) and walls:
-            effect = walls.pop(0)
-        elif isinstance(surface, Circle) and discs:
-            effect = discs.pop(0)
-        else:
-            continue
-        # The last parameter is its restitution, of which no surface tells.
-        numbers = list(zip(effect.parameters[:-1], surface.values, spread, strict=True))
-        start = {one.name: value for one, value, _ in numbers}
-        near = {one.name: _around(one, value, sd) for one, value, sd in numbers}
-        found.append(Placed(effect, start, near, surface.wall if isinstance(surface, Line) else None))
-    return found
+    further = [effect for effect in catalogue if isinstance(effect, Wall | HiddenObstacle)]
+    found: list[Placed] = []
+    for seen in seen_surfaces(videos) if further else []:
+        kind = Wall if isinstance(seen.surface, Line) else HiddenObstacle
+        there = {None, *(one.effect.name for one in found)}
+        effect = next((one for one in further if isinstance(one, kind) and one.follows in there), None)
+        if effect is not None:
+            further.remove(effect)
+            found.append(Placed(effect, seen))
+    return found if sum(one.seen.share for one in found) >= MOST_OF_THEM else []
+
+
+def as_stated(tracks: Tracks, walls: Sequence[Placed]) -> Tracks:
+    """Tracks that state walls, and of positions how far off the walls may be beside the noise.
+
+    Raises
+    ------
+    InputError
+        If a wall overlaps a body where that is first seen.
+    """
+    rough = np.nan_to_num(noise_scale(tracks)) ** 2 * np.eye(2)
+    stated = np.nan if tracks.position_covariance is None else tracks.position_covariance
+    unsure = float(np.mean([one.seen.slack for one in walls])) / NOISES
+    covariance = np.where(np.isfinite(stated), stated, np.broadcast_to(rough, (*tracks.positions.shape, 2)))
+    covariance = covariance + unsure**2 * np.eye(2)
+    axes = ("time", "body", "axis", "axis_other")
+    data = tracks.data.assign(position_covariance=(axes, covariance, {"units": "m^2"}))
+    return replace(tracks, walls=(*tracks.walls, *(one.wall for one in walls if one.wall is not None)), data=data)
 
 
 def _around(parameter: Parameter, value: float, sd: float) -> Parameter:
@@ -239,7 +274,7 @@ class _Edges:
 
     def met(self, surface: Surface) -> Bool[np.ndarray, "turn"]:
         """Which turns are at a surface, and away from it."""
-        directions, far = surface.towards(self.place)
+        directions, far = surface.towards(self.place, self.into)
         turned = np.arccos(np.clip((directions * self.into).sum(axis=1), -1.0, 1.0))
         near: np.ndarray = (far > self.least - self.slack) & (far < self.most + self.slack)
         return near & (turned < self.leaning)
@@ -268,7 +303,8 @@ def _lines(seen: Sequence[Turn]) -> Iterator[Line]:
         across, turn = math.atan2(apart[1], apart[0]), math.acos(higher / far)
         directions = [across + turn, across - turn]
         direction = max(directions, key=lambda at: one.into @ np.array([math.cos(at), math.sin(at)]))
-        yield Line(float(one.place @ Line(0.0, direction).normal) + one.least, direction)
+        normal = Line(0.0, direction).normal
+        yield Line(float(one.place @ normal) + one.least, math.remainder(direction, math.tau))
 
 
 def _circles(seen: Sequence[Turn], largest: float) -> Iterator[Circle]:
@@ -286,5 +322,7 @@ def _refined(surface: Surface, touching: Sequence[Turn]) -> Surface:
     edges = _Edges.of(touching)
     middle, noise = (edges.least + edges.most) / 2, edges.slack + (edges.most - edges.least) / 2
     kind = type(surface)
-    found = least_squares(lambda values: (kind(*values).towards(edges.place)[1] - middle) / noise, surface.values).x
-    return kind(*found.tolist())
+    found = least_squares(
+        lambda values: (kind(*values).towards(edges.place, edges.into)[1] - middle) / noise, surface.values
+    ).x.tolist()
+    return Line(found[0], math.remainder(found[1], math.tau)) if kind is Line else kind(*found)

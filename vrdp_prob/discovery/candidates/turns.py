@@ -22,6 +22,8 @@ CLEAR = 1.5
 """Frames between two events and what is fitted to the motion between them."""
 GRAZING = 0.1
 """Share of the speed below which a velocity along which a body turned tells no surface: bodies sway, rails guide."""
+FITTING = 3.0
+"""Mean square that a turn may leave, in that of the noise: what bends faster than its pieces can follow is none."""
 REACHED = 1.2
 """Distance from a stated wall, in that of the body's centre from its edge, within which the body has met the wall."""
 
@@ -62,6 +64,8 @@ def _of_video(video: Tracks) -> list[tuple[float, Turn]]:
     """Sudden turns of one video, and how many standard deviations each of them is."""
     clues = Clues.of(video)
     tracks, turned = clues.clean, []
+    if len(tracks.bodies) > 1 and any(body.radius is None for body in tracks.bodies):
+        return []  # nothing says where these meet each other
     for index, body in enumerate(tracks.bodies):
         least = body.radius or 0.0
         most = least * body.shape.reach
@@ -78,29 +82,37 @@ def _of_video(video: Tracks) -> list[tuple[float, Turn]]:
 
 
 def _kinks(clues: Clues, body: int) -> list[Kink]:
-    """Sudden changes of the velocity of a body where no other one is near, each beside those that are plainer."""
+    """Sudden changes of the velocity of a body where no other one is near, each beside all others."""
     tracks, noise = clues.clean, clues.noise
     step = float(np.median(np.diff(tracks.times)))
     meetings = [one.time for one in clues.approaches if body in (one.first, one.second)]
     alone = [at for at in tracks.times.tolist() if all(abs(at - time) > AROUND * step for time in meetings)]
-    events, found = list(meetings), []
+    turns: list[float] = []
 
-    def fitted(at: float, around: float) -> Kink | None:
+    def fitted(at: float, around: float, events: Sequence[float]) -> Kink | None:
         """The kink at a time, by the motion between the events before and after another time."""
         start = max((time + CLEAR * step for time in events if time < around), default=-np.inf)
         stop = min((time - CLEAR * step for time in events if time >= around), default=np.inf)
         return kink(tracks, body, at, noise, start=start, stop=stop)
 
-    kinks = {at: fitted(at, at) for at in alone}
+    def best(around: float, events: Sequence[float]) -> tuple[float, Kink]:
+        """The kink about a time that fits best, and when it is."""
+        moved = [(at, one) for at in around + step * SHIFTS if (one := fitted(at, around, events)) is not None]
+        return min(moved, key=lambda pair: pair[1].misfit)
+
+    kinks = {at: fitted(at, at, meetings) for at in alone}
     while plain := [(at, one) for at, one in kinks.items() if one is not None and _is_plain(one)]:
         around = max(plain, key=lambda pair: float(np.linalg.norm(pair[1].jump)) / pair[1].jump_sd)[0]
-        moved = [(at, one) for at in around + step * SHIFTS if (one := fitted(at, around)) is not None]
-        event, best = min(moved, key=lambda pair: pair[1].misfit)
-        events.append(event)
-        kinks |= {at: fitted(at, at) for at in alone if abs(at - event) < SPAN + CLEAR * step}
-        if _is_plain(best):
-            found.append(best)
-    return found
+        event, _ = best(around, [*meetings, *turns])
+        turns.append(event)
+        near = [at for at in alone if abs(at - event) < SPAN + CLEAR * step]
+        kinks |= {at: fitted(at, at, [*meetings, *turns]) for at in near}
+    found = []
+    for event in turns:
+        others = [*meetings, *(one for one in turns if one != event)]
+        if fitted(event, event, others) is not None:
+            found.append(best(event, others)[1])
+    return [one for one in found if _is_plain(one) and one.misfit < FITTING * noise**2 * 2 * one.count]
 
 
 def _is_plain(found: Kink) -> bool:

@@ -10,12 +10,12 @@ from jaxtyping import Float
 from vrdp_prob.discovery.candidates.proposals import hidden_things
 from vrdp_prob.discovery.candidates.scores import CauseScore, happens_once, score_causes
 from vrdp_prob.discovery.candidates.single_videos import causes_of_lost_videos, lost_videos
-from vrdp_prob.discovery.candidates.surfaces import placed_surfaces
+from vrdp_prob.discovery.candidates.surfaces import Placed, as_stated, placed_surfaces
 from vrdp_prob.discovery.checks.battery import run_checks
 from vrdp_prob.discovery.finding import Check
 from vrdp_prob.discovery.residuals.overdispersion import overdispersion
 from vrdp_prob.discovery.selection.doubts import causes_with_own_check_failing
-from vrdp_prob.discovery.selection.trials import FIRST, Trial, gain
+from vrdp_prob.discovery.selection.trials import FIRST, Trial, gain, weights
 from vrdp_prob.errors import InputError
 from vrdp_prob.inference.runs.parallel import in_processes
 from vrdp_prob.inference.several_videos.ascent import ImpossibleStartError
@@ -37,6 +37,10 @@ TRIFLE = 0.05
 """Share of any statistic, also of what happens once in a video, below which nothing is refitted."""
 MOST_REFITTED = 5
 """Causes that are refitted, at most."""
+ESTABLISHED = 0.8
+"""Probability that a cause must have beside the model without it."""
+PLAIN_TURNS = 4
+"""Turns from which walls and discs that explain them need no comparison with what else may have been there."""
 SHORT, MENDINGS = 0.5, 3
 """Share of what was promised or brought by another that a cause must bring, and number of refits searched anew."""
 
@@ -111,9 +115,12 @@ class Refits:
     def of(self, trial: Trial) -> list[Trial]:
         """Refits of a model, the best first."""
         if trial not in self._made:
-            met = self._met(trial)
-            enough = met is not None and met.brought(trial) > self.needed
-            self._keep(trial, [met] if met is not None and enough else self._new(trial))
+            placed = self._placed(trial)
+            met = self._met(trial, placed) if placed else None
+            found = [] if met is None else [met]
+            plain = sum(one.seen.turns for one in placed) >= PLAIN_TURNS
+            alone = plain and met is not None and not self.doubted(met, trial, self.left(met).overdispersion)
+            self._keep(trial, found if alone else [*found, *self._new(trial)])
         return self._made[trial]
 
     def made(self, trial: Trial) -> list[Trial]:
@@ -240,19 +247,33 @@ class Refits:
 
         return self._began_anew(trial, [effect], fitted)
 
-    def _met(self, trial: Trial) -> Trial | None:
-        """The fit from the beginning with the walls and discs that the tracks themselves show, all of them at once.
+    def doubted(self, trial: Trial, lesser: Trial, divisor: Float[np.ndarray, "video"]) -> bool:
+        """Whether a cause brings too little, or brings it in too few of the videos that could have been drawn."""
+        if gain(trial, lesser, divisor)[0] < self.needed:
+            return True
+        shares = weights([trial, lesser], [0.0, self.needed], np.random.default_rng(self.seed), overdispersion=divisor)
+        return bool(shares[0] < ESTABLISHED)
+
+    def _placed(self, trial: Trial) -> list[Placed]:
+        """Walls and discs that the tracks show, before any cause was found, where nothing unseen is in the model."""
+        if trial.causes or any(effect.overrides("obstacles") for effect in trial.fit.model.effects):
+            return []
+        return placed_surfaces([part.clues.tracks for part in trial.fit.fits], self.catalogue)
+
+    def _met(self, trial: Trial, placed: Sequence[Placed]) -> Trial | None:
+        """The fit from the beginning with walls and discs that tracks show, all of them at once.
 
         A fit without them has lost its way at the first that a body met, so that scores call for what mends its course.
-        Walls count as stated until a fit is found: twelve numbers more for four of them make every search longer, and
-        some lose their way. None where tracks show nothing of the kind, or something unseen stands in the model's way
-        already.
+        Walls count as stated until a fit is found, and positions are less certain by how far off these may be: twelve
+        numbers more for four walls make every search longer, and walls that are a little off explain no track. None
+        where videos have no world in common, or a wall overlaps what is seen.
         """
-        if trial.choices or any(effect.overrides("obstacles") for effect in trial.fit.model.effects):
-            return None
         tracks = [part.clues.tracks for part in trial.fit.fits]
-        placed = placed_surfaces(tracks, self.catalogue)
-        walls = [one.wall for one in placed if one.wall is not None]
+        walls = [one for one in placed if one.wall is not None]
+        try:
+            stated = [as_stated(one, walls) for one in tracks] if walls else tracks
+        except InputError:
+            return None
 
         def fitted() -> SharedFit:
             first = model = trial.fit.model
@@ -261,22 +282,20 @@ class Refits:
                 if one.wall is None:
                     first = first.with_effect(one.effect, tracks)
                     first = replace(first, beliefs={**first.beliefs, **one.near})
-            stated = [replace(one, walls=(*one.walls, *walls)) for one in tracks]
             fit = fit_together(stated, model=first, shared=trial.fit.shared, seed=self.seed, model_error=False)
             told = with_learned_walls(fit, stated[0]).walls[len(tracks[0].walls) :]
             start = {name: value for one in placed for name, value in one.start.items()}
-            for effect, wall in zip((one.effect for one in placed if one.wall is not None), told, strict=True):
-                start |= {} if wall.restitution is None else {effect.parameters[-1].name: wall.restitution}
+            for one, wall in zip(walls, told, strict=True):
+                start |= {} if wall.restitution is None else {one.effect.parameters[-1].name: wall.restitution}
             return fit.of_tracks(tracks).under(model, start=start, effort=FIRST, model_error=False)
 
-        return self._began_anew(trial, [one.effect for one in placed], fitted) if placed else None
+        return self._began_anew(trial, [one.effect for one in placed], fitted)
 
     def _began_anew(self, trial: Trial, causes: Sequence[Effect], fitted: Callable[[], SharedFit]) -> Trial | None:
         """A trial with further causes by a fit from the beginning; None where videos have no world in common."""
         try:
             return trial.and_causes(causes, fitted())
-        except (ImpossibleStartError, InputError):
-            # What single videos say of the causes fits no world of all of them, or a wall overlaps what is seen.
+        except ImpossibleStartError:  # what single videos say of the causes fits no world of all of them
             return None
         finally:
             self.advance(1)

@@ -9,7 +9,7 @@ from jaxtyping import Float
 
 from vrdp_prob.discovery.candidates.scores import happens_once
 from vrdp_prob.discovery.selection.refits import HOPEFUL, Left, Refits, lasting, merit
-from vrdp_prob.discovery.selection.trials import Trial, gain, weights, with_own_population
+from vrdp_prob.discovery.selection.trials import Trial, gain, with_own_population
 from vrdp_prob.inference.runs.parallel import in_processes
 from vrdp_prob.inference.several_videos.fitting import SharedFit
 from vrdp_prob.inference.several_videos.second_look import doubtful
@@ -22,8 +22,6 @@ MOST_CAUSES = 5
 MOST_SWAPS = 3
 PLAIN = 50.0
 """Gain of a cause, in those that are needed, from which it is not put in doubt again."""
-ESTABLISHED = 0.8
-"""Probability that a cause must have beside the model without it."""
 FALSE_ALARM = 0.05
 """Prior odds that the model lacks something; all causes of the catalogue share them alike."""
 
@@ -97,10 +95,7 @@ class Search:
             return self
         if len(causes) == len(self.best.causes):
             return self._with_best(self.base)
-        best = self.best
-        for cause in causes:
-            best = best.without(cause)
-        return self._with_best(best.continued())
+        return self._with_best(self.best.without(*causes).continued())
 
     def with_rival(self, cause: Effect, believable: Callable[[Trial], bool]) -> "Search | None":
         """The search with another cause in the place of one of the best model; None where none explains as much.
@@ -231,9 +226,7 @@ class _Searcher:
         """
         winner = next((one for one in step.tried[:1] if gain(one, trial)[0] >= self.needed), None)
         if winner is not None:
-            without = winner
-            for cause in winner.causes:
-                without = without if cause in trial.causes else without.without(cause)
+            without = winner.without(*winner.beyond(trial))
             if gain(without, trial)[0] > self.needed:
                 trial = without
             if happens_once(winner.causes[-1]):
@@ -262,10 +255,7 @@ class _Searcher:
 
     def doubted(self, trial: Trial, lesser: Trial, divisor: Float[np.ndarray, "video"]) -> bool:
         """Whether a cause brings too little, or brings it in too few of the videos that could have been drawn."""
-        if gain(trial, lesser, divisor)[0] < self.needed:
-            return True
-        shares = weights([trial, lesser], [0.0, self.needed], np.random.default_rng(self.seed), overdispersion=divisor)
-        return bool(shares[0] < ESTABLISHED)
+        return self.refits.doubted(trial, lesser, divisor)
 
     def compared(
         self, chain: Sequence[Trial], steps: Sequence[Step]
@@ -353,7 +343,7 @@ def _tried_at(cause: Effect, chain: Sequence[Trial], steps: Sequence[Step]) -> t
     """The model and the step at which a cause was tried first; a wall or a disc that kicks led to, where these were."""
     for name in (cause.name, ExternalImpulse.name):
         for base, step in zip(chain, steps, strict=True):
-            if any(trial.causes[-1].name == name for trial in step.tried):
+            if any(one.name == name for trial in step.tried for one in trial.beyond(base)):
                 return base, step
     return chain[0], steps[0]
 

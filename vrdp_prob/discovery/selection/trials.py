@@ -116,6 +116,10 @@ class Trial:
         """Names of the causes."""
         return tuple(cause.name for cause in self.causes)
 
+    def beyond(self, base: "Trial") -> tuple[Effect, ...]:
+        """The causes that it has beyond those of another model."""
+        return tuple(cause for cause in self.causes if cause not in base.causes)
+
     def with_cause(self, score: CauseScore) -> "Trial | None":
         """The fit with one more cause, from what its score says of it; None where no world can begin there."""
         try:
@@ -249,17 +253,20 @@ class Trial:
         fit = self.fit.with_other_courses(seed=seed)
         return self if fit is self.fit else replace(self, fit=fit)
 
-    def without(self, cause: Effect) -> "Trial":
-        """The fit without one of its causes."""
-        left = self._with_stated_population(self.fit.model.without_effect(cause))
-        choices = {name: one for name, one in self.choices.items() if name != cause.name}
-        fit = self.fit.under(left, held=self._held_without(cause), effort=FIRST, model_error=False)
-        causes = tuple(one for one in self.causes if one.name != cause.name)
-        return replace(self, causes=causes, fit=with_own_population(fit), choices=choices)
+    def without(self, *causes: Effect) -> "Trial":
+        """The fit without some of its causes."""
+        model, gone = self.fit.model, {cause.name for cause in causes}
+        for cause in causes:
+            model = model.without_effect(cause)
+        left = self._with_stated_population(model)
+        choices = {name: one for name, one in self.choices.items() if name not in gone}
+        fit = self.fit.under(left, held=self._held_without(*causes), effort=FIRST, model_error=False)
+        kept = tuple(one for one in self.causes if one.name not in gone)
+        return replace(self, causes=kept, fit=with_own_population(fit), choices=choices)
 
-    def _held_without(self, cause: Effect) -> list[dict[Owned, float | None]]:
-        """Numbers of each video that are held, but those of a cause."""
-        gone = {parameter.name for parameter in cause.parameters}
+    def _held_without(self, *causes: Effect) -> list[dict[Owned, float | None]]:
+        """Numbers of each video that are held, but those of some causes."""
+        gone = {parameter.name for cause in causes for parameter in cause.parameters}
         return [{key: one.held[key] for key in one.held if key[0] not in gone} for one in self.fit.structures]
 
     def _with_stated_population(self, model: PhysicsModel) -> PhysicsModel:

@@ -5,7 +5,8 @@ from collections.abc import Collection
 import numpy as np
 
 from vrdp_prob.discovery.finding import TriedCause
-from vrdp_prob.discovery.selection.search import ESTABLISHED, Search
+from vrdp_prob.discovery.selection.refits import ESTABLISHED
+from vrdp_prob.discovery.selection.search import Search
 from vrdp_prob.discovery.selection.trials import Trial, gain, weights
 
 
@@ -23,7 +24,7 @@ def tried_causes(found: Search, told: Collection[str], *, seed: int) -> list[Tri
     """
     best_of: dict[str, Trial] = {}
     for trial in found.refits.made(found.best):
-        cause = trial.causes[-1]
+        cause = trial.beyond(found.best)[0]
         if cause.name not in told:
             best_of.setdefault(cause.name if cause.follows else cause.cause_name(), trial)
     return sorted((_tried(found, trial, seed) for trial in best_of.values()), key=lambda one: -one.gain)
@@ -34,7 +35,7 @@ def _tried(found: Search, trial: Trial, seed: int) -> TriedCause:
     generator = np.random.default_rng(seed)
     shares = weights([trial, found.best], [0.0, found.needed], generator, overdispersion=found.overdispersion)
     probability = float(np.clip(shares[0], 0.0, 1.0))
-    cause = trial.causes[-1]
+    cause = trial.beyond(found.best)[0]
     if trial.patches(cause):
         why = "it mends videos and explains none of them"
     elif difference < found.needed:

@@ -204,7 +204,7 @@ def _judge(tracks: Tracks, first: int, second: int, time: float, noise: float) -
 class Kink:
     """Two quadratic pieces that join at one place: position (m), velocity before, velocity jump (m/s) and its sd.
 
-    `misfit` is the sum of the squares in m^2 that both leave.
+    `misfit` is the sum of the squares in m^2 that both leave of `count` positions.
     """
 
     position: Float[np.ndarray, "2"]
@@ -212,6 +212,7 @@ class Kink:
     jump: Float[np.ndarray, "2"]
     jump_sd: float
     misfit: float
+    count: int
 
 
 def _best_kinks(
@@ -263,7 +264,9 @@ def kink(
     misfit = float(
         ((seen - design @ coefficients) ** 2).sum() + np.einsum("ik,ij,jk->", coefficients, prior, coefficients)
     )
-    return Kink(coefficients[0], coefficients[1], coefficients[2], noise * float(np.sqrt(covariance[2, 2])), misfit)
+    return Kink(
+        coefficients[0], coefficients[1], coefficients[2], noise * float(np.sqrt(covariance[2, 2])), misfit, len(seen)
+    )
 
 
 def _interpolated(tracks: Tracks, body: int) -> Float[np.ndarray, "time 2"]:

@@ -37,6 +37,7 @@ def test_a_kick_that_comes_with_a_contact_is_no_cause() -> None:
     assert kicked(fit, video, body, kick).patches(ExternalImpulse())
 
 
+@pytest.mark.slow
 def test_a_kick_in_free_flight_is_a_cause() -> None:
     data, fit = fitted("external_impulse", seed=1)
     (video,) = (k for k, one in enumerate(data.truth.videos) if np.isfinite(one.laws.kick_time))

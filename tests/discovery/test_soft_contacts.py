@@ -78,6 +78,7 @@ def _score(chi_square: float, *, sign: float = 1.0) -> Score:
     return Score(np.array([sign * np.sqrt(chi_square)]), np.eye(1))
 
 
+@pytest.mark.slow
 def test_contacts_of_wrong_radii_do_not_last() -> None:
     found = checked(SHORT, growth=1.08)
     assert found[DISTANCE].significant

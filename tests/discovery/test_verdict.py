@@ -88,6 +88,7 @@ def test_what_was_tried_is_told_with_what_it_would_have_needed(
         trial.causes = (Mock(),)
         trial.causes[0].name = trial.causes[0].cause_name.return_value = name
         trial.causes[0].way.return_value = None
+        trial.beyond.return_value = trial.causes
         trial.patches.return_value = patches
     found.refits, found.needed, found.overdispersion = Mock(made=lambda _trial: trials), 6.0, np.ones(3)
     monkeypatch.setattr(tried, "gain", lambda *_given: gain)

@@ -12,6 +12,7 @@ from vrdp_prob.discovery.finding import Check, Verdict
 from vrdp_prob.discovery.selection import tried
 from vrdp_prob.discovery.selection.search import Search
 from vrdp_prob.discovery.selection.trials import Trial
+from vrdp_prob.models.effects.effect import Effect
 
 
 def _checks(failing: int, p_value: float = 1e-9) -> list[Check]:
@@ -85,7 +86,7 @@ def test_what_was_tried_is_told_with_what_it_would_have_needed(
     found = _search(())
     trials = [create_autospec(Trial, instance=True) for _ in range(3)]
     for trial, name in zip(trials, ("drag", "drag", "named before"), strict=True):
-        trial.causes = (Mock(),)
+        trial.causes = (Mock(spec=Effect),)
         trial.causes[0].name = trial.causes[0].cause_name.return_value = name
         trial.causes[0].way.return_value = None
         trial.beyond.return_value = trial.causes

@@ -8,6 +8,7 @@ from vrdp_prob.discovery.finding import TriedCause
 from vrdp_prob.discovery.selection.refits import ESTABLISHED
 from vrdp_prob.discovery.selection.search import Search
 from vrdp_prob.discovery.selection.trials import Trial, gain, weights
+from vrdp_prob.models.effects.effect import Effect
 
 
 def tried_causes(found: Search, told: Collection[str], *, seed: int) -> list[TriedCause]:
@@ -24,10 +25,15 @@ def tried_causes(found: Search, told: Collection[str], *, seed: int) -> list[Tri
     """
     best_of: dict[str, Trial] = {}
     for trial in found.refits.made(found.best):
-        cause = trial.beyond(found.best)[0]
+        cause = _further(trial, found)
         if cause.name not in told:
             best_of.setdefault(cause.name if cause.follows else cause.cause_name(), trial)
     return sorted((_tried(found, trial, seed) for trial in best_of.values()), key=lambda one: -one.gain)
+
+
+def _further(trial: Trial, found: Search) -> Effect:
+    """The first cause that a model has beyond the best one."""
+    return next(iter(trial.beyond(found.best)), trial.causes[-1])
 
 
 def _tried(found: Search, trial: Trial, seed: int) -> TriedCause:
@@ -35,7 +41,7 @@ def _tried(found: Search, trial: Trial, seed: int) -> TriedCause:
     generator = np.random.default_rng(seed)
     shares = weights([trial, found.best], [0.0, found.needed], generator, overdispersion=found.overdispersion)
     probability = float(np.clip(shares[0], 0.0, 1.0))
-    cause = trial.beyond(found.best)[0]
+    cause = _further(trial, found)
     if trial.patches(cause):
         why = "it mends videos and explains none of them"
     elif difference < found.needed:

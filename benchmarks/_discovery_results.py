@@ -8,14 +8,14 @@ from _discovery_tasks import SIZES, Kind
 from _resumable import Result
 from scipy.stats import binomtest
 
-from tests.discovery.causes import CATALOGUE, VARIANTS
 from vrdp_prob.discovery.selection.search import gain_needed
+from vrdp_prob.models.model_file import known_effects
 
 SURE, LIKELY = 0.9, 0.5
 REACHED = 0.95
 """Share of an effect size from which it counts as reached: the search for a strength is no finer."""
 NULLS = (Kind.NULL, Kind.ROUGH_NULL, Kind.GLIDING_NULL)
-NEEDED = gain_needed(len(CATALOGUE) + len(VARIANTS))
+NEEDED = gain_needed(sum(effect().follows is None for effect in known_effects().values()))
 """Gain (nats) without which the search names nothing, when it looks for all causes."""
 CERTAIN = 0.95
 """Probability of the intervals of parameters."""

@@ -164,6 +164,18 @@ def wall(videos: Videos, strength: float, generator: np.random.Generator) -> Vid
     return tuple(replace(v, hidden_walls=(*v.hidden_walls, *walls)) for v in videos)
 
 
+def obstacle_met_often(videos: Videos, strength: float, generator: np.random.Generator) -> Videos:
+    """Strength: radius in m of a disc where many bodies pass."""
+    disc = places.in_many_ways(videos, strength, generator)
+    return tuple(replace(v, hidden_discs=(*v.hidden_discs, disc)) for v in videos)
+
+
+def wall_met_often(videos: Videos, strength: float, generator: np.random.Generator) -> Videos:
+    """Strength: how far in m a wall cuts off the region that bodies would reach, where many of them go."""
+    walls = places.cutting_many(videos, strength, generator)
+    return tuple(replace(v, hidden_walls=(*v.hidden_walls, *walls)) for v in videos)
+
+
 def external_impulse(videos: Videos, strength: float, generator: np.random.Generator) -> Videos:
     """Strength: change of the velocity of one moving body of one video, once."""
     number, body, time = places.moving_moment(videos, generator)
@@ -228,5 +240,9 @@ CATALOGUE: dict[str, Cause] = {
 
 VARIANTS: dict[str, Cause] = {
     "irregular_frames": Cause("clock_error", irregular_frames, "s", 0.018),
+    "obstacle_met_often": Cause(
+        "hidden_obstacle", obstacle_met_often, "m", places.LARGEST_DISC, least=0.2, placed=True
+    ),
+    "wall_met_often": Cause("wall", wall_met_often, "m", 1.0, least=0.3, placed=True),
 }
 """Other ways in which a cause of the catalogue shows; the name to find is the cause's."""

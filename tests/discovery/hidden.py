@@ -14,6 +14,10 @@ from vrdp_prob.scene import Shape, Wall
 
 SPINNING = ("magnus_curl", "contact_friction")
 """Causes that act by the spin, which is seen only where angles are measured."""
+MET_OFTEN = ("obstacle_met_often", "wall_met_often")
+"""Hidden things that many bodies shall meet, so that these must come about."""
+GLIDING = 0.2
+"""Share of the usual friction and drag of a table on which bodies come about."""
 WHICH = ("", "second_", "third_", "fourth_")
 """How names of parameters tell several walls apart."""
 ROUGH = Measurement(outliers=0.05, dropout=0.1)
@@ -39,8 +43,8 @@ def hide(
     effect_size
         What each leaves after a refit, in units of the noise.
     setting, measurement
-        What kind of videos. Bodies have no friction or restitution of their own where that would hide a cause, and
-        angles are measured where a cause acts by the spin.
+        What kind of videos. Bodies have no friction or restitution of their own where that would hide a cause, tables
+        brake less where bodies shall come about, and angles are measured where a cause acts by the spin.
     """
     setting, measurement = setting or Setting(), measurement or Measurement()
     if set(ways) & set(ORDERS_FRICTION):
@@ -49,6 +53,8 @@ def hide(
         setting = replace(setting, restitution_spread=0.0)
     if set(ways) & set(SPINNING):
         measurement = replace(measurement, angles=True)
+    if set(ways) & set(MET_OFTEN):
+        setting = replace(setting, resistance=GLIDING * setting.resistance)
     wanted = [Wanted(way, effect_size=effect_size) for way in ways]
     return draw(wanted, seed=seed, setting=setting, measurement=measurement)
 
@@ -83,7 +89,7 @@ def true_values(truth: Truth, found: Mapping[str, float]) -> dict[str, float]:
                     f"impulse_x[{body} in {name}]": laws.kick_x,
                     f"impulse_y[{body} in {name}]": laws.kick_y,
                 }
-        elif cause.way == "wall":
+        elif cause.name == "wall":
             for which in WHICH:
                 if f"{which}hidden_wall_distance" in found:
                     values |= _nearest_wall(truth.videos[0].hidden_walls, found, which)
@@ -150,6 +156,7 @@ _OF_THE_TABLE: Mapping[str, Callable[[Video], dict[str, float]]] = {
         restitution_exponent="restitution_power", restitution_speed="restitution_speed"
     ),
     "hidden_obstacle": _disc,
+    "obstacle_met_often": _disc,
     "lens_distortion": _lens,
     "contact_radius_error": lambda video: {"radius_error": video.touching - 1},
 }

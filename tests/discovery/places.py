@@ -1,5 +1,7 @@
 """Where hidden things are put, so that some body meets them: read off the motion without them."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from tests.discovery.videos import Disc, Video
@@ -11,6 +13,10 @@ ROOM = 0.05
 """Distance in m that hidden things keep from where bodies are released."""
 LONG = 20.0
 """Half length of a hidden wall in m."""
+LARGEST_DISC = 0.3
+"""Radius in m of the largest disc that is put where bodies meet it often."""
+TRIED = 200
+"""Places and directions that are tried for what bodies shall meet often."""
 
 
 def moving_moment(videos: tuple[Video, ...], generator: np.random.Generator) -> tuple[int, int, float]:
@@ -81,6 +87,37 @@ def cutting_off(videos: tuple[Video, ...], depth: float, generator: np.random.Ge
     return tuple(walls)
 
 
+def in_many_ways(videos: tuple[Video, ...], radius: float, generator: np.random.Generator) -> Disc:
+    """A disc at the place, of those that are tried, that most bodies pass within the largest one's reach.
+
+    Raises
+    ------
+    ValueError
+        If no such place is found.
+    """
+    tried = [np.array(on_a_way(videos, generator)) for _ in range(TRIED)]
+    largest = [_disc(middle, LARGEST_DISC) for middle in tried]
+    free = [disc for disc in largest if all(_clear(video, disc) for video in videos)]
+    if not free:
+        raise ValueError("no place for a hidden disc was found; draw other videos.")
+    return replace(max(free, key=lambda disc: sum(_meeting(video, disc) for video in videos)), radius=radius)
+
+
+def cutting_many(videos: tuple[Video, ...], depth: float, generator: np.random.Generator) -> tuple[Wall, ...]:
+    """One wall that cuts `depth` m off what bodies reach, of the directions that are tried in that of most of them."""
+
+    def cut(angle: float) -> tuple[float, int]:
+        """Distance of the wall in a direction, and how many bodies would be seen beyond it."""
+        reach, room, _ = _room(videos, angle)
+        distance, ahead = reach - min(depth, room), np.array([np.cos(angle), np.sin(angle)])
+        beyond = [video.in_view & (video.motion.states[..., :2] @ ahead + video.radius > distance) for video in videos]
+        return distance, sum(int(one.any(axis=0).sum()) for one in beyond)
+
+    angles = generator.uniform(0, 2 * np.pi, TRIED).tolist()
+    best = max(angles, key=lambda angle: cut(angle)[1])
+    return (_wall(best, cut(best)[0]),)
+
+
 def _room(videos: tuple[Video, ...], angle: float) -> tuple[float, float, float]:
     """How far bodies reach in a direction, how much of it no body needs at its release, and that less what is unseen.
 
@@ -113,3 +150,9 @@ def _passing(video: Video, disc: Disc) -> int:
     """How often a body is seen where the disc would be."""
     apart = np.linalg.norm(video.motion.states[..., :2] - (disc.x, disc.y), axis=-1)
     return int((apart < disc.radius + video.radius - 1e-6).sum())
+
+
+def _meeting(video: Video, disc: Disc) -> int:
+    """How many bodies are seen where the disc would be."""
+    apart = np.linalg.norm(video.motion.states[..., :2] - (disc.x, disc.y), axis=-1)
+    return int((video.in_view & (apart < disc.radius + video.radius)).any(axis=0).sum())

@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares
 
+from tests.discovery.causes import CATALOGUE
 from tests.discovery.data_set import DataSet, Wanted, Yardstick, draw
+from tests.discovery.hidden import GLIDING, MET_OFTEN
 from tests.discovery.laws import GRAVITY, Laws
 from tests.discovery.measurement import Measurement
 from tests.discovery.other_effects import ALL
@@ -141,6 +143,16 @@ def test_what_is_put_where_bodies_go_is_met_though_another_cause_stops_them_earl
     causes = draw(wanted, seed=1, setting=Setting(videos=6, bodies=3)).truth.causes
     assert [one.way for one in causes] == [place, "linear_drag"]
     assert all(one.trace > 1 for one in causes)
+
+
+@pytest.mark.parametrize("way", MET_OFTEN)
+def test_hidden_things_that_are_to_be_met_often_are_met_more_than_once(way: str) -> None:
+    cause, plain = ALL[way], draw_videos(Setting(videos=6, bodies=3, resistance=GLIDING), np.random.default_rng(2))
+    videos = cause.hide(plain, cause.most, np.random.default_rng(3))
+    met = [int((video.motion.pairs >= len(video.shapes)).any(axis=1).sum()) for video in videos]
+    assert sum(met) >= 3
+    assert sum(count > 0 for count in met) >= 2
+    assert cause.name in CATALOGUE
 
 
 def test_a_cause_that_no_body_feels_leaves_no_trace() -> None:

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import torch
+from _finding_figures import keep_figures
 from jaxtyping import Float
 
 from vrdp_prob.discovery.discover import discover
@@ -47,6 +48,7 @@ def learned_extension(training: Sequence[Tracks], folder: Path) -> Learned:
     def found() -> SharedFit:
         finding = discover(training, seed=0, progress=progress_display(quiet=False), checkpoint=folder / "steps")
         write_finding(finding, folder)
+        keep_figures(finding, folder)
         assert finding.fit is not None
         return finding.fit
 

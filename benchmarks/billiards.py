@@ -8,7 +8,7 @@ are seen, frames 20 to 39 are predicted, and questions ask what happens there. P
 as in the paper, probabilities those of the posterior. Constant velocity is what a person without a simulator would
 say. The finding, the learned models and each test video's errors are kept in `--results` as
 they come, so that a run that was interrupted goes on; delete that folder after a change of the code. `--docs` writes
-the tables into `billiards.md` there.
+the tables into `billiards.md` there, and figures of the finding beside it.
 """
 
 import argparse
@@ -24,6 +24,7 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 import numpy as np
 import torch
 from _extension import forecast, learned_base, learned_extension
+from _finding_figures import copy_figures
 from _page import page_parser, publish, table_row
 from _resumable import Result, measured
 from jaxtyping import Float
@@ -90,6 +91,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     )
     text = "\n".join(_table(results, len(training)))
     publish(text, "billiards.md", {"results": results}, options)
+    if options.docs:
+        copy_figures(options.results / "finding", options.docs, "billiards")
     return 0
 
 

@@ -6,7 +6,7 @@ Tracks of ../shared/data/clevrer_bullet. Discovery, and what the scenes share, s
 never seen by either. Of each of these the first 60 % of the frames are fitted and the positions in the rest are
 predicted by the best fit; its questions are answered from the whole video by posterior draws. The finding, the learned
 models and each scene's results are kept in `--results` as they come, so that a run that was interrupted goes on; delete
-that folder after a change of the code. `--docs` writes the tables into `clevrer.md` there.
+that folder after a change of the code. `--docs` writes the tables into `clevrer.md` there, and figures beside it.
 """
 
 import argparse
@@ -22,6 +22,7 @@ import numpy as np
 import torch
 from _answer_goals import GOALS, title
 from _extension import forecast, learned_base, learned_extension
+from _finding_figures import copy_figures
 from _page import page_parser, publish, table_row
 from _resumable import Result, measured
 from _score_cells import gain, number, percent
@@ -88,6 +89,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     )
     text = "\n".join([*_errors(results, len(training)), "", *_answers(results)])
     publish(text, "clevrer.md", {"results": results}, options)
+    if options.docs:
+        copy_figures(options.results / "finding", options.docs, "clevrer")
     return 0
 
 

@@ -11,7 +11,6 @@ the tables into `measured-data.md` there, and figures of tracks as they are besi
 
 import argparse
 import os
-import shutil
 import sys
 import time
 from collections.abc import Mapping, Sequence
@@ -21,6 +20,7 @@ from pathlib import Path
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 import torch
+from _finding_figures import copy_figures, keep_figures
 from _injected import injected
 from _page import page_parser, publish, table_row
 from _resumable import Result, measured
@@ -35,14 +35,6 @@ from vrdp_prob.models.simulator.rollout import compile_model
 DATA = Path(__file__).parents[2] / "shared" / "data"
 RESULTS = Path("out") / "measured"
 FREE, GLIDERS, PUCKS = "glider_free_1d", "glider_collisions_1d_rubber", "puck_collisions_2d"
-DRAWN = (
-    "Missing acceleration over the plane",
-    "Missing acceleration against speed",
-    "Tangential against normal impulse",
-    "Duration of touch at contacts",
-)
-"""Figures of the page of a finding that are kept as files too."""
-WHITE = '<rect width="100%" height="100%" fill="white"/>'
 TRUE_PARAMETER = {"surface_tilt": "tilt_x", "linear_drag": "linear_drag", "lens_distortion": "distortion"}
 
 
@@ -101,7 +93,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     text = "\n".join([*_findings(results, tasks), *_recovered(results, tasks)])
     publish(text, "measured-data.md", {"results": results}, options)
     if options.docs:
-        _copy_figures(options.results, [name for name, task in tasks.items() if task.way is None], options.docs)
+        for name in (name for name, task in tasks.items() if task.way is None):
+            copy_figures(options.results / name, options.docs, f"measured-{name}")
     return 0
 
 
@@ -126,23 +119,8 @@ class _Searched:
         finding = discover(videos, seed=0, processes=1, checkpoint=self.folder / "steps" / task.name)
         seconds = time.process_time() - begin
         write_finding(finding, self.folder / task.name)
-        for title in finding.figures.keys() & set(DRAWN):
-            figure = finding.figures[title].replace(">", f">{WHITE}", 1)
-            figure_file(self.folder / task.name, title).write_text(figure, encoding="utf-8")
+        keep_figures(finding, self.folder / task.name)
         return {"name": task.name, "videos": len(videos), "seconds": seconds, **_summary(finding)}
-
-
-def figure_file(folder: Path, title: str) -> Path:
-    """Where a figure of a finding is kept."""
-    return folder / f"{title.lower().replace(' ', '-')}.svg"
-
-
-def _copy_figures(folder: Path, names: Sequence[str], docs: Path) -> None:
-    """Figures of findings to the documentation, as far as they are there; others stay as they are."""
-    for name in names:
-        for title in DRAWN:
-            if (kept := figure_file(folder / name, title)).exists():
-                shutil.copyfile(kept, docs / "figures" / f"measured-{name}-{kept.name}")
 
 
 def _summary(finding: Finding) -> Result:

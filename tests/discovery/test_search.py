@@ -80,13 +80,18 @@ def test_two_causes_are_found_of_which_neither_stands_out_beside_chance(
     assert _searcher(needed=2.0)._pair(nothing, tilt) == ((tilt, second) if is_found else None)
 
 
-@pytest.mark.parametrize(("least", "name"), [(2.0, "tilt"), (70.0, None)], ids=["enough", "too little"])
+@pytest.mark.parametrize(
+    ("least", "lacking", "name"),
+    [(2.0, 200.0, "tilt"), (70.0, 200.0, None), (2.0, 400.0, None)],
+    ids=["enough", "too little", "a trifle of what lacks"],
+)
 def test_the_first_of_two_is_what_lasts_and_brings_most_where_all_else_is_noise(
-    least: float, name: str | None, monkeypatch: pytest.MonkeyPatch
+    least: float, lacking: float, name: str | None, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     nothing, tilt, drag, kicks = (_refit(*one) for one in (("", 0.0), ("tilt", -1.0), ("drag", 0.5), ("kicks", 0.2)))
     for one, brought in ((nothing, 0.0), (tilt, 60.0), (drag, 20.0), (kicks, 90.0)):
         one.brought.return_value = brought
+    nothing.lacking = lacking
     monkeypatch.setattr(refits, "happens_once", lambda cause: cause == "kicks")
     found = _searcher(needed=least)._provisional(nothing, [drag, kicks, tilt])
     assert found is (tilt if name else None)
@@ -396,7 +401,7 @@ def test_a_cause_with_which_no_joint_world_can_begin_is_left_out(monkeypatch: py
 
     monkeypatch.setattr(refits, "fit_together", impossible)
     monkeypatch.setattr(refits, "lost_videos", lambda _fit: [0])
-    monkeypatch.setattr(refits, "causes_of_lost_videos", lambda *_given, **_named: [(SurfaceTilt(), 50.0)])
+    monkeypatch.setattr(refits, "causes_of_lost_videos", lambda *_given, **_named: [((SurfaceTilt(),), 50.0)])
     monkeypatch.setattr(refits.Refits, "left", lambda _self, _trial: Mock(scores=()))
     trial = _refit("", 0.0)
     trial.choices, trial.names, trial.fit = {}, (), Mock(fits=[], model=Mock(effects=()))

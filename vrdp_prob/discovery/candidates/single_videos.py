@@ -4,11 +4,13 @@ Scores and refits begin at the fit without the cause. Where that has taken the w
 near it to be found, and a search from the beginning is the only way.
 """
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
 from functools import partial
+from itertools import combinations
+from typing import NamedTuple
 
 from vrdp_prob.discovery.candidates.scores import happens_once
-from vrdp_prob.inference.map_fit import MapFit
 from vrdp_prob.inference.runs.parallel import in_processes
 from vrdp_prob.inference.search.plan import IN_DOUBT
 from vrdp_prob.inference.several_videos.fitting import SharedFit
@@ -16,7 +18,6 @@ from vrdp_prob.inference.several_videos.parts import fit_alone
 from vrdp_prob.inference.several_videos.second_look import may_take_another_course
 from vrdp_prob.models.effects.effect import Effect
 from vrdp_prob.models.parameters import Scope
-from vrdp_prob.models.physics import PhysicsModel
 
 LOST = 1.2
 """Residuals in units of the noise from which a video may be lost."""
@@ -28,7 +29,7 @@ NEARLY, MOST_TOLD = 0.6, 2
 FAR_BEHIND = 0.3
 """Share of the largest gain below which a cause is not tried in a further video."""
 EXPLAINED = 1.1
-"""Residuals in units of the noise from which a cause explains a video; no further ones are tried then."""
+"""Residuals in units of the noise up to which a cause explains a video; no further ones are tried then."""
 CONTACT_HOOKS = (
     "tangential_impulse",
     "vertical_impulse",
@@ -40,6 +41,9 @@ CONTACT_HOOKS = (
 """What an effect overrides that acts in contacts or on what follows from them."""
 AT_ONCE = 4
 """Causes that are tried side by side."""
+
+Causes = tuple[Effect, ...]
+"""Causes that act together."""
 
 
 def lost_videos(fit: SharedFit) -> list[int]:
@@ -57,8 +61,11 @@ def causes_of_lost_videos(
     needed: float,
     *,
     seed: int,
-) -> list[tuple[Effect, float]]:
+) -> list[tuple[Causes, float]]:
     """Causes with which lost videos are explained much better, the best first, and what is gained (nats).
+
+    Where no single one explains any of the videos, two of those that act in contacts may do so together: neither need
+    bring anything by itself then. Such a pair is told of alone.
 
     Parameters
     ----------
@@ -83,37 +90,69 @@ def causes_of_lost_videos(
     if not effects:
         return []
 
-    def searched(video: int) -> Callable[[PhysicsModel], MapFit]:
-        return partial(fit_alone, fit.fits[video].clues.tracks, seed=seed, plan=IN_DOUBT)
-
-    def tried(video: int, effects: Sequence[Effect]) -> list[tuple[Effect, MapFit]]:
-        """Searches with causes, until one of them explains the video."""
-        found: list[tuple[Effect, MapFit]] = []
-        for first in range(0, len(effects), AT_ONCE):
-            some = effects[first : first + AT_ONCE]
-            models = [fit.extended(effect) for effect in some]
-            fits = in_processes(searched(video), models)
-            found += zip(some, fits, strict=True)
-            if min(one.misfit.ratio for one in fits) < EXPLAINED:
-                break
-        return found
-
+    searches = _Searches(fit, seed)
     gains: dict[str, float] = {}
+    explained_any = False
     for rank, video in enumerate(lost[:VIDEOS]):
-        before = searched(video)(fit.model).modes[0].log_density
-        found = tried(video, effects)
-        # Models are nested: a search that makes a video less probable has lost its own way.
-        gained = {effect.name: max(one.modes[0].log_density - before, 0.0) for effect, one in found}
-        gains = {name: gain + gains.get(name, 0.0) for name, gain in gained.items()}
-        explained = len(found) < len(effects)
-        effects = sorted((effect for effect, _ in found), key=lambda effect: -gains[effect.name])
+        found = searches.with_causes(video, [(effect,) for effect in effects])
+        gains = {effect.name: one.gain + gains.get(effect.name, 0.0) for (effect,), one in found}
+        explained = any(one.explains for _, one in found)
+        explained_any = explained_any or explained
+        effects = sorted((effect for (effect,), _ in found), key=lambda effect: -gains[effect.name])
         if explained or rank + 1 >= WITH_ALL:
             least = FAR_BEHIND * gains[effects[0].name]
             effects = [effect for effect in effects[:SECOND_LOOKS] if gains[effect.name] >= least]
         if len(effects) == 1:
             break
-    ranked = [(effect, gains[effect.name]) for effect in effects if effect.name in gains]
+    ranked: list[tuple[Causes, float]] = [((effect,), gains[effect.name]) for effect in effects if effect.name in gains]
+    if lost and not explained_any:
+        pair = _together(searches, lost[:WITH_ALL], in_contacts)
+        if pair is not None and pair[1] > max((gain for _, gain in ranked), default=0.0) + needed:
+            return [pair]
     return [pair for pair in ranked if pair[1] > max(needed, NEARLY * ranked[0][1])][:MOST_TOLD]
+
+
+def _together(searches: "_Searches", lost: Sequence[int], effects: Sequence[Effect]) -> tuple[Causes, float] | None:
+    """Two causes that together explain the worst video, and what they gain (nats) in some; None where no two do."""
+    cheap = [effect for effect in effects if not effect.overrides("pair_force")]
+    found = searches.with_causes(lost[0], list(combinations(cheap, 2)))
+    explaining = [(causes, one.gain) for causes, one in found if one.explains]
+    if not explaining:
+        return None
+    best, gained = max(explaining, key=lambda pair: pair[1])
+    return best, gained + sum(one.gain for video in lost[1:] for _, one in searches.with_causes(video, [best]))
+
+
+class _Found(NamedTuple):
+    """What a search with further causes gains (nats) in a video, and whether it explains it."""
+
+    gain: float
+    explains: bool
+
+
+@dataclass(frozen=True)
+class _Searches:
+    """Single videos of a fit searched from the beginning, with further causes in the model."""
+
+    fit: SharedFit
+    seed: int
+
+    def with_causes(self, video: int, candidates: Sequence[Causes]) -> list[tuple[Causes, _Found]]:
+        """What searches with each of some causes find, until one of them explains the video.
+
+        Models are nested: a search that makes a video less probable has lost its own way, and gains nothing.
+        """
+        search = partial(fit_alone, self.fit.fits[video].clues.tracks, seed=self.seed, plan=IN_DOUBT)
+        before = search(self.fit.model).modes[0].log_density
+        found: list[tuple[Causes, _Found]] = []
+        for first in range(0, len(candidates), AT_ONCE):
+            some = candidates[first : first + AT_ONCE]
+            fits = in_processes(search, [self.fit.extended(*causes) for causes in some])
+            told = [_Found(max(one.modes[0].log_density - before, 0.0), one.misfit.ratio < EXPLAINED) for one in fits]
+            found += zip(some, told, strict=True)
+            if any(one.explains for one in told):
+                break
+        return found
 
 
 def _tells(effect: Effect) -> bool:

@@ -232,20 +232,19 @@ class Refits:
         still_lost = lost_videos(best)
         lost = [one for one in lost_videos(trial.fit) if one in still_lost]
         told = causes_of_lost_videos(trial.fit, lost, left, likely, self.needed, seed=self.seed)
-        again = [effect for effect, promised in told if reached.get(effect.name, 0.0) < promised]
+        again = [causes for causes, promised in told if len(causes) > 1 or reached.get(causes[0].name, 0.0) < promised]
+        return [one for causes in again if (one := self._searched_with(trial, causes)) is not None]
 
-        return [one for effect in again if (one := self._searched_with(trial, effect)) is not None]
-
-    def _searched_with(self, trial: Trial, effect: Effect) -> Trial | None:
-        """The fit from the beginning with one more cause; None where videos have no world in common."""
+    def _searched_with(self, trial: Trial, causes: Sequence[Effect]) -> Trial | None:
+        """The fit from the beginning with further causes; None where videos have no world in common."""
 
         def fitted() -> SharedFit:
             tracks = [part.clues.tracks for part in trial.fit.fits]
             return fit_together(
-                tracks, model=trial.fit.extended(effect), shared=trial.fit.shared, seed=self.seed, model_error=False
+                tracks, model=trial.fit.extended(*causes), shared=trial.fit.shared, seed=self.seed, model_error=False
             )
 
-        return self._began_anew(trial, [effect], fitted)
+        return self._began_anew(trial, causes, fitted)
 
     def doubted(self, trial: Trial, lesser: Trial, divisor: Float[np.ndarray, "video"]) -> bool:
         """Whether a cause brings too little, or brings it in too few of the videos that could have been drawn."""

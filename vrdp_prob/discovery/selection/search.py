@@ -20,6 +20,8 @@ from vrdp_prob.progress import ProgressDisplay, SilentProgress
 MOST_RIVALS = 2
 MOST_CAUSES = 5
 MOST_SWAPS = 3
+FIRST_SHARE = 0.2
+"""Share of what a model lacks that a cause must bring for a second one to be looked for beside it."""
 PLAIN = 50.0
 """Gain of a cause, in those that are needed, from which it is not put in doubt again."""
 FALSE_ALARM = 0.05
@@ -202,9 +204,9 @@ class _Searcher:
         return Step(self.refits.left(trial), tuple(self._in_order(trial, found)), pair)
 
     def _provisional(self, trial: Trial, found: Sequence[Trial]) -> Trial | None:
-        """The lasting cause that brings most where all else is noise, if it brings enough."""
+        """The lasting cause that brings most where all else is noise, if that is enough, and a good part of what lacks."""
         first = max(lasting(found), key=lambda one: one.brought(trial) + one.log_prior, default=trial)
-        return None if first.brought(trial) < self.needed else first
+        return None if first.brought(trial) < max(self.needed, FIRST_SHARE * trial.lacking) else first
 
     def _pair(self, trial: Trial, first: Trial) -> tuple[Trial, Trial] | None:
         """A cause and a second one beside it, if both together are established.

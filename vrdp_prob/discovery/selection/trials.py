@@ -1,5 +1,6 @@
 """A model that is tried on all videos: its fit, and how well it predicts each video from the others."""
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -105,6 +106,12 @@ class Trial:
         A fit is judged by this: what it has lost, chance would cover.
         """
         return float((self.fitted_density - base.fitted_density).sum())
+
+    @property
+    def lacking(self) -> float:
+        """What a model would bring (nats) that leaves nothing but noise, where all that this one leaves is noise."""
+        fits = self.fit.fits
+        return sum(2.0 * float(one.clues.tracks.seen.sum()) * max(math.log(one.misfit.ratio), 0.0) for one in fits)
 
     @property
     def log_prior(self) -> float:

@@ -81,9 +81,12 @@ class SharedFit:
         """What was seen in each video."""
         return tuple(part.likelihood.tracks for part in self.fits)
 
-    def extended(self, effect: Effect) -> PhysicsModel:
-        """Its model with one more cause, whose places and times are expected where these videos show something."""
-        return self.model.with_effect(effect, self.tracks)
+    def extended(self, *effects: Effect) -> PhysicsModel:
+        """Its model with further causes, whose places and times are expected where these videos show something."""
+        model = self.model
+        for effect in effects:
+            model = model.with_effect(effect, self.tracks)
+        return model
 
     def value(self, name: str) -> float | None:
         """Most probable value of a number that all videos share, in its unit; None where they share no such number."""

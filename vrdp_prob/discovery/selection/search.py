@@ -204,7 +204,7 @@ class _Searcher:
         return Step(self.refits.left(trial), tuple(self._in_order(trial, found)), pair)
 
     def _provisional(self, trial: Trial, found: Sequence[Trial]) -> Trial | None:
-        """The lasting cause that brings most where all else is noise, if that is enough, and a good part of what lacks."""
+        """The lasting cause that brings most where all else is noise: enough, and a good part of what lacks."""
         first = max(lasting(found), key=lambda one: one.brought(trial) + one.log_prior, default=trial)
         return None if first.brought(trial) < max(self.needed, FIRST_SHARE * trial.lacking) else first
 

@@ -1,14 +1,17 @@
-"""A disc that meets nothing but a wall tells the product of both restitutions, and nothing of its mass."""
+"""A body that meets nothing but a wall tells the product of both restitutions, and nothing of its mass."""
 
 from dataclasses import replace
 from functools import cache
 
 import numpy as np
 import pytest
+import torch
 
 from tests.inference.generator import Scene, states
 from vrdp_prob.inference import Posterior, Status, infer
-from vrdp_prob.models.parameters import MASS
+from vrdp_prob.inference.map_fit import fit_map
+from vrdp_prob.models.effects.wall import Wall as HiddenWall
+from vrdp_prob.models.parameters import MASS, Prior
 from vrdp_prob.models.physics import PhysicsModel
 from vrdp_prob.scene import Body, Shape, Tracks, Wall
 
@@ -20,11 +23,10 @@ WALL_AT = 0.5
 TIMES = np.arange(50) / 25
 
 
-@cache
-def against_a_wall(stated: float | None) -> Posterior:
-    """What is inferred from a disc that slides at a wall; a normal impact turns the speed across the wall."""
+def bouncing(walls: tuple[Wall, ...], shape: Shape = Shape.CYLINDER) -> Tracks:
+    """Tracks of a body that slides at a wall; a normal impact turns the speed across the wall."""
     before = Scene(
-        (Shape.CYLINDER,),
+        (shape,),
         np.array([[-1.0, 0.0]]),
         np.array([[1.8, 0.3]]),
         np.ones(1),
@@ -46,8 +48,13 @@ def against_a_wall(stated: float | None) -> Posterior:
     since = np.concatenate([[0.0], TIMES[~early] - fine[hit]])
     path = np.concatenate([states(before, TIMES[early])[:, :, :2], states(after, since)[1:, :, :2]])
     path = path + NOISE * np.random.default_rng(0).standard_normal(path.shape)
-    wall = Wall(WALL_AT, -3.0, WALL_AT, 3.0, stated)
-    tracks = Tracks.from_arrays("wall", (Body("disc", Shape.CYLINDER, RADIUS),), TIMES, path, walls=(wall,))
+    return Tracks.from_arrays("wall", (Body("disc", shape, RADIUS),), TIMES, path, walls=walls)
+
+
+@cache
+def against_a_wall(stated: float | None) -> Posterior:
+    """What is inferred from a disc that meets a wall."""
+    tracks = bouncing((Wall(WALL_AT, -3.0, WALL_AT, 3.0, stated),))
     return infer(tracks, model=PhysicsModel.base(), sampler="laplace", draws=500, hand_on=False)
 
 
@@ -77,3 +84,24 @@ def test_a_wall_says_nothing_of_a_mass(stated: float | None) -> None:
     assert (posterior.data["posterior"]["mass"].values == MASS.default).all()
     assert any("only where it meets walls" in sentence for sentence in posterior.warnings)
     assert not any("never collide" in sentence for sentence in posterior.warnings)
+
+
+@pytest.mark.parametrize("shape", [Shape.CYLINDER, Shape.CUBE])
+def test_a_body_that_meets_a_wall_that_nobody_states_has_the_same_unknowns(shape: Shape) -> None:
+    tracks = bouncing((), shape)
+    model = PhysicsModel.base().with_effect(HiddenWall(), [tracks])
+    distance, direction, _ = HiddenWall().parameters
+    near = {
+        distance.name: replace(distance, prior=Prior(WALL_AT, 0.05), default=WALL_AT),
+        direction.name: replace(direction, prior=Prior(0.0, 0.05), default=0.0),
+    }
+    believed = replace(model, beliefs={**model.beliefs, **near})
+    fit = fit_map(tracks, believed, np.random.default_rng(0), model_error=False)
+    places = fit.likelihood.coordinates.places
+    assert ("restitution", 0) in places
+    assert (("angle", 0) in places) is (shape is Shape.CUBE)
+    assert fit.misfit.ratio < 1.2
+    if shape is Shape.CYLINDER:  # a cube that lies askew turns, too
+        values = fit.likelihood.coordinates.quantities(torch.from_numpy(fit.point[None]))
+        product = float(values["restitution"][0, 0] * values["hidden_wall_restitution"][0, 0])
+        assert product == pytest.approx(PRODUCT, abs=0.03)

@@ -58,7 +58,8 @@ class Structure:
         Bodies that meet others, so that the motion can say something about mass and restitution (and yaw of a cube).
         Of those that meet nobody it says something about the mass only under effects by which that matters.
     bouncing
-        Bodies that meet walls, which say nothing about a mass, but about the rest.
+        Bodies that meet fixed things (walls, or obstacles that an effect adds), which say nothing about a mass, but
+        about the rest.
     passing
         Cubes that come so near to something that their yaw decides whether they meet it.
     held

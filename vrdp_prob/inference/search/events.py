@@ -1,5 +1,6 @@
 """Which pairs meet in a rollout, and in which order."""
 
+import numpy as np
 import torch
 from jaxtyping import Float
 from torch import Tensor
@@ -25,6 +26,13 @@ def wall_contacts(rollout: Rollout, world: int) -> Pairs:
     """Pairs of a body and a wall that meet in a world."""
     events = rollout.events.of_world(world).of_kind(RolloutEventKind.WALL)
     return tuple(sorted(set(zip(events.first.tolist(), events.second.tolist(), strict=True))))
+
+
+def bouncing_off_fixed_things(rollout: Rollout) -> frozenset[int]:
+    """Bodies that meet a wall, or an obstacle that an effect adds, in some world."""
+    events = rollout.events
+    fixed = np.isin(events.kind, (RolloutEventKind.WALL, RolloutEventKind.OBSTACLE))
+    return frozenset(events.first[fixed].tolist())
 
 
 def courses(rollout: Rollout) -> list[Pairs]:

@@ -10,7 +10,7 @@ from jaxtyping import Float
 from vrdp_prob.inference.search.least_squares import Minimum
 from vrdp_prob.models.coordinates import Coordinates
 from vrdp_prob.models.likelihood import Likelihood
-from vrdp_prob.models.simulator.events import RolloutEventKind
+from vrdp_prob.models.simulator.events import CONTACTS, RolloutEventKind
 from vrdp_prob.scene import Shape
 
 QUARTER = np.pi / 2
@@ -146,7 +146,7 @@ def frames_before_contact(
     """Frame just before the first contact of each body that has one after it was released."""
     with torch.no_grad():
         events = likelihood.rollout(torch.from_numpy(point[None]), frame_count).events
-    touching = (events.kind == RolloutEventKind.COLLISION) | (events.kind == RolloutEventKind.WALL)
+    touching = np.isin(events.kind, CONTACTS)
     frames: dict[int, int] = {}
     for kind, time, *pair in zip(
         events.kind[touching], events.time[touching], events.first[touching], events.second[touching], strict=True

@@ -11,7 +11,12 @@ from vrdp_prob.inference.draws.mode import Mode
 from vrdp_prob.inference.draws.samples import evaluate
 from vrdp_prob.inference.identifiability.information import Information
 from vrdp_prob.inference.identifiability.status import uninformed
-from vrdp_prob.inference.search.events import collision_sequences, first_contacts, wall_contacts
+from vrdp_prob.inference.search.events import (
+    bouncing_off_fixed_things,
+    collision_sequences,
+    first_contacts,
+    wall_contacts,
+)
 from vrdp_prob.inference.search.hypothesis import distances
 from vrdp_prob.inference.search.passing import close_passes
 from vrdp_prob.inference.search.refinement import Refined, best_first, mode_at
@@ -114,10 +119,10 @@ def _uninformed(likelihood: Likelihood, modes: Sequence[Mode], moving: frozenset
 def structure_at(
     likelihood: Likelihood, points: Sequence[Float[np.ndarray, "dimension"]], moving: frozenset[int]
 ) -> Structure:
-    """Bodies that move, that meet another one or a wall, and cubes that just pass one, at some of the points."""
+    """Bodies that move, that meet another one or a fixed thing, and cubes that just pass one, at some of the points."""
     with torch.no_grad():
         rollout = likelihood.rollout(torch.from_numpy(np.array(points)))
     colliding = frozenset(body for pairs in collision_sequences(rollout) for pair in pairs for body in pair)
-    bouncing = frozenset(body for world in range(len(points)) for body, _ in wall_contacts(rollout, world))
+    bouncing = bouncing_off_fixed_things(rollout)
     passing = close_passes(likelihood.tracks, rollout.trajectory.numpy())
     return Structure(moving, colliding, bouncing, passing - colliding - bouncing)

@@ -20,6 +20,7 @@ from vrdp_prob.inference.several_videos.fitting import fit_together
 from vrdp_prob.inference.several_videos.joint_fit import expand
 from vrdp_prob.inference.several_videos.second_look import doubtful
 from vrdp_prob.models.effects.surface_tilt import SurfaceTilt
+from vrdp_prob.models.parameters import ANGULAR_DRAG
 from vrdp_prob.scene import Tracks
 
 
@@ -170,3 +171,17 @@ def test_gains_are_divided_by_the_overdispersion_of_each_video() -> None:
     divisor = np.array([1.0, 4.0, 100.0])
     assert gains(found, base, divisor) == pytest.approx(gains(found, base) / divisor)
     assert gain(found, base, divisor)[0] == pytest.approx(float((gains(found, base) / divisor).sum()))
+
+
+def test_a_video_searched_anew_may_share_a_number_that_no_other_one_has(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    _, fit = fitted("surface_tilt", 3.0, seed=2)
+    assert ANGULAR_DRAG.name in fit.joint.numbers.names
+    held = fit.under(fit.model, held=[{(ANGULAR_DRAG.name, None): None}] * len(fit.fits), model_error=False)
+    assert ANGULAR_DRAG.name not in held.joint.numbers.names
+    lacking = replace(held, structures=tuple(replace(one, held={}) for one in held.structures))
+    monkeypatch.setattr(fitting, "look_again", lambda fits, *_, **__: [fits[0], fit.fits[1], *fits[2:]])
+    found = lacking.mended([1], seed=0)
+    assert found.joint.log_density >= lacking.joint.log_density
+    assert found is lacking or ANGULAR_DRAG.name in found.joint.numbers.names

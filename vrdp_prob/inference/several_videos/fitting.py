@@ -189,7 +189,6 @@ class SharedFit:
             joint.gaussian.mean,
             [joint.gaussian.locals[index].centre for index in others],
         )
-        agreed = rest.gaussian.mean
         points = {index: rest.point(place) for place, index in enumerate(others)}
         settled = [
             replace(fit, modes=(replace(fit.modes[0], point=points.get(index, joint.point(index))),))
@@ -212,6 +211,7 @@ class SharedFit:
         for index in changed:
             structures[index] = structure_of(fits[index].likelihood.coordinates)
         numbers, videos = link_fits(fits, self.model, self.shared, structures)
+        agreed, _ = first_numbers(rest, numbers, {}, {})
         locals_ = following_ones(numbers, videos, carried_starts(fits, videos), agreed)
         try:
             found = climb(numbers, videos, agreed, locals_)

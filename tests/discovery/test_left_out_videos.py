@@ -19,6 +19,7 @@ from vrdp_prob.inference.several_videos.agreement import following_ones
 from vrdp_prob.inference.several_videos.fitting import fit_together
 from vrdp_prob.inference.several_videos.joint_fit import expand
 from vrdp_prob.inference.several_videos.second_look import doubtful
+from vrdp_prob.models.effects.linear_drag import LinearDrag
 from vrdp_prob.models.effects.surface_tilt import SurfaceTilt
 from vrdp_prob.models.parameters import ANGULAR_DRAG
 from vrdp_prob.scene import Tracks
@@ -111,6 +112,16 @@ def test_errors_are_compared_video_by_video() -> None:
     assert few.ratio == 0.5
     assert np.isnan([few.q025, few.q975]).all()
     assert not error_ratios(predicted(None, None), predicted(0.5, 0.5))
+
+
+def test_only_what_is_not_there_may_as_well_vanish() -> None:
+    _, null = fitted(seed=1)
+    _, tilted = fitted("surface_tilt", 3.0, seed=2)
+    for fit, cause, may in ((null, SurfaceTilt(), True), (tilted, SurfaceTilt(), False), (null, LinearDrag(), False)):
+        score = score_causes(fit, ResidualModel.of(fit), [cause], seed=0)[0]
+        found = Trial((), fit).with_cause(score)
+        assert found is not None
+        assert found.may_vanish(cause) is may  # a drag vanishes infinitely far away
 
 
 @pytest.mark.slow

@@ -23,7 +23,7 @@ def _refit(cause: str, gained: float, *, patches: bool = False) -> Mock:
     refit.causes, refit.log_density, refit.log_prior = tuple(cause.split("+")), np.full(3, gained), 0.0
     refit.fit = Mock(videos=(0, 1, 2))
     refit.beyond = lambda base: tuple(one for one in refit.causes if one not in base.causes)
-    refit.patches.return_value = patches
+    refit.patches.return_value, refit.may_vanish.return_value = patches, False
     refit.loses_videos_of.return_value = False
     return refit
 

@@ -247,8 +247,11 @@ class Refits:
         return self._began_anew(trial, causes, fitted)
 
     def doubted(self, trial: Trial, lesser: Trial, divisor: Float[np.ndarray, "video"]) -> bool:
-        """Whether a cause brings too little, or brings it in too few of the videos that could have been drawn."""
-        if gain(trial, lesser, divisor)[0] < self.needed:
+        """Whether a cause brings too little, or in too few of the videos that could have been drawn, or may be nothing.
+
+        What a cause brings that may as well vanish, it brings by other numbers, to which it gives room.
+        """
+        if gain(trial, lesser, divisor)[0] < self.needed or any(map(trial.may_vanish, trial.beyond(lesser))):
             return True
         shares = weights([trial, lesser], [0.0, self.needed], np.random.default_rng(self.seed), overdispersion=divisor)
         return bool(shares[0] < ESTABLISHED)

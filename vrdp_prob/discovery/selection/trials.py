@@ -7,6 +7,7 @@ from functools import cached_property
 
 import numpy as np
 from jaxtyping import Float
+from scipy.stats import chi2
 
 from vrdp_prob.discovery.candidates.kicked_at_contact import kicked_at_contact
 from vrdp_prob.discovery.candidates.scores import CauseScore, happens_once
@@ -21,7 +22,7 @@ from vrdp_prob.inference.several_videos.fitting import Owned, SharedFit
 from vrdp_prob.inference.several_videos.population import own_parameters, with_learned_population
 from vrdp_prob.inference.several_videos.second_look import MOST
 from vrdp_prob.models.effects.effect import Effect
-from vrdp_prob.models.parameters import Parameter, Scope
+from vrdp_prob.models.parameters import Parameter, Scope, Transform
 from vrdp_prob.models.physics import PhysicsModel
 
 EACH_PARAMETER = 1.0
@@ -42,6 +43,8 @@ PATCHED = 0.5
 explains none of them."""
 MOVED = 1e-3
 """Probability that lateness of neighbouring frames is so much alike by chance, below which it is none."""
+CERTAIN = 0.95
+"""Probability of the region of strengths in which those must not be at which a cause vanishes."""
 FELL = 5.0
 """Nats by which a video may be less probable with one more cause; beyond that it has lost its course of events."""
 
@@ -126,6 +129,24 @@ class Trial:
     def beyond(self, base: "Trial") -> tuple[Effect, ...]:
         """The causes that it has beyond those of another model."""
         return tuple(cause for cause in self.causes if cause not in base.causes)
+
+    def may_vanish(self, cause: Effect) -> bool:
+        """Whether what all videos share of a cause is no further from where it vanishes than chance would have it.
+
+        It is not where that is infinitely far away, or a matter of single videos.
+        """
+        joint, vanishing = self.fit.joint, self.fit.vanishing([cause])
+        strengths = [
+            (place, entry.transform, vanishing[name])
+            for place, ((name, _), entry) in enumerate(zip(joint.numbers.keys, joint.numbers.entries, strict=True))
+            if name in vanishing
+        ]
+        if not strengths or any(transform is Transform.LOG and not value for _, transform, value in strengths):
+            return False
+        places = [place for place, *_ in strengths]
+        away = joint.gaussian.mean[places] - [transform.to_coordinate(value) for _, transform, value in strengths]
+        root = joint.gaussian.root[places]
+        return bool(away @ np.linalg.solve(root @ root.T, away) < chi2.ppf(CERTAIN, len(places)))
 
     def with_cause(self, score: CauseScore) -> "Trial | None":
         """The fit with one more cause, from what its score says of it; None where no world can begin there."""

@@ -8,10 +8,10 @@ import pytest
 import torch
 
 from tests.inference.generator import Scene, states
-from vrdp_prob.inference import Posterior, Status, infer
+from vrdp_prob.inference import Posterior, Status, identified, infer
 from vrdp_prob.inference.map_fit import fit_map
 from vrdp_prob.models.effects.wall import Wall as HiddenWall
-from vrdp_prob.models.parameters import MASS, Prior
+from vrdp_prob.models.parameters import MASS, RESTITUTION, Prior
 from vrdp_prob.models.physics import PhysicsModel
 from vrdp_prob.scene import Body, Shape, Tracks, Wall
 
@@ -87,13 +87,15 @@ def test_a_wall_says_nothing_of_a_mass(stated: float | None) -> None:
 
 
 @pytest.mark.parametrize("shape", [Shape.CYLINDER, Shape.CUBE])
-def test_a_body_that_meets_a_wall_that_nobody_states_has_the_same_unknowns(shape: Shape) -> None:
+@pytest.mark.parametrize("spread", [RESTITUTION.prior.sd, 0.05])
+def test_a_body_that_meets_a_wall_that_nobody_states_has_the_same_unknowns(shape: Shape, spread: float) -> None:
     tracks = bouncing((), shape)
     model = PhysicsModel.base().with_effect(HiddenWall(), [tracks])
     distance, direction, _ = HiddenWall().parameters
     near = {
         distance.name: replace(distance, prior=Prior(WALL_AT, 0.05), default=WALL_AT),
         direction.name: replace(direction, prior=Prior(0.0, 0.05), default=0.0),
+        RESTITUTION.name: replace(RESTITUTION, prior=replace(RESTITUTION.prior, sd=spread)),
     }
     believed = replace(model, beliefs={**model.beliefs, **near})
     fit = fit_map(tracks, believed, np.random.default_rng(0), model_error=False)
@@ -101,6 +103,9 @@ def test_a_body_that_meets_a_wall_that_nobody_states_has_the_same_unknowns(shape
     assert ("restitution", 0) in places
     assert (("angle", 0) in places) is (shape is Shape.CUBE)
     assert fit.misfit.ratio < 1.2
+    status = identified(fit).status["disc"].restitution
+    if spread == RESTITUTION.prior.sd:
+        assert (status.status, status.partners) == (Status.PRODUCT_ONLY, ("the hidden wall",))
     if shape is Shape.CYLINDER:  # a cube that lies askew turns, too
         values = fit.likelihood.coordinates.quantities(torch.from_numpy(fit.point[None]))
         product = float(values["restitution"][0, 0] * values["hidden_wall_restitution"][0, 0])

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from vrdp_prob.inference.identifiability.information import Information
 from vrdp_prob.inference.identifiability.status import BodyStatus, CollisionGroup, collision_groups, identifiability
 from vrdp_prob.inference.map_fit import MapFit
-from vrdp_prob.inference.search.events import Pairs, wall_contacts
+from vrdp_prob.inference.search.events import Pairs, contacts_with_fixed_things
 from vrdp_prob.models.parameters import RESTITUTION
 from vrdp_prob.models.unknowns import felt_masses, structure_of
 
@@ -38,10 +38,11 @@ def identified(fit: MapFit) -> Identified:
     """
     tracks, coordinates = fit.likelihood.tracks, fit.likelihood.coordinates
     information = Information(coordinates, fit.modes[0])
-    told, walls = _telling(fit), wall_contacts(fit.rollout, 0)
-    felt = felt_masses(fit.likelihood.model, structure_of(coordinates).moving)
-    status = identifiability(tracks, told, walls, information, felt)
-    return Identified(status, collision_groups(tracks, told, walls, information))
+    told, fixed = _telling(fit), contacts_with_fixed_things(fit.rollout, 0, len(tracks.walls))
+    model = fit.likelihood.model
+    felt, obstacles = felt_masses(model, structure_of(coordinates).moving), model.obstacle_restitutions
+    status = identifiability(tracks, told, fixed, information, felt=felt, obstacles=obstacles)
+    return Identified(status, collision_groups(tracks, told, fixed, information, obstacles))
 
 
 def _telling(fit: MapFit) -> Pairs:

@@ -174,6 +174,11 @@ class PhysicsModel:
         """Whether bodies that are apart act on each other."""
         return is_coupled(self.effects)
 
+    @property
+    def obstacle_restitutions(self) -> tuple[str, ...]:
+        """Names of the parameters that are the restitutions of the obstacles that effects add, in their order."""
+        return tuple(name for effect in self.effects for name in effect.obstacle_restitutions)
+
     @cached_property
     def path_depends_on_mass(self) -> bool:
         """Whether what accelerates or kicks a body depends on its mass."""

@@ -15,7 +15,7 @@ from vrdp_prob.inference.draws.mode import Mode
 from vrdp_prob.inference.draws.samples import Gaussian
 from vrdp_prob.models.coordinates import Coordinates
 
-Weights = Mapping[tuple[str, int], float]
+Weights = Mapping[tuple[str, int | None], float]
 """Weights of unknowns in a linear combination, by field and owner."""
 
 

@@ -44,7 +44,8 @@ class ParameterStatus:
         `identified`, `ratio_only` (a mass, against its partners; the scale is the prior's), `product_only` (a
         restitution, times its partners'), or `default` (nothing; the default value is used).
     partners
-        Ids of the bodies that a ratio or product refers to; the first wall is called `wall 1`.
+        Ids of the bodies that a ratio or product refers to; the first wall is called `wall 1`, one that nobody states
+        `the hidden wall`.
     contraction
         Share of the prior variance (of the logarithm) that the data take away; 0 for a default, 1 for a known mass.
     """
@@ -117,7 +118,13 @@ Pairs = Collection[tuple[int, int]]
 
 
 def identifiability(
-    tracks: Tracks, pairs: Pairs, walls: Pairs, information: Information, felt: Collection[int] = ()
+    tracks: Tracks,
+    pairs: Pairs,
+    fixed: Pairs,
+    information: Information,
+    *,
+    felt: Collection[int] = (),
+    obstacles: Sequence[str] = (),
 ) -> dict[str, BodyStatus]:
     """Status of every body.
 
@@ -127,29 +134,35 @@ def identifiability(
         The bodies, with what is known of them.
     pairs
         Pairs of bodies that collide, by index.
-    walls
-        Pairs of a body and a wall that collide, by index.
+    fixed
+        Pairs of a body and a wall, or an obstacle, that collide, by index; obstacles come after walls.
     information
         How much the data narrow the prior.
     felt
         Bodies whose free motion depends on their mass, by index. A law that has the same strength for all of them links
         their masses as collisions do.
+    obstacles
+        Names of the parameters that are the restitutions of obstacles.
     """
-    _, with_walls = _graphs(tracks, pairs, walls)
-    linked, _ = _graphs(tracks, [*pairs, *combinations(sorted(felt), 2)], ())
-    masses, restitutions = _Unknowns.masses(tracks, information), _Unknowns.restitutions(tracks, information)
+    _, with_fixed = _graphs(tracks, pairs, fixed, obstacles)
+    linked, _ = _graphs(tracks, [*pairs, *combinations(sorted(felt), 2)], (), ())
+    masses, restitutions = _Unknowns.masses(tracks, information), _Unknowns.restitutions(tracks, information, obstacles)
     return {
-        body.id: BodyStatus(masses.status(body.id, linked), restitutions.status(body.id, with_walls))
+        body.id: BodyStatus(masses.status(body.id, linked), restitutions.status(body.id, with_fixed))
         for body in tracks.bodies
     }
 
 
 def collision_groups(
-    tracks: Tracks, pairs: Sequence[tuple[int, int]], walls: Pairs, information: Information
+    tracks: Tracks,
+    pairs: Sequence[tuple[int, int]],
+    fixed: Pairs,
+    information: Information,
+    obstacles: Sequence[str] = (),
 ) -> tuple[CollisionGroup, ...]:
     """Which combinations of masses and restitutions the data determine, group by group; arguments as above."""
-    contacts, with_walls = _graphs(tracks, pairs, walls)
-    masses, restitutions = _Unknowns.masses(tracks, information), _Unknowns.restitutions(tracks, information)
+    contacts, with_fixed = _graphs(tracks, pairs, fixed, obstacles)
+    masses, restitutions = _Unknowns.masses(tracks, information), _Unknowns.restitutions(tracks, information, obstacles)
     names = [body.id for body in tracks.bodies]
     groups, left = [], [name for name in names if contacts[name]]
     while left:
@@ -157,31 +170,37 @@ def collision_groups(
         left = [name for name in left if name not in members]
         found = []
         for first, second in ((i, j) for i, j in pairs if names[i] in members):
-            ratio = {(MASS.name, first): 1.0, (MASS.name, second): -1.0}
-            product = {(RESTITUTION.name, first): 1.0, (RESTITUTION.name, second): 1.0}
+            ratio: Weights = {(MASS.name, first): 1.0, (MASS.name, second): -1.0}
+            product: Weights = {(RESTITUTION.name, first): 1.0, (RESTITUTION.name, second): 1.0}
             both = (names[first], names[second])
             for quantity, weights, unknowns, graph in (
                 ("mass_ratio", ratio, masses, contacts),
-                ("restitution_product", product, restitutions, with_walls),
+                ("restitution_product", product, restitutions, with_fixed),
             ):
                 linked = unknowns.told_together(*both, graph)
                 found.append(replace(_combination(quantity, both, weights, information), linked=linked))
-        scale = {(MASS.name, names.index(name)): 1 / len(members) for name in members}
+        scale: Weights = {(MASS.name, names.index(name)): 1 / len(members) for name in members}
         found.append(_combination("mass_scale", tuple(members), scale, information))
         groups.append(CollisionGroup(tuple(members), tuple(found)))
     return tuple(groups)
 
 
 def uninformed(
-    tracks: Tracks, pairs: Pairs, walls: Pairs, information: Information, felt: Collection[int] = ()
+    tracks: Tracks,
+    pairs: Pairs,
+    fixed: Pairs,
+    information: Information,
+    *,
+    felt: Collection[int] = (),
+    obstacles: Sequence[str] = (),
 ) -> frozenset[int]:
     """Bodies that collide, but of whose mass and restitution that says nothing, for example as it was too late."""
-    contacts, with_walls = _graphs(tracks, pairs, walls)
-    masses, restitutions = _Unknowns.masses(tracks, information), _Unknowns.restitutions(tracks, information)
+    contacts, with_fixed = _graphs(tracks, pairs, fixed, obstacles)
+    masses, restitutions = _Unknowns.masses(tracks, information), _Unknowns.restitutions(tracks, information, obstacles)
     return frozenset(
         index
         for index, body in enumerate(tracks.bodies)
-        if restitutions.says_nothing(body.id, with_walls[body.id])
+        if restitutions.says_nothing(body.id, with_fixed[body.id])
         and (body.mass is not None or index in felt or masses.says_nothing(body.id, contacts[body.id]))
     )
 
@@ -190,15 +209,21 @@ def _combination(quantity: str, objects: tuple[str, ...], weights: Weights, info
     return Combination(quantity, objects, information.sd(weights), information.contraction(weights))
 
 
-def _graphs(tracks: Tracks, pairs: Pairs, walls: Pairs) -> tuple[Graph, Graph]:
-    """Contacts between bodies, and the same with those of walls."""
+def _graphs(tracks: Tracks, pairs: Pairs, fixed: Pairs, obstacles: Sequence[str]) -> tuple[Graph, Graph]:
+    """Contacts between bodies, and the same with those of walls and obstacles."""
     names = [body.id for body in tracks.bodies]
     contacts = _graph(names, ((names[i], names[j]) for i, j in pairs))
-    wall_names = [wall_name(index) for index in range(len(tracks.walls))]
-    with_walls = _graph([*names, *wall_names], ((names[i], wall_names[k]) for i, k in walls))
+    fixed_names = [*(wall_name(index) for index in range(len(tracks.walls))), *map(_obstacle_name, obstacles)]
+    told = ((names[i], fixed_names[k]) for i, k in fixed if k < len(fixed_names))
+    with_fixed = _graph([*names, *fixed_names], told)
     for name, partners in contacts.items():
-        with_walls[name] |= partners
-    return contacts, with_walls
+        with_fixed[name] |= partners
+    return contacts, with_fixed
+
+
+def _obstacle_name(restitution: str) -> str:
+    """Name in words of an obstacle by the name of its restitution."""
+    return f"the {restitution.removesuffix('_restitution').replace('_', ' ')}"
 
 
 def _graph(names: Iterable[str], edges: Iterable[tuple[str, str]]) -> Graph:
@@ -223,14 +248,14 @@ def _component(name: str, graph: Graph) -> dict[str, int]:
 
 @dataclass(frozen=True)
 class _Unknowns:
-    """The masses of bodies, or the restitutions of bodies and walls, and what contacts say of two of them together.
+    """The masses of bodies, or the restitutions of bodies and fixed things, and what contacts say of two together.
 
     Parameters
     ----------
     information
         How much the data narrow the prior.
     keys
-        Their names among the coordinates, by that of the body or wall.
+        Their names among the coordinates, by that of the body, wall or obstacle.
     sign
         -1 where a contact tells a ratio, 1 where it tells a product.
     together
@@ -240,21 +265,24 @@ class _Unknowns:
     """
 
     information: Information
-    keys: Mapping[str, tuple[str, int]]
+    keys: Mapping[str, tuple[str, int | None]]
     sign: float
     together: Status
     known: frozenset[str]
 
     @classmethod
     def masses(cls, tracks: Tracks, information: Information) -> "_Unknowns":
-        keys = {body.id: (MASS.name, index) for index, body in enumerate(tracks.bodies)}
+        keys: dict[str, tuple[str, int | None]] = {body.id: (MASS.name, k) for k, body in enumerate(tracks.bodies)}
         known = frozenset(body.id for body in tracks.bodies if body.mass is not None)
         return cls(information, keys, -1.0, Status.RATIO_ONLY, known)
 
     @classmethod
-    def restitutions(cls, tracks: Tracks, information: Information) -> "_Unknowns":
-        keys = {body.id: (RESTITUTION.name, index) for index, body in enumerate(tracks.bodies)}
+    def restitutions(cls, tracks: Tracks, information: Information, obstacles: Sequence[str]) -> "_Unknowns":
+        keys: dict[str, tuple[str, int | None]] = {
+            body.id: (RESTITUTION.name, index) for index, body in enumerate(tracks.bodies)
+        }
         keys |= {wall_name(index): (WALL_RESTITUTION.name, index) for index in range(len(tracks.walls))}
+        keys |= {_obstacle_name(name): (name, None) for name in obstacles}
         known = {wall_name(index) for index, wall in enumerate(tracks.walls) if wall.restitution is not None}
         return cls(information, keys, 1.0, Status.PRODUCT_ONLY, frozenset(known))
 

@@ -1,6 +1,5 @@
 """Which pairs meet in a rollout, and in which order."""
 
-import numpy as np
 import torch
 from jaxtyping import Float
 from torch import Tensor
@@ -22,17 +21,22 @@ def collision_sequences(rollout: Rollout) -> list[Pairs]:
     return [tuple(dict.fromkeys(contacts)) for contacts in _contacts(rollout)]
 
 
-def wall_contacts(rollout: Rollout, world: int) -> Pairs:
-    """Pairs of a body and a wall that meet in a world."""
-    events = rollout.events.of_world(world).of_kind(RolloutEventKind.WALL)
-    return tuple(sorted(set(zip(events.first.tolist(), events.second.tolist(), strict=True))))
+def contacts_with_fixed_things(rollout: Rollout, world: int, walls: int) -> Pairs:
+    """Pairs of a body and a wall, or an obstacle that an effect adds, that meet in a world; obstacles come after walls.
 
-
-def bouncing_off_fixed_things(rollout: Rollout) -> frozenset[int]:
-    """Bodies that meet a wall, or an obstacle that an effect adds, in some world."""
-    events = rollout.events
-    fixed = np.isin(events.kind, (RolloutEventKind.WALL, RolloutEventKind.OBSTACLE))
-    return frozenset(events.first[fixed].tolist())
+    Parameters
+    ----------
+    rollout, world
+        Where.
+    walls
+        Number of the walls.
+    """
+    events = rollout.events.of_world(world)
+    found: set[tuple[int, int]] = set()
+    for kind, before in ((RolloutEventKind.WALL, 0), (RolloutEventKind.OBSTACLE, walls)):
+        some = events.of_kind(kind)
+        found.update(zip(some.first.tolist(), (before + some.second).tolist(), strict=True))
+    return tuple(sorted(found))
 
 
 def courses(rollout: Rollout) -> list[Pairs]:

@@ -12,10 +12,9 @@ from vrdp_prob.inference.draws.samples import evaluate
 from vrdp_prob.inference.identifiability.information import Information
 from vrdp_prob.inference.identifiability.status import uninformed
 from vrdp_prob.inference.search.events import (
-    bouncing_off_fixed_things,
     collision_sequences,
+    contacts_with_fixed_things,
     first_contacts,
-    wall_contacts,
 )
 from vrdp_prob.inference.search.hypothesis import distances
 from vrdp_prob.inference.search.passing import close_passes
@@ -107,9 +106,10 @@ def _uninformed(likelihood: Likelihood, modes: Sequence[Mode], moving: frozenset
         uninformed(
             likelihood.tracks,
             first_contacts(rollout, world),
-            wall_contacts(rollout, world),
+            contacts_with_fixed_things(rollout, world, len(likelihood.tracks.walls)),
             Information(likelihood.coordinates, mode),
-            felt_masses(likelihood.model, moving),
+            felt=felt_masses(likelihood.model, moving),
+            obstacles=likelihood.model.obstacle_restitutions,
         )
         for world, mode in enumerate(modes)
     ]
@@ -123,6 +123,9 @@ def structure_at(
     with torch.no_grad():
         rollout = likelihood.rollout(torch.from_numpy(np.array(points)))
     colliding = frozenset(body for pairs in collision_sequences(rollout) for pair in pairs for body in pair)
-    bouncing = bouncing_off_fixed_things(rollout)
+    walls = len(likelihood.tracks.walls)
+    bouncing = frozenset(
+        body for world in range(len(points)) for body, _ in contacts_with_fixed_things(rollout, world, walls)
+    )
     passing = close_passes(likelihood.tracks, rollout.trajectory.numpy())
     return Structure(moving, colliding, bouncing, passing - colliding - bouncing)

@@ -47,6 +47,7 @@ class HiddenObstacle(Effect):
     law: ClassVar = _law()
     source: ClassVar = "contact with a body of infinite mass"
     parameters: ClassVar = _parameters()
+    obstacle_restitutions: ClassVar = (parameters[-1].name,)
 
     def start(self, place: tuple[float, float], radius: float, restitution: float) -> dict[str, float]:
         """Values of its parameters in m and 1."""
@@ -75,3 +76,4 @@ class SecondHiddenObstacle(HiddenObstacle):
     sentence: ClassVar = "Something further that cannot be seen stands in the way."
     law: ClassVar = _law("second_")
     parameters: ClassVar = _parameters("second_")
+    obstacle_restitutions: ClassVar = (parameters[-1].name,)

@@ -60,6 +60,7 @@ class Wall(Effect):
     law: ClassVar = _law()
     source: ClassVar = "contact with a body of infinite mass"
     parameters: ClassVar = _parameters()
+    obstacle_restitutions: ClassVar = (parameters[-1].name,)
 
     def start(self, distance: float, direction: float, restitution: float) -> dict[str, float]:
         """Values of its parameters in m, rad and 1."""
@@ -94,6 +95,7 @@ class SecondWall(Wall):
     sentence: ClassVar = "A further wall that cannot be seen throws bodies back."
     law: ClassVar = _law("second_")
     parameters: ClassVar = _parameters("second_")
+    obstacle_restitutions: ClassVar = (parameters[-1].name,)
 
 
 class ThirdWall(Wall):
@@ -105,6 +107,7 @@ class ThirdWall(Wall):
     sentence: ClassVar = "A further wall that cannot be seen throws bodies back."
     law: ClassVar = _law("third_")
     parameters: ClassVar = _parameters("third_")
+    obstacle_restitutions: ClassVar = (parameters[-1].name,)
 
 
 class FourthWall(Wall):
@@ -116,3 +119,4 @@ class FourthWall(Wall):
     sentence: ClassVar = "A further wall that cannot be seen throws bodies back."
     law: ClassVar = _law("fourth_")
     parameters: ClassVar = _parameters("fourth_")
+    obstacle_restitutions: ClassVar = (parameters[-1].name,)

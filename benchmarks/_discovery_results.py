@@ -9,13 +9,17 @@ from _resumable import Result
 from scipy.stats import binomtest
 
 from vrdp_prob.discovery.selection.search import gain_needed
+from vrdp_prob.inference import default_model
 from vrdp_prob.models.model_file import known_effects
 
 SURE, LIKELY = 0.9, 0.5
 REACHED = 0.95
 """Share of an effect size from which it counts as reached: the search for a strength is no finer."""
 NULLS = (Kind.NULL, Kind.ROUGH_NULL, Kind.GLIDING_NULL)
-NEEDED = gain_needed(sum(effect().follows is None for effect in known_effects().values()))
+NEEDED = gain_needed(
+    sum(effect.follows is None for effect in known_effects().values())
+    - sum(effect.follows is None for effect in default_model().effects)
+)
 """Gain (nats) without which the search names nothing, when it looks for all causes."""
 CERTAIN = 0.95
 """Probability of the intervals of parameters."""

@@ -121,7 +121,7 @@ def test_only_what_is_not_there_may_as_well_vanish() -> None:
         score = score_causes(fit, ResidualModel.of(fit), [cause], seed=0)[0]
         found = Trial((), fit).with_cause(score)
         assert found is not None
-        assert found.may_vanish(cause) is may  # a drag vanishes infinitely far away
+        assert found.may_vanish(cause, np.ones(len(fit.fits))) is may  # a drag vanishes infinitely far away
 
 
 @pytest.mark.slow

@@ -409,6 +409,26 @@ def test_a_cause_with_which_no_joint_world_can_begin_is_left_out(monkeypatch: py
 
 
 @pytest.mark.parametrize(
+    ("may_vanish", "is_doubted"),
+    [((False,), False), ((True,), True), ((True, False), False), ((True, True), True)],
+    ids=["there", "perhaps nothing", "one of two perhaps nothing", "both perhaps nothing"],
+)
+def test_what_may_as_well_be_nothing_is_not_established(may_vanish: tuple[bool, ...], is_doubted: bool) -> None:
+    names = ["tilt", "drag"][: len(may_vanish)]
+    nothing, found = _refit("", 0.0), _refit("+".join(names), 10.0)
+    nothing.causes = ()
+    found.may_vanish.side_effect = lambda cause, _divisor: may_vanish[names.index(cause)]
+    assert _refits(needed=2.0).doubted(found, nothing, np.ones(3)) is is_doubted
+
+
+def test_a_cause_that_may_be_nothing_goes_though_another_one_brings_less(monkeypatch: pytest.MonkeyPatch) -> None:
+    both, drag, tilt = _refit("tilt+drag", 10.0), _refit("drag", 5.0), _refit("tilt", 6.0)
+    monkeypatch.setattr(search._Searcher, "doubted", lambda _self, trial, lesser, _divisor: lesser is drag)
+    monkeypatch.setattr(search._Searcher, "_lesser", lambda *_given: ())
+    assert _searcher()._pruned(both, (drag, tilt), np.ones(3))[0] is drag
+
+
+@pytest.mark.parametrize(
     ("explains", "is_believed", "taken"),
     [(9.5, True, "tilt"), (9.5, False, None), (6.0, True, None)],
     ids=["as much", "as much, and doubted as well", "less"],

@@ -1,12 +1,19 @@
 """Where a fit has lost its way, single videos tell the cause."""
 
+from unittest.mock import create_autospec
+
 import pytest
 
 from tests.discovery.fitted import fitted
+from vrdp_prob.discovery.candidates import single_videos
 from vrdp_prob.discovery.candidates.single_videos import causes_of_lost_videos, lost_videos
+from vrdp_prob.inference.several_videos.fitting import SharedFit
 from vrdp_prob.models.effects.clock_error import ClockError
 from vrdp_prob.models.effects.contact_friction import ContactFriction
+from vrdp_prob.models.effects.effect import Effect
 from vrdp_prob.models.effects.material_friction import MaterialFriction
+from vrdp_prob.models.effects.pair_force import PairForce
+from vrdp_prob.models.effects.slip_to_roll import SlipToRoll
 from vrdp_prob.models.effects.surface_tilt import SurfaceTilt
 
 
@@ -14,6 +21,45 @@ def test_no_video_of_a_null_is_lost() -> None:
     _, fit = fitted(seed=1)
     assert lost_videos(fit) == []
     assert causes_of_lost_videos(fit, [], [SurfaceTilt()], {"surface_tilt"}, 6.0, seed=0) == []
+
+
+GAINS = {
+    ("contact_friction",): 5.0,
+    ("slip_to_roll",): 15.0,
+    ("pair_force",): 30.0,
+    ("surface_tilt",): 10.0,
+    ("contact_friction", "slip_to_roll"): 200.0,
+}
+"""What searches with some causes gain (nats) in each video."""
+
+
+@pytest.mark.parametrize(
+    ("explains", "told"),
+    [
+        ([("contact_friction", "slip_to_roll")], [("contact_friction", "slip_to_roll")]),
+        ([("pair_force",), ("contact_friction", "slip_to_roll")], [("pair_force",)]),
+        ([], [("pair_force",)]),
+    ],
+    ids=["two together", "one", "none"],
+)
+@pytest.mark.parametrize("lost", [[2], [2, 0, 1]])
+def test_two_causes_at_contacts_are_told_where_none_explains_a_video_alone(
+    lost: list[int], explains: list[tuple[str, ...]], told: list[tuple[str, ...]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def searched(
+        _self: object, _video: int, candidates: list[tuple[Effect, ...]]
+    ) -> list[tuple[tuple[Effect, ...], single_videos._Found]]:
+        named = [(causes, tuple(cause.name for cause in causes)) for causes in candidates]
+        return [(causes, single_videos._Found(GAINS.get(names, 0.0), names in explains)) for causes, names in named]
+
+    monkeypatch.setattr(single_videos._Searches, "with_causes", searched)
+    effects = [ContactFriction(), SlipToRoll(), PairForce(), SurfaceTilt()]
+    found = causes_of_lost_videos(
+        create_autospec(SharedFit, instance=True), lost, effects, {"surface_tilt"}, 6.0, seed=0
+    )
+    assert [tuple(cause.name for cause in causes) for causes, _ in found] == told
+    if len(told[0]) > 1:
+        assert found[0][1] == 200.0 * min(len(lost), single_videos.WITH_ALL)
 
 
 @pytest.mark.slow
@@ -24,7 +70,7 @@ def test_friction_of_contacts_is_told_by_the_videos_that_nothing_else_explains()
     assert ratios[worst] > 1.2
     effects = [SurfaceTilt(), ContactFriction(), ClockError(), MaterialFriction()]
     found = causes_of_lost_videos(fit, [worst], effects, {effect.name for effect in effects}, 6.0, seed=0)
-    assert found[0][0].name == "contact_friction"
+    assert found[0][0][0].name == "contact_friction"
     assert found[0][1] > 50
 
 

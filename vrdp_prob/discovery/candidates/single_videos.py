@@ -5,7 +5,7 @@ near it to be found, and a search from the beginning is the only way.
 """
 
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 from itertools import combinations
 from typing import NamedTuple
@@ -92,12 +92,13 @@ def causes_of_lost_videos(
 
     searches = _Searches(fit, seed)
     gains: dict[str, float] = {}
-    explained_any = False
+    best_of_all, explained_any = 0.0, False
     for rank, video in enumerate(lost[:VIDEOS]):
         found = searches.with_causes(video, [(effect,) for effect in effects])
         gains = {effect.name: one.gain + gains.get(effect.name, 0.0) for (effect,), one in found}
         explained = any(one.explains for _, one in found)
         explained_any = explained_any or explained
+        best_of_all = max(gains.values()) if rank < WITH_ALL else best_of_all
         effects = sorted((effect for (effect,), _ in found), key=lambda effect: -gains[effect.name])
         if explained or rank + 1 >= WITH_ALL:
             least = FAR_BEHIND * gains[effects[0].name]
@@ -107,7 +108,7 @@ def causes_of_lost_videos(
     ranked: list[tuple[Causes, float]] = [((effect,), gains[effect.name]) for effect in effects if effect.name in gains]
     if lost and not explained_any:
         pair = _together(searches, lost[:WITH_ALL], in_contacts)
-        if pair is not None and pair[1] > max((gain for _, gain in ranked), default=0.0) + needed:
+        if pair is not None and pair[1] > best_of_all + needed:
             return [pair]
     return [pair for pair in ranked if pair[1] > max(needed, NEARLY * ranked[0][1])][:MOST_TOLD]
 
@@ -136,6 +137,7 @@ class _Searches:
 
     fit: SharedFit
     seed: int
+    _before: dict[int, float] = field(default_factory=dict)
 
     def with_causes(self, video: int, candidates: Sequence[Causes]) -> list[tuple[Causes, _Found]]:
         """What searches with each of some causes find, until one of them explains the video.
@@ -143,8 +145,9 @@ class _Searches:
         Models are nested: a search that makes a video less probable has lost its own way, and gains nothing.
         """
         search = partial(fit_alone, self.fit.fits[video].clues.tracks, seed=self.seed, plan=IN_DOUBT)
-        before = search(self.fit.model).modes[0].log_density
-        found: list[tuple[Causes, _Found]] = []
+        if video not in self._before:
+            self._before[video] = search(self.fit.model).modes[0].log_density
+        before, found = self._before[video], list[tuple[Causes, _Found]]()
         for first in range(0, len(candidates), AT_ONCE):
             some = candidates[first : first + AT_ONCE]
             fits = in_processes(search, [self.fit.extended(*causes) for causes in some])

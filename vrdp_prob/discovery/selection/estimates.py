@@ -83,6 +83,39 @@ def widened(
     return wider if unexplained is None else wider * unexplained.shared_widening
 
 
+def may_vanish(
+    fit: SharedFit, effect: Effect, *, unexplained: Unexplained, overdispersion: Float[np.ndarray, "video"]
+) -> bool:
+    """Whether what all videos share of an effect is no further from where it vanishes than chance would have it.
+
+    It is not where that is infinitely far away, where only single videos tell, or where a strength reaches farther than
+    its Gaussian, which then says nothing of where the strength is not.
+
+    Parameters
+    ----------
+    fit
+        Fit of a model with the effect.
+    effect
+        The effect.
+    unexplained, overdispersion
+        See `estimates`.
+    """
+    joint, vanishing = fit.joint, fit.vanishing([effect])
+    strengths = [
+        (place, entry.transform, vanishing[name])
+        for place, ((name, _), entry) in enumerate(zip(joint.numbers.keys, joint.numbers.entries, strict=True))
+        if name in vanishing
+    ]
+    if not strengths or any(transform is Transform.LOG and not value for _, transform, value in strengths):
+        return False
+    sd = widened(joint.gaussian.sd, overdispersion, unexplained)
+    places = [place for place, *_ in strengths]
+    away = joint.gaussian.mean[places] - [transform.to_coordinate(value) for _, transform, value in strengths]
+    root = (sd / joint.gaussian.sd)[places, None] * joint.gaussian.root[places]
+    is_near = away @ np.linalg.solve(root @ root.T, away) < chi2.ppf(CERTAIN, len(places))
+    return bool(is_near) and not reaches(fit, vanishing, sd)
+
+
 def mass_scale_notes(effects: Iterable[Effect], videos: Iterable[Tracks]) -> Iterator[str]:
     """What limits estimates of parameters that show only as their ratio to the masses, where no mass is stated.
 

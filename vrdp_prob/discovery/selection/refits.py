@@ -249,12 +249,19 @@ class Refits:
     def doubted(self, trial: Trial, lesser: Trial, divisor: Float[np.ndarray, "video"]) -> bool:
         """Whether a cause brings too little, or in too few of the videos that could have been drawn, or may be nothing.
 
-        What a cause brings that may as well vanish, it brings by other numbers, to which it gives room.
+        What a cause brings that may as well vanish, it brings by other numbers, to which it gives room. Of several
+        causes one is enough that may not: in the end each is asked beside the others.
         """
-        if gain(trial, lesser, divisor)[0] < self.needed or any(map(trial.may_vanish, trial.beyond(lesser))):
+        if gain(trial, lesser, divisor)[0] < self.needed or self.is_nothing(trial, lesser, divisor):
             return True
         shares = weights([trial, lesser], [0.0, self.needed], np.random.default_rng(self.seed), overdispersion=divisor)
         return bool(shares[0] < ESTABLISHED)
+
+    @staticmethod
+    def is_nothing(trial: Trial, base: Trial, divisor: Float[np.ndarray, "video"]) -> bool:
+        """Whether all that a model has beyond another one may as well vanish."""
+        further = trial.beyond(base)
+        return bool(further) and all(trial.may_vanish(cause, divisor) for cause in further)
 
     def _placed(self, trial: Trial) -> list[Placed]:
         """Walls and discs that the tracks show, before any cause was found, where nothing unseen is in the model."""

@@ -274,7 +274,10 @@ class _Searcher:
         for _ in range(MOST_SWAPS):
             best, lesser = self._pruned(best, lesser, divisor)
             rivals = self._rivals(best, lesser, chain, steps)
-            better = max((one for some in rivals for one in some), key=sure, default=best)
+            others = (one for some in rivals for one in some)
+            better = max(others, key=sure, default=best)
+            if sure(better) > sure(best) and self.refits.is_nothing(better, best, divisor):
+                better = best
             if sure(better) <= sure(best):
                 break
             best, lesser = better, self._lesser(better, better.causes)
@@ -289,8 +292,11 @@ class _Searcher:
     def _pruned(
         self, best: Trial, lesser: tuple[Trial, ...], divisor: Float[np.ndarray, "video"]
     ) -> tuple[Trial, tuple[Trial, ...]]:
-        while lesser and self.doubted(best, weakest := max(lesser, key=partial(_sure, divisor=divisor)), divisor):
-            best, lesser = weakest, self._lesser(weakest, weakest.causes)
+        weakest_first = partial(sorted, key=partial(_sure, divisor=divisor), reverse=True)
+        while (
+            left := next((one for one in weakest_first(lesser) if self.doubted(best, one, divisor)), None)
+        ) is not None:
+            best, lesser = left, self._lesser(left, left.causes)
         return best, lesser
 
     def unpatched(self, best: Trial) -> Trial:

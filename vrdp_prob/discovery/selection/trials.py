@@ -7,7 +7,6 @@ from functools import cached_property
 
 import numpy as np
 from jaxtyping import Float
-from scipy.stats import chi2
 
 from vrdp_prob.discovery.candidates.kicked_at_contact import kicked_at_contact
 from vrdp_prob.discovery.candidates.scores import CauseScore, happens_once
@@ -16,13 +15,14 @@ from vrdp_prob.discovery.finding import HeldOut
 from vrdp_prob.discovery.residuals.held_out import Cavity, cavities
 from vrdp_prob.discovery.residuals.jitter import alike_in_neighbours
 from vrdp_prob.discovery.residuals.unexplained import Unexplained, unexplained
+from vrdp_prob.discovery.selection.estimates import may_vanish
 from vrdp_prob.discovery.selection.forecast import held_out
 from vrdp_prob.inference.several_videos.ascent import Effort, ImpossibleStartError
 from vrdp_prob.inference.several_videos.fitting import Owned, SharedFit
 from vrdp_prob.inference.several_videos.population import own_parameters, with_learned_population
 from vrdp_prob.inference.several_videos.second_look import MOST
 from vrdp_prob.models.effects.effect import Effect
-from vrdp_prob.models.parameters import Parameter, Scope, Transform
+from vrdp_prob.models.parameters import Parameter, Scope
 from vrdp_prob.models.physics import PhysicsModel
 
 EACH_PARAMETER = 1.0
@@ -43,8 +43,6 @@ PATCHED = 0.5
 explains none of them."""
 MOVED = 1e-3
 """Probability that lateness of neighbouring frames is so much alike by chance, below which it is none."""
-CERTAIN = 0.95
-"""Probability of the region of strengths in which those must not be at which a cause vanishes."""
 FELL = 5.0
 """Nats by which a video may be less probable with one more cause; beyond that it has lost its course of events."""
 
@@ -112,9 +110,9 @@ class Trial:
 
     @property
     def lacking(self) -> float:
-        """What a model would bring (nats) that leaves nothing but noise, where all that this one leaves is noise."""
-        fits = self.fit.fits
-        return sum(2.0 * float(one.clues.tracks.seen.sum()) * max(math.log(one.misfit.ratio), 0.0) for one in fits)
+        """What a model would bring (nats) that explains all lost videos, where all that this one leaves is noise."""
+        lost = [one for one in self.fit.fits if one.misfit.ratio > LOST]
+        return sum(2.0 * float(one.clues.tracks.seen.sum()) * math.log(one.misfit.ratio) for one in lost)
 
     @property
     def log_prior(self) -> float:
@@ -130,23 +128,9 @@ class Trial:
         """The causes that it has beyond those of another model."""
         return tuple(cause for cause in self.causes if cause not in base.causes)
 
-    def may_vanish(self, cause: Effect) -> bool:
-        """Whether what all videos share of a cause is no further from where it vanishes than chance would have it.
-
-        It is not where that is infinitely far away, or a matter of single videos.
-        """
-        joint, vanishing = self.fit.joint, self.fit.vanishing([cause])
-        strengths = [
-            (place, entry.transform, vanishing[name])
-            for place, ((name, _), entry) in enumerate(zip(joint.numbers.keys, joint.numbers.entries, strict=True))
-            if name in vanishing
-        ]
-        if not strengths or any(transform is Transform.LOG and not value for _, transform, value in strengths):
-            return False
-        places = [place for place, *_ in strengths]
-        away = joint.gaussian.mean[places] - [transform.to_coordinate(value) for _, transform, value in strengths]
-        root = joint.gaussian.root[places]
-        return bool(away @ np.linalg.solve(root @ root.T, away) < chi2.ppf(CERTAIN, len(places)))
+    def may_vanish(self, cause: Effect, overdispersion: Float[np.ndarray, "video"]) -> bool:
+        """Whether the strength of a cause may as well be nothing, see `estimates.may_vanish`."""
+        return may_vanish(self.fit, cause, unexplained=self.unexplained, overdispersion=overdispersion)
 
     def with_cause(self, score: CauseScore) -> "Trial | None":
         """The fit with one more cause, from what its score says of it; None where no world can begin there."""

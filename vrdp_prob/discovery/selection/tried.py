@@ -48,6 +48,8 @@ def _tried(found: Search, trial: Trial, seed: int) -> TriedCause:
         why = "it gains too little"
     elif probability < ESTABLISHED:
         why = "too few videos speak for it"
+    elif trial.may_vanish(cause, found.overdispersion):
+        why = "its strength may as well be nothing"
     else:
         why = "what it leaves unexplained outweighs its gain"
     return TriedCause(cause.cause_name(), difference, error, found.needed, probability, ESTABLISHED, why, cause.way())

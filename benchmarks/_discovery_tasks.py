@@ -9,6 +9,7 @@ import _project  # noqa: F401  the generator belongs to the tests, which lie bes
 
 from tests.discovery.causes import CATALOGUE, VARIANTS
 from tests.discovery.data_set import DataSet
+from tests.discovery.hidden import MET_OFTEN
 from tests.discovery.other_effects import OTHERS
 from tests.discovery.scenes import Setting
 from vrdp_prob import load_all
@@ -116,7 +117,12 @@ def tasks(
     pairs = [pair for pair in PAIRS if chosen.issuperset(pair)]
     rounds: list[list[Task]] = []
     for seed in range(1, seeds + 1):
-        found = [Task(Kind.ONE, (way,), size, seed) for size in sorted(sizes, reverse=True) for way in single]
+        found = [
+            Task(Kind.ONE, (way,), size, seed)
+            for size in sorted(sizes, reverse=True)
+            for way in single
+            if size == max(sizes) or way not in MET_OFTEN  # which never leave little
+        ]
         found += [Task(Kind.TWO, pair, TOGETHER, seed) for pair in pairs]
         found += [Task(Kind.OUTSIDE, (way,), STRONG, seed) for way in OTHERS if way in chosen]
         if seed == 1:

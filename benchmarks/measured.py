@@ -93,8 +93,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     text = "\n".join([*_findings(results, tasks), *_recovered(results, tasks)])
     publish(text, "measured-data.md", {"results": results}, options)
     if options.docs:
-        for name in (name for name, task in tasks.items() if task.way is None):
-            copy_figures(options.results / name, options.docs, f"measured-{name}")
+        for task in (one for one in tasks.values() if one.way is None):
+            copy_figures(options.results / task.name, options.docs, f"measured-{task.name}")
     return 0
 
 

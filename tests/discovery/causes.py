@@ -33,7 +33,7 @@ class Cause:
     most
         Strength beyond which it is no longer a small effect; the search for a strength ends there.
     least
-        Strength at which it is gone or hardly there.
+        Smallest strength that is tried, at which it is gone or hardly there where nothing else is said.
     catalogued
         Whether the catalogue has it.
     placed
@@ -165,13 +165,13 @@ def wall(videos: Videos, strength: float, generator: np.random.Generator) -> Vid
 
 
 def obstacle_met_often(videos: Videos, strength: float, generator: np.random.Generator) -> Videos:
-    """Strength: radius in m of a disc where many bodies pass."""
+    """Strength: radius in m of a disc where many bodies pass; none is so small that it leaves little."""
     disc = places.in_many_ways(videos, strength, generator)
     return tuple(replace(v, hidden_discs=(*v.hidden_discs, disc)) for v in videos)
 
 
 def wall_met_often(videos: Videos, strength: float, generator: np.random.Generator) -> Videos:
-    """Strength: how far in m a wall cuts off the region that bodies would reach, where many of them go."""
+    """Strength: how far in m a wall cuts off the region that bodies would reach, where many go; it never leaves little."""
     walls = places.cutting_many(videos, strength, generator)
     return tuple(replace(v, hidden_walls=(*v.hidden_walls, *walls)) for v in videos)
 

@@ -171,7 +171,7 @@ def obstacle_met_often(videos: Videos, strength: float, generator: np.random.Gen
 
 
 def wall_met_often(videos: Videos, strength: float, generator: np.random.Generator) -> Videos:
-    """Strength: how far in m a wall cuts off the region that bodies would reach, where many go; it never leaves little."""
+    """Strength: how far in m a wall cuts off the region that bodies reach, where many go; it never leaves little."""
     walls = places.cutting_many(videos, strength, generator)
     return tuple(replace(v, hidden_walls=(*v.hidden_walls, *walls)) for v in videos)
 

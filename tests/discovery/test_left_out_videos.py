@@ -114,6 +114,15 @@ def test_errors_are_compared_video_by_video() -> None:
     assert not error_ratios(predicted(None, None), predicted(0.5, 0.5))
 
 
+def test_a_model_lacks_what_would_explain_its_lost_videos() -> None:
+    _, fit = fitted(seed=1)
+    assert Trial((), fit).lacking == 0
+    strayed, *others = fit.fits
+    worse = replace(strayed, misfit=replace(strayed.misfit, residual_sd=3.0 * strayed.misfit.noise_sd))
+    count = strayed.clues.tracks.seen.sum()
+    assert Trial((), replace(fit, fits=(worse, *others))).lacking == pytest.approx(2 * count * np.log(3.0))
+
+
 def test_only_what_is_not_there_may_as_well_vanish() -> None:
     _, null = fitted(seed=1)
     _, tilted = fitted("surface_tilt", 3.0, seed=2)

@@ -10,7 +10,7 @@ from jaxtyping import Float
 
 from vrdp_prob.discovery.candidates.kicked_at_contact import kicked_at_contact
 from vrdp_prob.discovery.candidates.scores import CauseScore, happens_once
-from vrdp_prob.discovery.candidates.single_videos import LOST
+from vrdp_prob.discovery.candidates.single_videos import LOST, lost_videos
 from vrdp_prob.discovery.finding import HeldOut
 from vrdp_prob.discovery.residuals.held_out import Cavity, cavities
 from vrdp_prob.discovery.residuals.jitter import alike_in_neighbours
@@ -111,7 +111,7 @@ class Trial:
     @property
     def lacking(self) -> float:
         """What a model would bring (nats) that explains all lost videos, where all that this one leaves is noise."""
-        lost = [one for one in self.fit.fits if one.misfit.ratio > LOST]
+        lost = [self.fit.fits[index] for index in lost_videos(self.fit)]
         return sum(2.0 * float(one.clues.tracks.seen.sum()) * math.log(one.misfit.ratio) for one in lost)
 
     @property

@@ -364,6 +364,16 @@ def test_kicks_are_no_measure_of_laws(monkeypatch: pytest.MonkeyPatch) -> None:
     assert [one.effect for one in refits._shortlist(scores, 0.8)] == ["kicks", "patch"]
 
 
+@pytest.mark.parametrize(("sixth", "refitted"), [(96.0, 6), (94.0, 5)])
+def test_causes_that_score_as_well_as_the_last_that_is_refitted_are_refitted_too(
+    sixth: float, refitted: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(refits, "happens_once", lambda _cause: False)
+    sizes = [300.0, 200.0, 150.0, 110.0, 100.0, sixth, 60.0]
+    scores = [Mock(spec=refits.CauseScore, effect=f"cause {size}", size=size, p_value=0.0) for size in sizes]
+    assert len(refits._shortlist(scores)) == refitted
+
+
 @pytest.mark.parametrize(
     ("before", "brought", "is_tried"),
     [((), 1.0, True), ((), 9.0, False), (("tilt",), 1.0, False)],

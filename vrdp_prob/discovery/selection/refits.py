@@ -35,8 +35,8 @@ HOPEFUL = 0.2
 """Share of the largest statistic (see `_shortlist`) below which a cause cannot be the best one, nor a rival of it."""
 TRIFLE = 0.05
 """Share of any statistic, also of what happens once in a video, below which nothing is refitted."""
-MOST_REFITTED = 5
-"""Causes that are refitted, at most."""
+MOST_REFITTED, ALIKE = 5, 0.95
+"""Causes that are refitted at most, but for those whose statistic is this share of that of the last one at least."""
 ESTABLISHED = 0.8
 """Probability that a cause must have beside the model without it."""
 PLAIN_TURNS = 4
@@ -408,4 +408,6 @@ def _shortlist(scores: Sequence[CauseScore], share: float = HOPEFUL) -> list[Cau
     likely.sort(key=lambda one: -one.size)
     lasting = [one for one in likely if not happens_once(one.effect)]
     compared = [(one, lasting if one in lasting else likely) for one in likely]
-    return [one for one, others in compared if one.size > share * others[0].size][:MOST_REFITTED]
+    chosen = [one for one, others in compared if one.size > share * others[0].size]
+    least = ALIKE * chosen[MOST_REFITTED - 1].size if len(chosen) > MOST_REFITTED else 0.0
+    return [one for one in chosen if one.size >= least]

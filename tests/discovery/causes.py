@@ -11,8 +11,8 @@ import numpy as np
 
 from tests.discovery import places
 from tests.discovery.scenes import MATERIALS, ROLLING
-from tests.discovery.videos import Video
-from vrdp_prob.scene import Shape
+from tests.discovery.videos import Disc, Video
+from vrdp_prob.scene import Shape, Wall
 
 Videos = tuple[Video, ...]
 Hide = Callable[[Videos, float, np.random.Generator], Videos]
@@ -52,6 +52,16 @@ class Cause:
 def governed(videos: Videos, **numbers: float) -> Videos:
     """All videos with other numbers in their laws."""
     return tuple(video.governed_by(**numbers) for video in videos)
+
+
+def with_disc(videos: Videos, disc: Disc) -> Videos:
+    """All videos with a further disc that nobody sees."""
+    return tuple(replace(video, hidden_discs=(*video.hidden_discs, disc)) for video in videos)
+
+
+def with_walls(videos: Videos, walls: tuple[Wall, ...]) -> Videos:
+    """All videos with further walls that nobody sees."""
+    return tuple(replace(video, hidden_walls=(*video.hidden_walls, *walls)) for video in videos)
 
 
 def direction(generator: np.random.Generator) -> tuple[float, float]:
@@ -154,26 +164,22 @@ def speed_dependent_restitution(videos: Videos, strength: float, generator: np.r
 
 def hidden_obstacle(videos: Videos, strength: float, generator: np.random.Generator) -> Videos:
     """Strength: how far in m a disc reaches into the place where some body would have ended, square on its way."""
-    disc = places.in_the_way(videos, strength, generator)
-    return tuple(replace(v, hidden_discs=(*v.hidden_discs, disc)) for v in videos)
+    return with_disc(videos, places.in_the_way(videos, strength, generator))
 
 
 def wall(videos: Videos, strength: float, generator: np.random.Generator) -> Videos:
     """Strength: how far in m one wall, or two, cut off the region that bodies would reach."""
-    walls = places.cutting_off(videos, strength, generator)
-    return tuple(replace(v, hidden_walls=(*v.hidden_walls, *walls)) for v in videos)
+    return with_walls(videos, places.cutting_off(videos, strength, generator))
 
 
 def obstacle_met_often(videos: Videos, strength: float, generator: np.random.Generator) -> Videos:
     """Strength: radius in m of a disc where many bodies pass; none is so small that it leaves little."""
-    disc = places.in_many_ways(videos, strength, generator)
-    return tuple(replace(v, hidden_discs=(*v.hidden_discs, disc)) for v in videos)
+    return with_disc(videos, places.in_many_ways(videos, strength, generator))
 
 
 def wall_met_often(videos: Videos, strength: float, generator: np.random.Generator) -> Videos:
     """Strength: how far in m a wall cuts off the region that bodies reach, where many go; it never leaves little."""
-    walls = places.cutting_many(videos, strength, generator)
-    return tuple(replace(v, hidden_walls=(*v.hidden_walls, *walls)) for v in videos)
+    return with_walls(videos, places.cutting_many(videos, strength, generator))
 
 
 def external_impulse(videos: Videos, strength: float, generator: np.random.Generator) -> Videos:

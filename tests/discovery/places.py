@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
+from jaxtyping import Float
 
 from tests.discovery.videos import Disc, Video
 from vrdp_prob.scene import Wall
@@ -142,17 +143,21 @@ def _disc(middle: np.ndarray, radius: float) -> Disc:
 
 
 def _clear(video: Video, disc: Disc) -> bool:
-    apart = np.linalg.norm(video.position - (disc.x, disc.y), axis=1)
-    return bool((apart > disc.radius + 1.5 * video.radius + ROOM).all())
+    return bool((_apart(video.position, disc) > disc.radius + 1.5 * video.radius + ROOM).all())
 
 
 def _passing(video: Video, disc: Disc) -> int:
     """How often a body is seen where the disc would be."""
-    apart = np.linalg.norm(video.motion.states[..., :2] - (disc.x, disc.y), axis=-1)
-    return int((apart < disc.radius + video.radius - 1e-6).sum())
+    return int((_apart(video.motion.states[..., :2], disc) < disc.radius + video.radius - 1e-6).sum())
 
 
 def _meeting(video: Video, disc: Disc) -> int:
     """How many bodies are seen where the disc would be."""
-    apart = np.linalg.norm(video.motion.states[..., :2] - (disc.x, disc.y), axis=-1)
-    return int((video.in_view & (apart < disc.radius + video.radius)).any(axis=0).sum())
+    near = _apart(video.motion.states[..., :2], disc) < disc.radius + video.radius
+    return int((video.in_view & near).any(axis=0).sum())
+
+
+def _apart(positions: Float[np.ndarray, "*batch 2"], disc: Disc) -> Float[np.ndarray, "*batch"]:
+    """Distances in m of places from the middle of a disc."""
+    distances: np.ndarray = np.linalg.norm(positions - (disc.x, disc.y), axis=-1)
+    return distances

@@ -292,12 +292,16 @@ class _Searcher:
     def _pruned(
         self, best: Trial, lesser: tuple[Trial, ...], divisor: Float[np.ndarray, "video"]
     ) -> tuple[Trial, tuple[Trial, ...]]:
-        weakest_first = partial(sorted, key=partial(_sure, divisor=divisor), reverse=True)
-        while (
-            left := next((one for one in weakest_first(lesser) if self.doubted(best, one, divisor)), None)
-        ) is not None:
+        while (left := self._without_doubted(best, lesser, divisor)) is not None:
             best, lesser = left, self._lesser(left, left.causes)
         return best, lesser
+
+    def _without_doubted(
+        self, best: Trial, lesser: Sequence[Trial], divisor: Float[np.ndarray, "video"]
+    ) -> Trial | None:
+        """A model without the weakest of its causes that are not established; None where all are."""
+        weakest_first = sorted(lesser, key=partial(_sure, divisor=divisor), reverse=True)
+        return next((one for one in weakest_first if self.doubted(best, one, divisor)), None)
 
     def unpatched(self, best: Trial) -> Trial:
         """A model without those of its causes that patch several videos and explain few of them."""

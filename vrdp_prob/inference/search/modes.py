@@ -11,11 +11,7 @@ from vrdp_prob.inference.draws.mode import Mode
 from vrdp_prob.inference.draws.samples import evaluate
 from vrdp_prob.inference.identifiability.information import Information
 from vrdp_prob.inference.identifiability.status import uninformed
-from vrdp_prob.inference.search.events import (
-    collision_sequences,
-    contacts_with_fixed_things,
-    first_contacts,
-)
+from vrdp_prob.inference.search.events import collision_sequences, contacts_with_fixed_things, first_contacts
 from vrdp_prob.inference.search.hypothesis import distances
 from vrdp_prob.inference.search.passing import close_passes
 from vrdp_prob.inference.search.refinement import Refined, best_first, mode_at

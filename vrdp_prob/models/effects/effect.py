@@ -135,8 +135,6 @@ class Effect:
     """Whether its laws read `vrdp_prob.models.parameters.VIDEO_START` beside their parameters."""
     stepwise: ClassVar[frozenset[str]] = frozenset()
     """Parameters on which the motion depends in steps, without a slope: they are found by a scan, and held there."""
-    obstacle_restitutions: ClassVar[tuple[str, ...]] = ()
-    """Names of the parameters that are the restitutions of its `obstacles`, in their order."""
     least_start: ClassVar[Mapping[str, float]] = {}
     """Values of parameters below which no refit begins, where the motion has no slope beyond."""
 
@@ -257,6 +255,11 @@ class Effect:
 
     def obstacles(self, parameters: Mapping[str, Float[Tensor, "..."]]) -> Sequence[Obstacle]:
         """Fixed discs and straight walls that the effect adds to a scene."""
+        return ()
+
+    @property
+    def obstacle_restitutions(self) -> tuple[str, ...]:
+        """Names of the parameters that are the restitutions of its `obstacles`, in their order."""
         return ()
 
     def contact_radius(

@@ -47,7 +47,6 @@ class HiddenObstacle(Effect):
     law: ClassVar = _law()
     source: ClassVar = "contact with a body of infinite mass"
     parameters: ClassVar = _parameters()
-    obstacle_restitutions: ClassVar = (parameters[-1].name,)
 
     def start(self, place: tuple[float, float], radius: float, restitution: float) -> dict[str, float]:
         """Values of its parameters in m and 1."""
@@ -61,6 +60,11 @@ class HiddenObstacle(Effect):
     def unmet(self, videos: Sequence[Tracks]) -> Mapping[str, Unmet]:
         """A disc is met by all that pass within its radius."""
         return {self.parameters[2].name: largest_disc(videos)}
+
+    @property
+    def obstacle_restitutions(self) -> tuple[str, ...]:
+        """Its one restitution."""
+        return (self.parameters[-1].name,)
 
     def obstacles(self, parameters: Mapping[str, Float[Tensor, "..."]]) -> Sequence[Obstacle]:
         """The disc."""
@@ -76,4 +80,3 @@ class SecondHiddenObstacle(HiddenObstacle):
     sentence: ClassVar = "Something further that cannot be seen stands in the way."
     law: ClassVar = _law("second_")
     parameters: ClassVar = _parameters("second_")
-    obstacle_restitutions: ClassVar = (parameters[-1].name,)

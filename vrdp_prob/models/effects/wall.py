@@ -60,7 +60,6 @@ class Wall(Effect):
     law: ClassVar = _law()
     source: ClassVar = "contact with a body of infinite mass"
     parameters: ClassVar = _parameters()
-    obstacle_restitutions: ClassVar = (parameters[-1].name,)
 
     def start(self, distance: float, direction: float, restitution: float) -> dict[str, float]:
         """Values of its parameters in m, rad and 1."""
@@ -73,6 +72,11 @@ class Wall(Effect):
     def unmet(self, videos: Sequence[Tracks]) -> Mapping[str, Unmet]:
         """No path goes through a wall."""
         return {self.parameters[0].name: deepest_wall(videos)}
+
+    @property
+    def obstacle_restitutions(self) -> tuple[str, ...]:
+        """Its one restitution."""
+        return (self.parameters[-1].name,)
 
     def obstacles(self, parameters: Mapping[str, Float[Tensor, "..."]]) -> Sequence[Obstacle]:
         """The wall."""
@@ -95,7 +99,6 @@ class SecondWall(Wall):
     sentence: ClassVar = "A further wall that cannot be seen throws bodies back."
     law: ClassVar = _law("second_")
     parameters: ClassVar = _parameters("second_")
-    obstacle_restitutions: ClassVar = (parameters[-1].name,)
 
 
 class ThirdWall(Wall):
@@ -107,7 +110,6 @@ class ThirdWall(Wall):
     sentence: ClassVar = "A further wall that cannot be seen throws bodies back."
     law: ClassVar = _law("third_")
     parameters: ClassVar = _parameters("third_")
-    obstacle_restitutions: ClassVar = (parameters[-1].name,)
 
 
 class FourthWall(Wall):
@@ -119,4 +121,3 @@ class FourthWall(Wall):
     sentence: ClassVar = "A further wall that cannot be seen throws bodies back."
     law: ClassVar = _law("fourth_")
     parameters: ClassVar = _parameters("fourth_")
-    obstacle_restitutions: ClassVar = (parameters[-1].name,)

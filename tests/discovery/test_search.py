@@ -187,6 +187,28 @@ def test_of_several_walls_at_once_none_is_a_merit_of_a_better_course(monkeypatch
     walls.without.assert_called_once_with("wall", "second_wall")
 
 
+@pytest.mark.parametrize("course_alone", [True, False], ids=["the course alone", "the cause, too"])
+def test_a_course_found_beside_a_cause_is_that_of_the_model_without_it_too(
+    *, course_alone: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Where the course is all that the cause has brought, the search goes on without it."""
+    plain, friction = _refit("", 0.0), _refit("friction", 20.0)
+    plain.causes = ()
+    found, mended = _refit("friction", 60.0), _refit("", 59.0 if course_alone else 40.0)
+    mended.causes = ()
+    chosen = {plain: (plain, friction), friction: (found, None), found: (found, None), mended: (mended, None)}
+    monkeypatch.setattr(search._Searcher, "tried", lambda self, trial: self.untried(trial))
+    monkeypatch.setattr(search._Searcher, "chosen", lambda _self, trial, _step: chosen[trial])
+    monkeypatch.setattr(search._Searcher, "_left_out", lambda _self, _trial, *_causes: mended)
+    monkeypatch.setattr(refits.Refits, "left", lambda _self, _trial: refits.Left((), (), np.ones(3)))
+    monkeypatch.setattr(
+        refits.Refits, "doubted", lambda self, one, other, _by: search.gain(one, other)[0] < self.needed
+    )
+    chain, steps = _searcher(needed=6.0).forward(plain)
+    assert chain == ([mended] if course_alone else [mended, found])
+    assert len(steps) == len(chain)
+
+
 @pytest.mark.parametrize("enough", [True, False], ids=["enough", "too little"])
 @pytest.mark.parametrize("refitted", [True, False], ids=["refitted before", "not refitted"])
 def test_lost_videos_are_searched_once_and_refits_made_only_where_that_leaves_something(

@@ -6,8 +6,9 @@ import pytest
 
 from tests.discovery.fitted import fitted
 from vrdp_prob.discovery.candidates import single_videos
-from vrdp_prob.discovery.candidates.single_videos import causes_of_lost_videos, lost_videos
+from vrdp_prob.discovery.candidates.single_videos import causes_of_lost_videos
 from vrdp_prob.inference.several_videos.fitting import SharedFit
+from vrdp_prob.inference.several_videos.second_look import lost_videos
 from vrdp_prob.models.effects.clock_error import ClockError
 from vrdp_prob.models.effects.contact_friction import ContactFriction
 from vrdp_prob.models.effects.effect import Effect
@@ -19,7 +20,7 @@ from vrdp_prob.models.effects.surface_tilt import SurfaceTilt
 
 def test_no_video_of_a_null_is_lost() -> None:
     _, fit = fitted(seed=1)
-    assert lost_videos(fit) == []
+    assert lost_videos(fit.fits) == []
     assert causes_of_lost_videos(fit, [], [SurfaceTilt()], {"surface_tilt"}, 6.0, seed=0) == []
 
 

@@ -32,6 +32,8 @@ STRENGTHS = {
     "contact_friction": (0, 0.5),
     "wall_friction": (0, 0.5),
     "slip_friction": (0.1, 0.4),
+    "pair_strength": (-0.02, 0.02),
+    "pair_softening": (0.05, 0.2),
 }
 SLIPPING = EXTENDED.with_effect(SlipToRoll())
 MODELS = {"base": PhysicsModel.base(), "extended": EXTENDED, "slipping": SLIPPING}

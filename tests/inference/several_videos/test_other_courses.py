@@ -5,6 +5,7 @@ from unittest.mock import Mock, create_autospec
 import pytest
 
 from tests.inference.several_videos.videos import sliding
+from vrdp_prob.inference.map_fit import MapFit
 from vrdp_prob.inference.several_videos import fitting, second_look
 from vrdp_prob.inference.several_videos.fitting import SharedFit, fit_together
 from vrdp_prob.models.parameters import SLIDING_FRICTION
@@ -38,3 +39,32 @@ def test_where_nobody_is_trusted_nothing_is_told(monkeypatch: pytest.MonkeyPatch
     assert told().beliefs["sliding_friction"].prior.sd < 0.5 * SLIDING_FRICTION.prior.sd
     monkeypatch.setattr(second_look, "trusted", lambda fits: [index != 1 for index in range(len(fits))])
     assert told() is fit.model
+
+
+@pytest.mark.parametrize(
+    ("ratios", "worst"),
+    [
+        ([1.0, 1.3, 0.9, 1.0, 1.1, 1.0], [1]),
+        ([1.0, 4.0, 0.9, 1.3, 1.1, 1.0], [1]),
+        ([3.0, 3.0, 3.1, 3.3, 3.2, 2.9], [3, 4, 2]),
+        ([1.0, 1.1, 0.9, 1.0, 1.1, 1.0], []),
+    ],
+    ids=["a lost one", "one far worse than the others first", "half of them", "none"],
+)
+def test_the_worst_of_the_lost_videos_are_searched(ratios: list[float], worst: list[int]) -> None:
+    clues = Mock(tracks=Mock(bodies=("", "")))
+    fits = [Mock(spec=MapFit, misfit=Mock(ratio=ratio), clues=clues) for ratio in ratios]
+    assert second_look.worst_videos(fits) == worst
+
+
+@pytest.mark.parametrize(("better", "searches"), [(0, 1), (1, 2), (5, 3)])
+def test_lost_videos_are_searched_as_long_as_that_finds_more(
+    better: int, searches: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(fitting, "worst_videos", lambda _fits: [2])
+    chain = [_fit(float(number)) for number in range(better + 1)]
+    for one, after in zip(chain, [*chain[1:], chain[-1]], strict=True):
+        one.mended.return_value = after
+    assert SharedFit.with_lost_courses(chain[0], seed=5) is chain[min(better, 3)]
+    asked = [call for one in chain for call in one.mended.call_args_list]
+    assert [(call.args, call.kwargs["seed"]) for call in asked] == [(([2],), 5 + k) for k in range(searches)]

@@ -15,12 +15,9 @@ from vrdp_prob.inference.runs.parallel import in_processes
 from vrdp_prob.inference.search.plan import IN_DOUBT
 from vrdp_prob.inference.several_videos.fitting import SharedFit
 from vrdp_prob.inference.several_videos.parts import fit_alone
-from vrdp_prob.inference.several_videos.second_look import may_take_another_course
 from vrdp_prob.models.effects.effect import Effect
 from vrdp_prob.models.parameters import Scope
 
-LOST = 1.2
-"""Residuals in units of the noise from which a video may be lost."""
 VIDEOS, WITH_ALL, SECOND_LOOKS = 4, 2, 4
 """Lost videos that are looked at, those of them that are searched with every cause, and causes, the best first, with
 which the others are."""
@@ -44,13 +41,6 @@ AT_ONCE = 4
 
 Causes = tuple[Effect, ...]
 """Causes that act together."""
-
-
-def lost_videos(fit: SharedFit) -> list[int]:
-    """Videos that may have taken the wrong course of events, the worst first."""
-    ratios = [part.misfit.ratio for part in fit.fits]
-    order = sorted(range(len(ratios)), key=lambda index: -ratios[index])
-    return [index for index in order if ratios[index] > LOST and may_take_another_course(fit.fits[index])]
 
 
 def causes_of_lost_videos(

@@ -9,7 +9,7 @@ from jaxtyping import Float
 
 from vrdp_prob.discovery.candidates.proposals import hidden_things
 from vrdp_prob.discovery.candidates.scores import CauseScore, happens_once, score_causes
-from vrdp_prob.discovery.candidates.single_videos import causes_of_lost_videos, lost_videos
+from vrdp_prob.discovery.candidates.single_videos import causes_of_lost_videos
 from vrdp_prob.discovery.candidates.surfaces import Placed, as_stated, placed_surfaces
 from vrdp_prob.discovery.checks.battery import run_checks
 from vrdp_prob.discovery.finding import Check
@@ -21,7 +21,7 @@ from vrdp_prob.inference.runs.parallel import in_processes
 from vrdp_prob.inference.several_videos.ascent import ImpossibleStartError
 from vrdp_prob.inference.several_videos.fitting import SharedFit, fit_together
 from vrdp_prob.inference.several_videos.learned import with_learned_walls
-from vrdp_prob.inference.several_videos.second_look import MOST, explained, may_take_another_course
+from vrdp_prob.inference.several_videos.second_look import MOST, explained, lost_videos, may_take_another_course
 from vrdp_prob.models.effects.effect import Effect
 from vrdp_prob.models.effects.external_impulse import ExternalImpulse
 from vrdp_prob.progress import Advance
@@ -178,7 +178,7 @@ class Refits:
         found = one
         for _ in range(MENDINGS):
             kicked = [site.video for score in self.left(found).scores for site in score.sites if _kicks(score)]
-            videos = list(dict.fromkeys([*lost_videos(found.fit), *kicked]))
+            videos = list(dict.fromkeys([*lost_videos(found.fit.fits), *kicked]))
             before, few = found, len(videos) <= len(one.fit.fits) // MOST
             found = self.searched_anew(found, videos) if few else found
             if found is before:
@@ -228,9 +228,9 @@ class Refits:
         left = self.further(trial)
         likely = {one.effect.name for one in _shortlist(self.left(trial).scores)}
         reached = {one.causes[-1].name: one.brought(trial) for one in reversed(found)}
-        best = next((one.fit for one in found if not _mends_several(one)), trial.fit)
+        best = next((one.fit.fits for one in found if not _mends_several(one)), trial.fit.fits)
         still_lost = lost_videos(best)
-        lost = [one for one in lost_videos(trial.fit) if one in still_lost]
+        lost = [one for one in lost_videos(trial.fit.fits) if one in still_lost]
         told = causes_of_lost_videos(trial.fit, lost, left, likely, self.needed, seed=self.seed)
         again = [causes for causes, promised in told if len(causes) > 1 or reached.get(causes[0].name, 0.0) < promised]
         return [one for causes in again if (one := self._searched_with(trial, causes)) is not None]
@@ -275,7 +275,8 @@ class Refits:
         A fit without them has lost its way at the first that a body met, so that scores call for what mends its course.
         Walls count as stated until a fit is found, and positions are less certain by how far off these may be: twelve
         numbers more for four walls make every search longer, and walls that are a little off explain no track. None
-        where videos have no world in common, or a wall overlaps what is seen.
+        where videos have no world in common, or a wall overlaps what is seen. Lost videos are searched anew before
+        anything is learned of what bodies may be: what misleads them teaches wrong things.
         """
         tracks = [part.clues.tracks for part in trial.fit.fits]
         walls = [one for one in placed if one.wall is not None]
@@ -285,7 +286,7 @@ class Refits:
             return None
 
         def fitted() -> SharedFit:
-            first = model = trial.fit.model
+            first = model = trial.with_stated_population(trial.fit.model)
             for one in placed:
                 model = model.with_effect(one.effect, tracks)
                 if one.wall is None:
@@ -296,7 +297,8 @@ class Refits:
             start = {name: value for one in placed for name, value in one.start.items()}
             for one, wall in zip(walls, told, strict=True):
                 start |= {} if wall.restitution is None else {one.effect.parameters[-1].name: wall.restitution}
-            return fit.of_tracks(tracks).under(model, start=start, effort=FIRST, model_error=False)
+            freed = fit.of_tracks(tracks).under(model, start=start, effort=FIRST, model_error=False)
+            return freed.with_lost_courses(seed=self.seed)
 
         return self._began_anew(trial, [one.effect for one in placed], fitted)
 

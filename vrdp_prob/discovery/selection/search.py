@@ -12,7 +12,7 @@ from vrdp_prob.discovery.selection.refits import HOPEFUL, Left, Refits, lasting,
 from vrdp_prob.discovery.selection.trials import Trial, gain, with_own_population
 from vrdp_prob.inference.runs.parallel import in_processes
 from vrdp_prob.inference.several_videos.fitting import SharedFit
-from vrdp_prob.inference.several_videos.second_look import doubtful
+from vrdp_prob.inference.several_videos.second_look import doubtful, explained
 from vrdp_prob.models.effects.effect import Effect
 from vrdp_prob.models.effects.external_impulse import ExternalImpulse
 from vrdp_prob.progress import ProgressDisplay, SilentProgress
@@ -147,20 +147,10 @@ def search(
     needed = gain_needed(sum(effect.follows is None for effect in catalogue))
     with (progress or SilentProgress()).stage("Trying causes", total=None) as advance:
         searcher = _Searcher(Refits(tuple(catalogue), seed, needed, advance))
-        chain = [Trial((), with_own_population(fit), stated=fit.model.beliefs).continued()]
-        steps = [searcher.untried(chain[0])]
-        while len(chain) <= MOST_CAUSES:
-            step = steps[-1] = searcher.tried(chain[-1])
-            base, winner = searcher.chosen(chain[-1], step)
-            found_better_course = base is not chain[-1]
-            chain[-1] = base
-            if found_better_course:
-                steps[-1] = replace(step, left=searcher.refits.left(base))
-            if winner is not None:
-                chain.append(winner)
-                steps.append(searcher.untried(winner))
-            elif not found_better_course:
-                break
+        if explained(fit.fits):  # what single videos leave then is rather a lost course than a cause
+            fit = fit.with_lost_courses(seed=seed)
+        base = Trial((), with_own_population(fit), stated=fit.model.beliefs).continued()
+        chain, steps = searcher.forward(base)
         best = searcher.unpatched(chain[-1])
         if best is not chain[-1]:
             chain.append(best)
@@ -184,6 +174,28 @@ class _Searcher:
     @property
     def needed(self) -> float:
         return self.refits.needed
+
+    def forward(self, base: Trial) -> tuple[list[Trial], list[Step]]:
+        """The models that follow one another, each with a cause more, and the step from each; the last adds nothing."""
+        chain, steps = [base], [self.untried(base)]
+        while len(chain) <= MOST_CAUSES:
+            step = steps[-1] = self.tried(chain[-1])
+            found, winner = self.chosen(chain[-1], step)
+            found_better_course = found is not chain[-1]
+            if found_better_course:
+                chain[-1], steps[-1] = found, replace(step, left=self.refits.left(found))
+                if len(chain) > 1 and (lesser := self.with_course_of(found, chain[-2])) is not chain[-2]:
+                    chain[-2] = lesser
+                    if self.doubted(found, lesser, steps[-1].left.overdispersion):
+                        chain.pop()
+                        steps[-2:] = [self.untried(lesser)]
+                        continue
+            if winner is not None:
+                chain.append(winner)
+                steps.append(self.untried(winner))
+            elif not found_better_course:
+                break
+        return chain, steps
 
     def untried(self, trial: Trial) -> Step:
         """A step in which nothing was tried yet."""
@@ -237,6 +249,14 @@ class _Searcher:
             if self.doubted(winner, trial, self.refits.left(winner).overdispersion):
                 winner = None
         return trial, self.or_first_of(step.pair, winner)
+
+    def with_course_of(self, trial: Trial, before: Trial) -> Trial:
+        """The model before a model's last causes, with the better course that this one has found since.
+
+        What that course brings is no merit of these causes.
+        """
+        lesser = self._left_out(trial, *trial.beyond(before))
+        return lesser if gain(lesser, before)[0] > self.needed else before
 
     def or_first_of(self, pair: tuple[Trial, Trial] | None, winner: Trial | None) -> Trial | None:
         """The best single cause, or the first of an established pair that brings more.
@@ -312,9 +332,9 @@ class _Searcher:
         """A model without each of some causes."""
         return tuple(self._left_out(best, cause) for cause in causes)
 
-    def _left_out(self, best: Trial, cause: Effect) -> Trial:
-        """A model without one of its causes, searched the longer the less the cause seems to bring."""
-        found = best.without(cause)
+    def _left_out(self, best: Trial, *causes: Effect) -> Trial:
+        """A model without some of its causes, searched the longer the less these seem to bring."""
+        found = best.without(*causes)
         if gain(best, found)[0] < PLAIN * self.needed:
             found = found.mended(doubtful(found.fit.fits), seed=self.seed)
         return found.continued() if gain(best, found)[0] < PLAIN * self.needed else found

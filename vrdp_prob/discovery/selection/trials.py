@@ -10,7 +10,6 @@ from jaxtyping import Float
 
 from vrdp_prob.discovery.candidates.kicked_at_contact import kicked_at_contact
 from vrdp_prob.discovery.candidates.scores import CauseScore, happens_once
-from vrdp_prob.discovery.candidates.single_videos import LOST, lost_videos
 from vrdp_prob.discovery.finding import HeldOut
 from vrdp_prob.discovery.residuals.held_out import Cavity, cavities
 from vrdp_prob.discovery.residuals.jitter import alike_in_neighbours
@@ -20,7 +19,7 @@ from vrdp_prob.discovery.selection.forecast import held_out
 from vrdp_prob.inference.several_videos.ascent import Effort, ImpossibleStartError
 from vrdp_prob.inference.several_videos.fitting import Owned, SharedFit
 from vrdp_prob.inference.several_videos.population import own_parameters, with_learned_population
-from vrdp_prob.inference.several_videos.second_look import MOST
+from vrdp_prob.inference.several_videos.second_look import EXPLAINED, MOST, lost_videos
 from vrdp_prob.models.effects.effect import Effect
 from vrdp_prob.models.parameters import Parameter, Scope
 from vrdp_prob.models.physics import PhysicsModel
@@ -111,7 +110,7 @@ class Trial:
     @property
     def lacking(self) -> float:
         """What a model would bring (nats) that explains all lost videos, where all that this one leaves is noise."""
-        lost = [self.fit.fits[index] for index in lost_videos(self.fit)]
+        lost = [self.fit.fits[index] for index in lost_videos(self.fit.fits)]
         return sum(2.0 * float(one.clues.tracks.seen.sum()) * math.log(one.misfit.ratio) for one in lost)
 
     @property
@@ -146,7 +145,7 @@ class Trial:
 
     def loses_videos_of(self, other: "Trial") -> bool:
         """Whether a video is less probable than in another fit and explained no more."""
-        return any(self.fit.fits[index].misfit.ratio > LOST for index in self._fallen_from(other))
+        return any(self.fit.fits[index].misfit.ratio > EXPLAINED for index in self._fallen_from(other))
 
     def _fallen_from(self, base: "Trial") -> list[int]:
         gained = self.fitted_density - base.fitted_density
@@ -270,7 +269,7 @@ class Trial:
         model, gone = self.fit.model, {cause.name for cause in causes}
         for cause in causes:
             model = model.without_effect(cause)
-        left = self._with_stated_population(model)
+        left = self.with_stated_population(model)
         choices = {name: one for name, one in self.choices.items() if name not in gone}
         fit = self.fit.under(left, held=self._held_without(*causes), effort=FIRST, model_error=False)
         kept = tuple(one for one in self.causes if one.name not in gone)
@@ -281,10 +280,11 @@ class Trial:
         gone = {parameter.name for cause in causes for parameter in cause.parameters}
         return [{key: one.held[key] for key in one.held if key[0] not in gone} for one in self.fit.structures]
 
-    def _with_stated_population(self, model: PhysicsModel) -> PhysicsModel:
+    def with_stated_population(self, model: PhysicsModel) -> PhysicsModel:
         """A model in which bodies may be what they may before anything is learned.
 
-        What a cause has explained, they have to explain by themselves without it, and would lose their way to it.
+        What a cause has explained, they have to explain by themselves without it, and would lose their way to it; and
+        what a fit that explains no video has taught of them misleads the next one.
         """
         own = {one.name for one in own_parameters(model)}
         learned = {name: one for name, one in model.beliefs.items() if name not in own}

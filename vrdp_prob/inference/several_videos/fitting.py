@@ -23,7 +23,7 @@ from vrdp_prob.inference.several_videos.joining import CLIMBS, Climb, joined
 from vrdp_prob.inference.several_videos.joint_fit import JointFit, with_alternatives
 from vrdp_prob.inference.several_videos.linking import check_names, link
 from vrdp_prob.inference.several_videos.parts import carried_starts, fit_alone, link_fits
-from vrdp_prob.inference.several_videos.second_look import look_again, may_take_another_course
+from vrdp_prob.inference.several_videos.second_look import look_again, may_take_another_course, worst_videos
 from vrdp_prob.inference.several_videos.transfer import first_numbers
 from vrdp_prob.models.effects.effect import Effect
 from vrdp_prob.models.likelihood import Likelihood
@@ -32,8 +32,9 @@ from vrdp_prob.models.unknowns import Structure, structure_of, unknowns
 from vrdp_prob.progress import ProgressDisplay, SilentProgress
 from vrdp_prob.scene import Tracks
 
-MENDING_LOOKS = 2
-"""Fits that are made anew of a video that may have lost its course of events in a joint fit."""
+MENDING_LOOKS, SEARCHES = 2, 3
+"""Fits that are made anew of a video that may have lost its course of events in a joint fit, and how often that is done
+as long as it finds more."""
 
 NEWS = 5.0
 """Gain (nats) of other courses of events that is worth a change of all that follows from a fit."""
@@ -220,6 +221,16 @@ class SharedFit:
         if found.log_density < joint.log_density:
             return self
         return _finished(found, self.model, fits, tuple(structures), self.shared, model_error=False)
+
+    def with_lost_courses(self, *, seed: int) -> "SharedFit":
+        """The fit with its lost videos searched anew, as long as that finds more."""
+        found = self
+        for search in range(SEARCHES):
+            better = found.mended(worst_videos(found.fits), seed=seed + search, thorough=True)
+            if better is found:
+                break
+            found = better
+        return found
 
     def with_other_courses(self, *, seed: int) -> "SharedFit":
         """The fit with all videos searched anew, one half given what the other says; itself where little is gained.

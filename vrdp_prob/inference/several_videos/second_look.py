@@ -27,7 +27,7 @@ LOOKS = 4
 """Fits that are made anew of one video, with and without what the others say by turns..."""
 EXPLAINED = 1.2
 """...and one more, with the yaws of its cubes turned, if the video in the middle leaves no more than so many noise
-sd."""
+sd; a video that leaves more may have lost its course of events."""
 MOST = 2
 """One video in so many is looked at again."""
 SAME = 0.01
@@ -69,6 +69,18 @@ def doubtful(fits: Sequence[MapFit], among: Collection[int] | None = None) -> li
 def explained(fits: Sequence[MapFit]) -> bool:
     """Whether the model lacks nothing whose place a wrong yaw could take: it explains most videos."""
     return float(np.median([one.misfit.ratio for one in fits])) < EXPLAINED
+
+
+def lost_videos(fits: Sequence[MapFit]) -> list[int]:
+    """Videos that may have taken the wrong course of events, the worst first."""
+    order = sorted(range(len(fits)), key=lambda index: -fits[index].misfit.ratio)
+    return [index for index in order if fits[index].misfit.ratio > EXPLAINED and may_take_another_course(fits[index])]
+
+
+def worst_videos(fits: Sequence[MapFit]) -> list[int]:
+    """Lost videos to search anew, at most half of all; first those far worse than the others, whom these mislead."""
+    lost, among_others = lost_videos(fits), trusted(fits)
+    return ([index for index in lost if not among_others[index]] or lost)[: len(fits) // MOST]
 
 
 def may_take_another_course(fit: MapFit) -> bool:

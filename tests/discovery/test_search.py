@@ -93,8 +93,23 @@ def test_the_first_of_two_is_what_lasts_and_brings_most_where_all_else_is_noise(
         one.brought.return_value = brought
     nothing.lacking = lacking
     monkeypatch.setattr(refits, "happens_once", lambda cause: cause == "kicks")
+    monkeypatch.setattr(search, "explained", lambda _fits: True)
     found = _searcher(needed=least)._provisional(nothing, [drag, kicks, tilt])
     assert found is (tilt if name else None)
+
+
+@pytest.mark.parametrize(("before", "taken"), [(True, "drag"), (False, "tilt")], ids=["most", "few"])
+def test_a_law_is_none_to_go_on_from_that_loses_most_videos_which_were_explained(
+    before: bool, taken: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    nothing, tilt, drag = (_refit(*one) for one in (("", 0.0), ("tilt", 1.0), ("drag", 0.5)))
+    for one, brought, explains in ((nothing, 0.0, before), (tilt, 60.0, False), (drag, 20.0, True)):
+        one.brought.return_value, one.fit.fits, one.lacking = brought, explains, 50.0
+    monkeypatch.setattr(refits, "happens_once", lambda _cause: False)
+    monkeypatch.setattr(search, "explained", lambda fits: fits)
+    found = _searcher(needed=2.0)._provisional(nothing, [drag, tilt])
+    assert found is not None
+    assert found.causes == (taken,)
 
 
 @pytest.mark.parametrize(

@@ -216,8 +216,12 @@ class _Searcher:
         return Step(self.refits.left(trial), tuple(self._in_order(trial, found)), pair)
 
     def _provisional(self, trial: Trial, found: Sequence[Trial]) -> Trial | None:
-        """The lasting cause that brings most where all else is noise: enough, and a good part of what lacks."""
-        first = max(lasting(found), key=lambda one: one.brought(trial) + one.log_prior, default=trial)
+        """The lasting cause that brings most where all else is noise: enough, and a good part of what lacks.
+
+        A law with which most videos are explained no more, though they are without it, is none to go on from.
+        """
+        possible = [one for one in lasting(found) if explained(one.fit.fits) or not explained(trial.fit.fits)]
+        first = max(possible, key=lambda one: one.brought(trial) + one.log_prior, default=trial)
         return None if first.brought(trial) < max(self.needed, FIRST_SHARE * trial.lacking) else first
 
     def _pair(self, trial: Trial, first: Trial) -> tuple[Trial, Trial] | None:

@@ -30,8 +30,9 @@ def _refit(cause: str, gained: float, *, patches: bool = False) -> Mock:
 
 @pytest.fixture(autouse=True)
 def tracks_show_no_walls(monkeypatch: pytest.MonkeyPatch) -> None:
-    """No refit here has tracks to look at."""
+    """No refit here has tracks to look at, nor fits of videos that could be explained or not."""
     monkeypatch.setattr(refits.Refits, "_placed", lambda _self, _trial: [])
+    monkeypatch.setattr(search, "explained", lambda _fits: True)
 
 
 def _searcher(needed: float = 0.0) -> search._Searcher:
@@ -93,7 +94,6 @@ def test_the_first_of_two_is_what_lasts_and_brings_most_where_all_else_is_noise(
         one.brought.return_value = brought
     nothing.lacking = lacking
     monkeypatch.setattr(refits, "happens_once", lambda cause: cause == "kicks")
-    monkeypatch.setattr(search, "explained", lambda _fits: True)
     found = _searcher(needed=least)._provisional(nothing, [drag, kicks, tilt])
     assert found is (tilt if name else None)
 
@@ -202,26 +202,46 @@ def test_of_several_walls_at_once_none_is_a_merit_of_a_better_course(monkeypatch
     walls.without.assert_called_once_with("wall", "second_wall")
 
 
-@pytest.mark.parametrize("course_alone", [True, False], ids=["the course alone", "the cause, too"])
-def test_a_course_found_beside_a_cause_is_that_of_the_model_without_it_too(
-    *, course_alone: bool, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize("needs_it", [True, False], ids=["the course alone", "the cause, too"])
+def test_a_course_found_beside_causes_is_handed_back_and_causes_are_looked_for_once_more(
+    *, needs_it: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Where the course is all that the cause has brought, the search goes on without it."""
-    plain, friction = _refit("", 0.0), _refit("friction", 20.0)
-    plain.causes = ()
-    found, mended = _refit("friction", 60.0), _refit("", 59.0 if course_alone else 40.0)
-    mended.causes = ()
-    chosen = {plain: (plain, friction), friction: (found, None), found: (found, None), mended: (mended, None)}
-    monkeypatch.setattr(search._Searcher, "tried", lambda self, trial: self.untried(trial))
+    plain, friction, both = _refit("", 0.0), _refit("friction", 20.0), _refit("friction+drag", 30.0)
+    found, without_drag, mended = _refit("friction+drag", 90.0), _refit("friction", 80.0), _refit("", 60.0)
+    plain.causes = mended.causes = ()
+    again = _refit("friction", 81.0)
+    chosen = {plain: (plain, friction), friction: (friction, both), both: (found, None)}
+    chosen |= {mended: (mended, None if needs_it else again), again: (again, None)}
+    left_out = {found: without_drag, without_drag: mended}
+    asked: list[Trial] = []
+
+    def tried(self: search._Searcher, trial: Trial) -> search.Step:
+        asked.append(trial)
+        return self.untried(trial)
+
+    monkeypatch.setattr(search._Searcher, "tried", tried)
     monkeypatch.setattr(search._Searcher, "chosen", lambda _self, trial, _step: chosen[trial])
-    monkeypatch.setattr(search._Searcher, "_left_out", lambda _self, _trial, *_causes: mended)
+    monkeypatch.setattr(search._Searcher, "_left_out", lambda _self, trial, *_causes: left_out[trial])
     monkeypatch.setattr(refits.Refits, "left", lambda _self, _trial: refits.Left((), (), np.ones(3)))
-    monkeypatch.setattr(
-        refits.Refits, "doubted", lambda self, one, other, _by: search.gain(one, other)[0] < self.needed
-    )
     chain, steps = _searcher(needed=6.0).forward(plain)
-    assert chain == ([mended] if course_alone else [mended, found])
+    assert chain == ([mended] if needs_it else [mended, again])
+    assert asked == [plain, friction, both, *chain]
     assert len(steps) == len(chain)
+
+
+def test_a_course_that_gains_nothing_without_the_cause_is_not_handed_back(monkeypatch: pytest.MonkeyPatch) -> None:
+    plain, tilt = _refit("", 0.0), _refit("tilt", 50.0)
+    monkeypatch.setattr(search._Searcher, "_left_out", lambda _self, _trial, *_causes: _refit("", 1.0))
+    assert _searcher(needed=6.0).handed_back([plain, tilt]) == [plain, tilt]
+
+
+def test_a_law_that_loses_most_videos_comes_last(monkeypatch: pytest.MonkeyPatch) -> None:
+    nothing, wind, drag = _refit("", 0.0), _refit("wind", 30.0), _refit("drag", 10.0)
+    for one in (nothing, wind, drag):
+        one.fit.fits = one is not wind
+    monkeypatch.setattr(search, "explained", lambda fits: fits)
+    monkeypatch.setattr(search._Searcher, "doubted", lambda *_given: False)
+    assert _searcher()._in_order(nothing, [wind, drag]) == [drag, wind]
 
 
 @pytest.mark.parametrize("enough", [True, False], ids=["enough", "too little"])

@@ -8,7 +8,6 @@ from tests.discovery.fitted import fitted
 from vrdp_prob.discovery.candidates import single_videos
 from vrdp_prob.discovery.candidates.single_videos import causes_of_lost_videos
 from vrdp_prob.inference.several_videos.fitting import SharedFit
-from vrdp_prob.inference.several_videos.second_look import lost_videos
 from vrdp_prob.models.effects.clock_error import ClockError
 from vrdp_prob.models.effects.contact_friction import ContactFriction
 from vrdp_prob.models.effects.effect import Effect
@@ -18,9 +17,8 @@ from vrdp_prob.models.effects.slip_to_roll import SlipToRoll
 from vrdp_prob.models.effects.surface_tilt import SurfaceTilt
 
 
-def test_no_video_of_a_null_is_lost() -> None:
+def test_of_no_lost_video_nothing_is_told() -> None:
     _, fit = fitted(seed=1)
-    assert lost_videos(fit.fits) == []
     assert causes_of_lost_videos(fit, [], [SurfaceTilt()], {"surface_tilt"}, 6.0, seed=0) == []
 
 

@@ -33,7 +33,7 @@ def _verdict(worlds: Worlds, found: Sequence[Slope], seed: int, model: PhysicsMo
         return "order of events changes"
     if all(slope.inexact for slope in wrong):
         return "differences inexact"
-    if model is COUPLED:  # the reference knows no forces between bodies
+    if any(effect.overrides("pair_force") for effect in model.effects):  # the reference knows no forces between bodies
         return "unexplained"
     doubtful = reference.rollout(scene_of(off_frames(worlds, seed), 0), FRAMES.numpy()).doubtful_from
     return "grazing contact" if doubtful < FRAMES[-1] else "unexplained"

@@ -113,7 +113,8 @@ def test_a_body_starts_when_friction_has_become_too_small() -> None:
     assert result.trajectory[0, -1, 0, 0].item() == pytest.approx(expected, abs=1e-6)
 
 
-def test_two_bodies_attract_each_other() -> None:
+@pytest.mark.parametrize("slips", [True, False])
+def test_two_bodies_attract_each_other(*, slips: bool) -> None:
     strength, softening, masses = 0.4, 0.1, np.array([1.0, 3.0])
     start = [[0, 0], [1.2, 0.1]], [[0.1, 0.3], [-0.2, 0.0]]
     worlds = scene(*start, pair_strength=strength, pair_softening=softening, mass=masses.tolist(), radius=[1e-3, 1e-3])
@@ -125,7 +126,7 @@ def test_two_bodies_attract_each_other() -> None:
 
     times = np.linspace(0, 2, 30)
     exact = solve_ivp(rates, (0, 2), np.ravel(start), "DOP853", times, rtol=1e-12, atol=1e-12).y[:4].T.reshape(-1, 2, 2)
-    rollout = simulate(worlds, tensor(times), TOGETHER)
+    rollout = simulate(worlds, tensor(times), TOGETHER if slips else PhysicsModel.base().with_effect(PairForce()))
     assert rollout.outcome == (Outcome.OK,)
     assert np.abs(rollout.trajectory[0, :, :, :2].numpy() - exact).max() < 1e-8
 

@@ -87,6 +87,8 @@ def discover(
     timed = videos if _reads_stamps((*physics.effects, *looked_for)) else _from_first_frames(videos)
     with several_processes(processes), journal(own):
         fit = fit_together(timed, model=physics, seed=seed, model_error=False, progress=progress)
+        if explained(fit.fits):  # what single videos leave then is rather a lost course than a cause
+            fit = fit.with_lost_courses(seed=seed)
         outcome = outcome_of(fit, looked_for, seed=seed, progress=progress)
         if outcome.verdict is Verdict.UNKNOWN and not outcome.found.best.causes:
             better = fit.with_other_courses(seed=seed) if explained(fit.fits) else fit

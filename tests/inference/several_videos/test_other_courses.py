@@ -42,29 +42,59 @@ def test_where_nobody_is_trusted_nothing_is_told(monkeypatch: pytest.MonkeyPatch
 
 
 @pytest.mark.parametrize(
-    ("ratios", "worst"),
+    ("ratios", "groups"),
     [
-        ([1.0, 1.3, 0.9, 1.0, 1.1, 1.0], [1]),
-        ([1.0, 4.0, 0.9, 1.3, 1.1, 1.0], [1]),
-        ([3.0, 3.0, 3.1, 3.3, 3.2, 2.9], [3, 4, 2]),
+        ([1.0, 1.3, 0.9, 1.0, 1.1, 1.0], [[1]]),
+        ([1.0, 4.0, 0.9, 1.3, 1.1, 1.0], [[1], [3]]),
+        ([3.0, 3.0, 3.1, 3.3, 3.2, 2.9], [[3, 4, 2]]),
         ([1.0, 1.1, 0.9, 1.0, 1.1, 1.0], []),
+        ([0.9, 5.0, 1.0], [[1]]),
     ],
-    ids=["a lost one", "one far worse than the others first", "half of them", "none"],
+    ids=["a lost one", "one far worse than the others first", "half of them", "none", "one of three"],
 )
-def test_the_worst_of_the_lost_videos_are_searched(ratios: list[float], worst: list[int]) -> None:
-    clues = Mock(tracks=Mock(bodies=("", "")))
-    fits = [Mock(spec=MapFit, misfit=Mock(ratio=ratio), clues=clues) for ratio in ratios]
-    assert second_look.worst_videos(fits) == worst
+def test_lost_videos_are_searched_in_groups(ratios: list[float], groups: list[list[int]]) -> None:
+    assert second_look.lost_together(_fits(ratios)) == groups
+
+
+def test_what_has_one_course_only_is_not_lost() -> None:
+    assert second_look.lost_videos(_fits([2.0, 1.0, 3.0], bodies=1)) == []
+
+
+def test_no_video_of_a_null_is_lost() -> None:
+    fit = fit_together([sliding(1), sliding(2), sliding(3)], model=PhysicsModel.base(), model_error=False)
+    assert fit.with_lost_courses(seed=0) is fit
 
 
 @pytest.mark.parametrize(("better", "searches"), [(0, 1), (1, 2), (5, 3)])
 def test_lost_videos_are_searched_as_long_as_that_finds_more(
     better: int, searches: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(fitting, "worst_videos", lambda _fits: [2])
+    monkeypatch.setattr(fitting, "lost_together", lambda _fits: [[2]])
+    monkeypatch.setattr(fitting, "lost_videos", lambda _fits: [2])
     chain = [_fit(float(number)) for number in range(better + 1)]
     for one, after in zip(chain, [*chain[1:], chain[-1]], strict=True):
         one.mended.return_value = after
     assert SharedFit.with_lost_courses(chain[0], seed=5) is chain[min(better, 3)]
     asked = [call for one in chain for call in one.mended.call_args_list]
     assert [(call.args, call.kwargs["seed"]) for call in asked] == [(([2],), 5 + k) for k in range(searches)]
+
+
+@pytest.mark.parametrize("loses", [True, False])
+def test_where_the_worst_are_not_found_the_other_lost_ones_are_searched_and_none_may_be_lost_for_it(
+    *, loses: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    first, second = _fit(0.0), _fit(10.0)
+    second.fits = ["found"]
+    first.mended.side_effect = lambda videos, **_how: second if videos == [3] else first
+    second.mended.return_value = second
+    monkeypatch.setattr(fitting, "lost_together", lambda _fits: [[1], [3]])
+    monkeypatch.setattr(
+        fitting, "lost_videos", lambda fits: ([1, 0] if loses else [1]) if fits == ["found"] else [1, 3]
+    )
+    assert SharedFit.with_lost_courses(first, seed=0) is (first if loses else second)
+
+
+def _fits(ratios: list[float], *, bodies: int = 2) -> list[Mock]:
+    """Fits of videos with such residuals in units of the noise, in which nothing happens."""
+    clues, rollout = Mock(tracks=Mock(bodies=("",) * bodies, walls=())), Mock(events=())
+    return [Mock(spec=MapFit, misfit=Mock(ratio=ratio), clues=clues, rollout=rollout) for ratio in ratios]

@@ -21,7 +21,13 @@ from vrdp_prob.inference.runs.parallel import in_processes
 from vrdp_prob.inference.several_videos.ascent import ImpossibleStartError
 from vrdp_prob.inference.several_videos.fitting import SharedFit, fit_together
 from vrdp_prob.inference.several_videos.learned import with_learned_walls
-from vrdp_prob.inference.several_videos.second_look import MOST, explained, lost_videos, may_take_another_course
+from vrdp_prob.inference.several_videos.second_look import (
+    FAR_WORSE,
+    MOST,
+    explained,
+    lost_videos,
+    may_take_another_course,
+)
 from vrdp_prob.models.effects.effect import Effect
 from vrdp_prob.models.effects.external_impulse import ExternalImpulse
 from vrdp_prob.progress import Advance
@@ -275,8 +281,8 @@ class Refits:
         A fit without them has lost its way at the first that a body met, so that scores call for what mends its course.
         Walls count as stated until a fit is found, and positions are less certain by how far off these may be: twelve
         numbers more for four walls make every search longer, and walls that are a little off explain no track. None
-        where videos have no world in common, or a wall overlaps what is seen. Lost videos are searched anew before
-        anything is learned of what bodies may be: what misleads them teaches wrong things.
+        where videos have no world in common, or a wall overlaps what is seen. Where it nearly explains most videos,
+        the lost ones are searched anew before anything is learned of bodies, of which they teach wrong things.
         """
         tracks = [part.clues.tracks for part in trial.fit.fits]
         walls = [one for one in placed if one.wall is not None]
@@ -298,7 +304,7 @@ class Refits:
             for one, wall in zip(walls, told, strict=True):
                 start |= {} if wall.restitution is None else {one.effect.parameters[-1].name: wall.restitution}
             freed = fit.of_tracks(tracks).under(model, start=start, effort=FIRST, model_error=False)
-            return freed.with_lost_courses(seed=self.seed)
+            return freed.with_lost_courses(seed=self.seed) if explained(freed.fits, FAR_WORSE) else freed
 
         return self._began_anew(trial, [one.effect for one in placed], fitted)
 

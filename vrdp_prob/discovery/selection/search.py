@@ -19,7 +19,7 @@ from vrdp_prob.progress import ProgressDisplay, SilentProgress
 
 MOST_RIVALS = 2
 MOST_CAUSES = 5
-MOST_SWAPS = 3
+MOST_SWAPS, MOST_ROUNDS = 3, 3
 FIRST_SHARE = 0.2
 """Share of what a model lacks that a cause must bring for a second one to be looked for beside it."""
 PLAIN = 50.0
@@ -56,7 +56,7 @@ class Search:
     Parameters
     ----------
     base
-        The model that was given.
+        The model that was given, with the best courses of events that were found, whatever was tried beside it.
     best
         The model with every cause that was found.
     steps
@@ -147,8 +147,6 @@ def search(
     needed = gain_needed(sum(effect.follows is None for effect in catalogue))
     with (progress or SilentProgress()).stage("Trying causes", total=None) as advance:
         searcher = _Searcher(Refits(tuple(catalogue), seed, needed, advance))
-        if explained(fit.fits):  # what single videos leave then is rather a lost course than a cause
-            fit = fit.with_lost_courses(seed=seed)
         base = Trial((), with_own_population(fit), stated=fit.model.beliefs).continued()
         chain, steps = searcher.forward(base)
         best = searcher.unpatched(chain[-1])
@@ -177,19 +175,18 @@ class _Searcher:
 
     def forward(self, base: Trial) -> tuple[list[Trial], list[Step]]:
         """The models that follow one another, each with a cause more, and the step from each; the last adds nothing."""
-        chain, steps = [base], [self.untried(base)]
+        chain, steps, rounds = [base], [self.untried(base)], 0
         while len(chain) <= MOST_CAUSES:
             step = steps[-1] = self.tried(chain[-1])
             found, winner = self.chosen(chain[-1], step)
             found_better_course = found is not chain[-1]
             if found_better_course:
                 chain[-1], steps[-1] = found, replace(step, left=self.refits.left(found))
-                if len(chain) > 1 and (lesser := self.with_course_of(found, chain[-2])) is not chain[-2]:
-                    chain[-2] = lesser
-                    if self.doubted(found, lesser, steps[-1].left.overdispersion):
-                        chain.pop()
-                        steps[-2:] = [self.untried(lesser)]
-                        continue
+                back = self.handed_back(chain) if rounds < MOST_ROUNDS else chain
+                if len(back) < len(chain):
+                    chain, rounds = back, rounds + 1
+                    steps[len(chain) - 1 :] = [self.untried(chain[-1])]
+                    continue
             if winner is not None:
                 chain.append(winner)
                 steps.append(self.untried(winner))
@@ -216,11 +213,8 @@ class _Searcher:
         return Step(self.refits.left(trial), tuple(self._in_order(trial, found)), pair)
 
     def _provisional(self, trial: Trial, found: Sequence[Trial]) -> Trial | None:
-        """The lasting cause that brings most where all else is noise: enough, and a good part of what lacks.
-
-        A law with which most videos are explained no more, though they are without it, is none to go on from.
-        """
-        possible = [one for one in lasting(found) if explained(one.fit.fits) or not explained(trial.fit.fits)]
+        """The lasting cause that brings most where all else is noise: enough, and a good part of what lacks."""
+        possible = [one for one in lasting(found) if not _loses_most(one, trial)]
         first = max(possible, key=lambda one: one.brought(trial) + one.log_prior, default=trial)
         return None if first.brought(trial) < max(self.needed, FIRST_SHARE * trial.lacking) else first
 
@@ -254,13 +248,17 @@ class _Searcher:
                 winner = None
         return trial, self.or_first_of(step.pair, winner)
 
-    def with_course_of(self, trial: Trial, before: Trial) -> Trial:
-        """The model before a model's last causes, with the better course that this one has found since.
+    def handed_back(self, chain: Sequence[Trial]) -> list[Trial]:
+        """The models up to the first that gains by the course which the last one has found since, with that course.
 
-        What that course brings is no merit of these causes.
+        What it brings is no merit of the causes beside which it was found: these are looked for once more.
         """
-        lesser = self._left_out(trial, *trial.beyond(before))
-        return lesser if gain(lesser, before)[0] > self.needed else before
+        *before, last = chain
+        if not before:
+            return [last]
+        lesser = self._left_out(last, *last.beyond(before[-1]))
+        gains = gain(lesser, before[-1])[0] > self.needed
+        return self.handed_back([*before[:-1], lesser]) if gains else list(chain)
 
     def or_first_of(self, pair: tuple[Trial, Trial] | None, winner: Trial | None) -> Trial | None:
         """The best single cause, or the first of an established pair that brings more.
@@ -272,8 +270,8 @@ class _Searcher:
         return pair[0]
 
     def _in_order(self, trial: Trial, found: Sequence[Trial]) -> list[Trial]:
-        """Trials by merit; those that patch several videos last, unless the best other one is in doubt."""
-        patching = [one for one in found if one.patches(one.causes[-1])]
+        """Trials by merit; those that patch or lose several videos last, unless the best other one is in doubt."""
+        patching = [one for one in found if one.patches(one.causes[-1]) or _loses_most(one, trial)]
         others = sorted((one for one in found if one not in patching), key=merit, reverse=True)
         if others and not self.doubted(others[0], trial, np.ones(len(trial.fit.videos))):
             return [*others, *sorted(patching, key=merit, reverse=True)]
@@ -382,6 +380,11 @@ def _tried_at(cause: Effect, chain: Sequence[Trial], steps: Sequence[Step]) -> t
             if any(one.name == name for trial in step.tried for one in trial.beyond(base)):
                 return base, step
     return chain[0], steps[0]
+
+
+def _loses_most(trial: Trial, lesser: Trial) -> bool:
+    """Whether most videos are explained no more with the last cause of a model, which they are without it."""
+    return explained(lesser.fit.fits) and not explained(trial.fit.fits)
 
 
 def _sure(trial: Trial, divisor: Float[np.ndarray, "video"]) -> float:

@@ -23,7 +23,12 @@ from vrdp_prob.inference.several_videos.joining import CLIMBS, Climb, joined
 from vrdp_prob.inference.several_videos.joint_fit import JointFit, with_alternatives
 from vrdp_prob.inference.several_videos.linking import check_names, link
 from vrdp_prob.inference.several_videos.parts import carried_starts, fit_alone, link_fits
-from vrdp_prob.inference.several_videos.second_look import look_again, may_take_another_course, worst_videos
+from vrdp_prob.inference.several_videos.second_look import (
+    look_again,
+    lost_together,
+    lost_videos,
+    may_take_another_course,
+)
 from vrdp_prob.inference.several_videos.transfer import first_numbers
 from vrdp_prob.models.effects.effect import Effect
 from vrdp_prob.models.likelihood import Likelihood
@@ -223,13 +228,17 @@ class SharedFit:
         return _finished(found, self.model, fits, tuple(structures), self.shared, model_error=False)
 
     def with_lost_courses(self, *, seed: int) -> "SharedFit":
-        """The fit with its lost videos searched anew, as long as that finds more."""
+        """The fit with its lost videos searched anew, as long as that finds more and loses no other one."""
         found = self
         for search in range(SEARCHES):
-            better = found.mended(worst_videos(found.fits), seed=seed + search, thorough=True)
-            if better is found:
+            before = found
+            for group in lost_together(found.fits):
+                better = found.mended(group, seed=seed + search, thorough=True)
+                if better is not found and set(lost_videos(better.fits)) <= set(lost_videos(found.fits)):
+                    found = better
+                    break
+            if found is before:
                 break
-            found = better
         return found
 
     def with_other_courses(self, *, seed: int) -> "SharedFit":

@@ -27,7 +27,9 @@ LOOKS = 4
 """Fits that are made anew of one video, with and without what the others say by turns..."""
 EXPLAINED = 1.2
 """...and one more, with the yaws of its cubes turned, if the video in the middle leaves no more than so many noise
-sd; a video that leaves more may have lost its course of events."""
+sd."""
+LOST = 1.2
+"""Residuals in units of the noise from which a video may have lost its course of events."""
 MOST = 2
 """One video in so many is looked at again."""
 SAME = 0.01
@@ -66,21 +68,25 @@ def doubtful(fits: Sequence[MapFit], among: Collection[int] | None = None) -> li
     ]
 
 
-def explained(fits: Sequence[MapFit]) -> bool:
-    """Whether the model lacks nothing whose place a wrong yaw could take: it explains most videos."""
-    return float(np.median([one.misfit.ratio for one in fits])) < EXPLAINED
+def explained(fits: Sequence[MapFit], within: float = EXPLAINED) -> bool:
+    """Whether a model explains most videos within so many noise sd, so that a wrong yaw takes the place of nothing."""
+    return float(np.median([one.misfit.ratio for one in fits])) < within
 
 
 def lost_videos(fits: Sequence[MapFit]) -> list[int]:
     """Videos that may have taken the wrong course of events, the worst first."""
     order = sorted(range(len(fits)), key=lambda index: -fits[index].misfit.ratio)
-    return [index for index in order if fits[index].misfit.ratio > EXPLAINED and may_take_another_course(fits[index])]
+    return [index for index in order if fits[index].misfit.ratio > LOST and may_take_another_course(fits[index])]
 
 
-def worst_videos(fits: Sequence[MapFit]) -> list[int]:
-    """Lost videos to search anew, at most half of all; first those far worse than the others, whom these mislead."""
-    lost, among_others = lost_videos(fits), trusted(fits)
-    return ([index for index in lost if not among_others[index]] or lost)[: len(fits) // MOST]
+def lost_together(fits: Sequence[MapFit]) -> list[list[int]]:
+    """Lost videos in groups that are searched one after the other, each of half of all videos at most.
+
+    Those far worse than the others come first and alone: they mislead the fit of these.
+    """
+    lost, as_good = lost_videos(fits), trusted(fits)
+    groups = [[index for index in lost if not as_good[index]], [index for index in lost if as_good[index]]]
+    return [group[: len(fits) // MOST] for group in groups if group]
 
 
 def may_take_another_course(fit: MapFit) -> bool:

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from tests.discovery.data_set import Truth
-from tests.discovery.hidden import hide
+from tests.discovery.hidden import ROUGH, hide
 from tests.discovery.scenes import Setting
 from vrdp_prob import load_all
 from vrdp_prob.discovery.discover import discover
@@ -163,3 +163,19 @@ def test_a_friction_that_ends_all_sliding_may_be_larger_still(tmp_path: Path) ->
 def test_a_single_video_on_a_wrong_course_is_no_false_alarm(seed: int, tmp_path: Path) -> None:
     _, finding = finding_of(tmp_path, [], seed=seed, setting=replace(LARGER, resistance=0.05))
     assert finding.verdict is Verdict.NONE
+
+
+@pytest.mark.slow
+def test_nor_is_one_among_outliers(tmp_path: Path) -> None:
+    hide([], seed=14, setting=LARGER, measurement=ROUGH).write(tmp_path)
+    assert discover(load_all(tmp_path), seed=0, processes=1).verdict is Verdict.NONE
+
+
+@pytest.mark.slow
+def test_walls_that_nobody_states_are_found_by_bodies_of_any_shape(tmp_path: Path) -> None:
+    hide([], seed=2, setting=replace(LARGER, arena=2.0, late=0.0, resistance=0.2)).write(tmp_path)
+    finding = discover([replace(tracks, walls=()) for tracks in load_all(tmp_path)], seed=0, processes=1)
+    found = {cause.effect: cause.parameters for cause in finding.causes if cause.named}
+    assert set(found) == {"wall", "second_wall", "third_wall", "fourth_wall"}
+    distances = [value.mean for one in found.values() for name, value in one.items() if name.endswith("wall_distance")]
+    assert np.abs(distances) == pytest.approx([2.0] * 4, abs=0.002)

@@ -17,7 +17,7 @@ DAMPINGS = 10.0 ** np.array([-3.0, -2.0, -1.0, 0.0, 1.0, 2.0, 3.0])
 """Factors on the current damping that one batch of trial steps covers."""
 SMALLEST_DAMPING, LARGEST_DAMPING = 1e-9, 1e9
 STEP = 1e-5
-"""Finite-difference step in units of the coordinates' scale: large against the simulator's error of 1e-11."""
+"""Finite-difference step in units of the coordinates' scale: large against the simulator's error of 1e-9."""
 JUMP, LEAST_JUMP = 10.0, 1.0
 """A difference is a jump where it is so many times that on the other side, and so large (in standard deviations)."""
 

@@ -25,12 +25,12 @@ from vrdp_prob.inference.runs.checkpoint import Checkpoint, effects_facts, model
 from vrdp_prob.inference.runs.journal import journal
 from vrdp_prob.inference.runs.parallel import linear_algebra_in_one_thread, several_processes
 from vrdp_prob.inference.several_videos.fitting import fit_together
-from vrdp_prob.inference.several_videos.second_look import explained
+from vrdp_prob.inference.several_videos.second_look import explained, lost_videos
 from vrdp_prob.models.effects.effect import Effect
 from vrdp_prob.models.model_file import known_effects
 from vrdp_prob.models.physics import PhysicsModel
 from vrdp_prob.models.simulator.rollout import compile_model
-from vrdp_prob.progress import ProgressDisplay
+from vrdp_prob.progress import ProgressDisplay, SilentProgress
 from vrdp_prob.report.wording import counted, listed
 from vrdp_prob.scene import Shape, Tracks
 
@@ -87,8 +87,9 @@ def discover(
     timed = videos if _reads_stamps((*physics.effects, *looked_for)) else _from_first_frames(videos)
     with several_processes(processes), journal(own):
         fit = fit_together(timed, model=physics, seed=seed, model_error=False, progress=progress)
-        if explained(fit.fits):  # what single videos leave then is rather a lost course than a cause
-            fit = fit.with_lost_courses(seed=seed)
+        if explained(fit.fits) and lost_videos(fit.fits):  # these have rather lost their courses than lack a cause
+            with (progress or SilentProgress()).stage("Searching lost videos anew"):
+                fit = fit.with_lost_courses(seed=seed)
         outcome = outcome_of(fit, looked_for, seed=seed, progress=progress)
         if outcome.verdict is Verdict.UNKNOWN and not outcome.found.best.causes:
             better = fit.with_other_courses(seed=seed) if explained(fit.fits) else fit

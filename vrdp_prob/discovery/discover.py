@@ -25,7 +25,7 @@ from vrdp_prob.inference.runs.checkpoint import Checkpoint, effects_facts, model
 from vrdp_prob.inference.runs.journal import journal
 from vrdp_prob.inference.runs.parallel import linear_algebra_in_one_thread, several_processes
 from vrdp_prob.inference.several_videos.fitting import fit_together
-from vrdp_prob.inference.several_videos.second_look import explained, lost_videos
+from vrdp_prob.inference.several_videos.second_look import explained, loses_single_videos
 from vrdp_prob.models.effects.effect import Effect
 from vrdp_prob.models.model_file import known_effects
 from vrdp_prob.models.physics import PhysicsModel
@@ -87,7 +87,7 @@ def discover(
     timed = videos if _reads_stamps((*physics.effects, *looked_for)) else _from_first_frames(videos)
     with several_processes(processes), journal(own):
         fit = fit_together(timed, model=physics, seed=seed, model_error=False, progress=progress)
-        if explained(fit.fits) and lost_videos(fit.fits):  # these have rather lost their courses than lack a cause
+        if loses_single_videos(fit.fits):
             with (progress or SilentProgress()).stage("Searching lost videos anew"):
                 fit = fit.with_lost_courses(seed=seed)
         outcome = outcome_of(fit, looked_for, seed=seed, progress=progress)

@@ -56,6 +56,22 @@ def test_lost_videos_are_searched_in_groups(ratios: list[float], groups: list[li
     assert second_look.lost_together(_fits(ratios)) == groups
 
 
+@pytest.mark.parametrize(
+    ("ratios", "loses"),
+    [
+        ([1.0, 1.3, 0.9, 1.0, 1.1, 1.0], True),
+        ([1.0, 1.3, 0.9, 1.3, 1.1, 1.0], False),
+        ([1.0, 1.3, 0.9], True),
+        ([1.0] * 9 + [2.0] * 3, True),
+        ([1.0, 1.1, 0.9], False),
+        ([1.3], False),
+    ],
+    ids=["one of six", "two of six", "one of three", "three of twelve", "none", "the only one"],
+)
+def test_few_lost_videos_lack_their_course_rather_than_a_cause(ratios: list[float], *, loses: bool) -> None:
+    assert second_look.loses_single_videos(_fits(ratios)) is loses
+
+
 def test_what_has_one_course_only_is_not_lost() -> None:
     assert second_look.lost_videos(_fits([2.0, 1.0, 3.0], bodies=1)) == []
 

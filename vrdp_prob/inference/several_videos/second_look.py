@@ -32,6 +32,8 @@ LOST = 1.2
 """Residuals in units of the noise from which a video may have lost its course of events."""
 MOST = 2
 """One video in so many is looked at again."""
+SINGLE = 4
+"""One video in so many, at most, has lost its course by itself; where more are lost, the model lacks something."""
 SAME = 0.01
 """Fits whose residuals differ by a smaller share are taken for the same one, and unless they are far worse than those
 of other videos no further one is looked for in the same way: with what the others say, or without, since what they say
@@ -77,6 +79,11 @@ def lost_videos(fits: Sequence[MapFit]) -> list[int]:
     """Videos that may have taken the wrong course of events, the worst first."""
     order = sorted(range(len(fits)), key=lambda index: -fits[index].misfit.ratio)
     return [index for index in order if fits[index].misfit.ratio > LOST and may_take_another_course(fits[index])]
+
+
+def loses_single_videos(fits: Sequence[MapFit]) -> bool:
+    """Whether a model explains most videos and loses few, which rather lack their course of events than a cause."""
+    return explained(fits) and 0 < len(lost_videos(fits)) <= max(len(fits) // SINGLE, 1)
 
 
 def lost_together(fits: Sequence[MapFit]) -> list[list[int]]:

@@ -39,8 +39,8 @@ from vrdp_prob.models.simulator.world_kernel import (
 TOLERANCE, COUPLED_TOLERANCE = 1e-11, 1e-9
 """Error of one step, in m, m/s, rad and rad/s; and where bodies act on each other at a distance and none slips.
 
-There every step is one of all bodies that are about, and a rollout takes ten times as long; paths are exact to some
-1e-8 m still. A slip that ends needs exact steps.
+There every step is one of all bodies that are about, and a rollout takes ten times as long; paths of discs are
+exact to some 1e-8 m still. A slip that ends needs exact steps.
 """
 INNER_TOLERANCE = 1e-9
 """Change of the velocity in m/s within a step by which its polynomial may miss the law in the middle."""

@@ -186,7 +186,7 @@ def test_walls_and_discs_take_the_places_that_the_catalogue_has() -> None:
 
 def test_tracks_that_state_walls_are_as_uncertain_as_these() -> None:
     tracks = table()[0]
-    placed = Placed(Wall(), Seen(Line(HALF, 0.0), slack=0.02, turns=3, share=1.0))
+    placed = Placed(Wall(), Seen(Line(HALF, 0.0), slack=0.02, turns=3, share=1.0, span=HALF))
     stated = as_stated(tracks, [placed])
     assert len(stated.walls) == 1
     assert stated.walls[0].x1 == pytest.approx(HALF)
@@ -194,6 +194,19 @@ def test_tracks_that_state_walls_are_as_uncertain_as_these() -> None:
     np.testing.assert_allclose(sd, np.hypot(0.002, 0.02 / 4), rtol=0.1)
     with pytest.raises(InputError, match="overlaps the wall"):
         as_stated(tracks, [replace(placed, seen=replace(placed.seen, surface=Line(-0.6, 0.0)))])
+
+
+def test_a_search_begins_with_a_wall_as_near_to_where_it_is_seen_as_its_turns_tell() -> None:
+    placed = Placed(Wall(), Seen(Line(HALF, 0.5), slack=0.02, turns=3, share=1.0, span=0.4))
+    distance, direction = placed.near.values()
+    assert (distance.default, distance.prior.sd) == pytest.approx((HALF, 0.02))
+    assert (direction.default, direction.prior.sd) == pytest.approx((0.5, 0.05))
+    in_one_place = replace(placed, seen=replace(placed.seen, span=0.0))
+    assert list(in_one_place.near.values())[1].prior.sd == pytest.approx(0.2)
+    pillar = table(hidden=False, discs=(PILLAR,), count=6)
+    for one in (*placed_surfaces(table(), WALLS), *placed_surfaces(pillar, [HiddenObstacle()])):
+        assert list(one.near) == list(one.start)
+        assert [belief.default for belief in one.near.values()] == pytest.approx(list(one.start.values()))
 
 
 def test_bodies_whose_radius_nobody_states_are_thrown_back_where_their_middle_is() -> None:

@@ -9,6 +9,7 @@ from functools import cache
 import numpy as np
 from jaxtyping import Bool, Float
 from scipy.optimize import least_squares
+from scipy.spatial.distance import pdist
 
 from vrdp_prob.discovery.candidates.turns import Turn, sudden_turns
 from vrdp_prob.models.effects.effect import Effect
@@ -115,12 +116,22 @@ class Seen:
         Number of the turns that it explains.
     share
         The same as a share of all turns.
+    span
+        Distance in m between those of them that are farthest apart.
     """
 
     surface: Surface
     slack: float
     turns: int
     share: float
+    span: float
+
+    @property
+    def spread(self) -> tuple[float, ...]:
+        """By how much each of its numbers may be off: a distance in m, a direction in rad, a size by its logarithm."""
+        if isinstance(self.surface, Circle):
+            return self.slack, self.slack, SIZE_SD
+        return self.slack, min(RUBBED, self.slack / self.span if self.span else RUBBED)
 
 
 def seen_surfaces(videos: Sequence[Tracks]) -> list[Seen]:
@@ -152,7 +163,8 @@ def seen_surfaces(videos: Sequence[Tracks]) -> list[Seen]:
         if is_one and _Edges.of(touching).met(refined).all() and not _crossed(refined, paths, edges):
             surface = refined
         turns = int(mine.sum())
-        found.append(Seen(surface, float(np.median(edges.slack[mine])), turns, turns / len(seen)))
+        slack, span = float(np.median(edges.slack[mine])), float(pdist(edges.place[mine]).max())
+        found.append(Seen(surface, slack, turns, turns / len(seen), span))
         left &= ~mine
 
 
@@ -184,9 +196,8 @@ class Placed:
 
     @property
     def near(self) -> dict[str, Parameter]:
-        """The same of a disc as beliefs, with which a search begins."""
-        spread = (self.seen.slack, self.seen.slack, SIZE_SD)
-        numbers = zip(self.effect.parameters[:-1], self.seen.surface.values, spread, strict=True)
+        """The same as beliefs, with which a search begins."""
+        numbers = zip(self.effect.parameters[:-1], self.seen.surface.values, self.seen.spread, strict=True)
         return {one.name: _around(one, value, sd) for one, value, sd in numbers}
 
 

@@ -1,7 +1,7 @@
 """Refits with one more cause: which causes are tried on a model, and with what lost or hidden things beside them."""
 
 from collections.abc import Callable, Collection, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import partial
 
 import numpy as np
@@ -10,19 +10,17 @@ from jaxtyping import Float
 from vrdp_prob.discovery.candidates.proposals import hidden_things
 from vrdp_prob.discovery.candidates.scores import CauseScore, happens_once, score_causes
 from vrdp_prob.discovery.candidates.single_videos import causes_of_lost_videos
-from vrdp_prob.discovery.candidates.surfaces import Placed, as_stated, placed_surfaces
+from vrdp_prob.discovery.candidates.surfaces import Placed, placed_surfaces
 from vrdp_prob.discovery.checks.battery import run_checks
 from vrdp_prob.discovery.finding import Check
 from vrdp_prob.discovery.residuals.overdispersion import overdispersion
 from vrdp_prob.discovery.selection.doubts import causes_with_own_check_failing
-from vrdp_prob.discovery.selection.trials import FIRST, Trial, gain, weights
-from vrdp_prob.errors import InputError
+from vrdp_prob.discovery.selection.met_surfaces import fit_with_surfaces
+from vrdp_prob.discovery.selection.trials import Trial, gain, weights
 from vrdp_prob.inference.runs.parallel import in_processes
 from vrdp_prob.inference.several_videos.ascent import ImpossibleStartError
 from vrdp_prob.inference.several_videos.fitting import SharedFit, fit_together
-from vrdp_prob.inference.several_videos.learned import with_learned_walls
 from vrdp_prob.inference.several_videos.second_look import (
-    FAR_WORSE,
     MOST,
     explained,
     lost_videos,
@@ -279,34 +277,17 @@ class Refits:
         """The fit from the beginning with walls and discs that tracks show, all of them at once.
 
         A fit without them has lost its way at the first that a body met, so that scores call for what mends its course.
-        Walls count as stated until a fit is found, and positions are less certain by how far off these may be: twelve
-        numbers more for four walls make every search longer, and walls that are a little off explain no track. None
-        where videos have no world in common, or a wall overlaps what is seen. Where it nearly explains most videos,
-        the lost ones are searched anew before anything is learned of bodies, of which they teach wrong things.
+        Where walls that count as stated explain the videos and leave something, or overlap what is seen, they may be a
+        little off, and hold all videos there: then they are unknown from the beginning. None where videos have no world
+        in common.
         """
-        tracks = [part.clues.tracks for part in trial.fit.fits]
+        effects = [one.effect for one in placed]
         walls = [one for one in placed if one.wall is not None]
-        try:
-            stated = [as_stated(one, walls) for one in tracks] if walls else tracks
-        except InputError:
-            return None
-
-        def fitted() -> SharedFit:
-            first = model = trial.with_stated_population(trial.fit.model)
-            for one in placed:
-                model = model.with_effect(one.effect, tracks)
-                if one.wall is None:
-                    first = first.with_effect(one.effect, tracks)
-                    first = replace(first, beliefs={**first.beliefs, **one.near})
-            fit = fit_together(stated, model=first, shared=trial.fit.shared, seed=self.seed, model_error=False)
-            told = with_learned_walls(fit, stated[0]).walls[len(tracks[0].walls) :]
-            start = {name: value for one in placed for name, value in one.start.items()}
-            for one, wall in zip(walls, told, strict=True):
-                start |= {} if wall.restitution is None else {one.effect.parameters[-1].name: wall.restitution}
-            freed = fit.of_tracks(tracks).under(model, start=start, effort=FIRST, model_error=False)
-            return freed.with_lost_courses(seed=self.seed) if explained(freed.fits, FAR_WORSE) else freed
-
-        return self._began_anew(trial, [one.effect for one in placed], fitted)
+        found = self._began_anew(trial, effects, partial(fit_with_surfaces, trial, placed, walls, seed=self.seed))
+        if not walls or (found is not None and not (explained(found.fit.fits) and self._leaves_something(found))):
+            return found
+        near = self._began_anew(trial, effects, partial(fit_with_surfaces, trial, placed, [], seed=self.seed))
+        return max((one for one in (found, near) if one is not None), key=merit, default=None)
 
     def _began_anew(self, trial: Trial, causes: Sequence[Effect], fitted: Callable[[], SharedFit]) -> Trial | None:
         """A trial with further causes by a fit from the beginning; None where videos have no world in common."""

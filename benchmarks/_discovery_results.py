@@ -143,10 +143,13 @@ def covered(estimate: Result) -> bool:
 
 
 def bounds(results: Sequence[Result]) -> dict[str, list[Result]]:
-    """Upper bounds of what was hidden and is not told of, by the parameter; None where the data put none on it."""
+    """Upper bounds of what was hidden and is not told of, by the parameter; None where the data put none on it.
+
+    Where something unknown is left, none is told.
+    """
     found: dict[str, list[Result]] = {}
     for result in of(results, Kind.ONE, Kind.TWO):
-        for bound in result.get("bounds", ()):
+        for bound in result.get("bounds", ()) if not unknown(result) else ():
             found.setdefault(bound["parameter"], []).append(bound)
     return found
 

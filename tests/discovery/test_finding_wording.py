@@ -83,13 +83,14 @@ def test_bounds_and_units() -> None:
     assert bound_words(slip) == "within 0.0003 of the rolling resistance"
     assert with_unit("3", "1") == "3"
     wall = UpperBound("wall", "hidden_wall_distance", 0.0, "m", measure="depth of a wall")
-    assert bound_words(wall) == "none"
+    assert bound_words(wall) == "no room for any"
     assert bound_words(replace(wall, bound=0.2)) == "≤ 0.2 m"
 
 
 def test_p_values_and_probabilities() -> None:
     assert [p_words(p) for p in (0.27, 0.0107, 0.001, 1.0)] == ["0.27", "0.011", "0.001", "1"]
-    assert [p_words(p) for p in (9.7e-4, 3.1e-38, 0.0)] == [f"1{TIMES}10⁻³", f"3{TIMES}10⁻³⁸", "< 0.001"]
+    assert [p_words(p) for p in (9.7e-4, 3.1e-38)] == [f"1{TIMES}10⁻³", f"3{TIMES}10⁻³⁸"]
+    assert [p_words(p) for p in (7e-306, 0.0)] == ["< 10⁻⁹⁹"] * 2
     assert {p_words(p) for p in (math.nan, -0.1, 1.1)} == {UNDEFINED}
     assert [chance(p) for p in (0.0, 0.314, 1.0)] == ["< 1 %", "31 %", "> 99 %"]
 

@@ -119,6 +119,7 @@ def test_with_no_cause_to_look_for_what_is_wrong_is_unknown(tmp_path: Path) -> N
     _, finding = finding_of(tmp_path, ["surface_tilt"], seed=1, catalogue=())
     assert finding.verdict is Verdict.UNKNOWN
     assert (finding.causes, finding.upper_bounds, finding.tried) == ((), (), ())
+    assert any(note.startswith("How strong other causes can be at most is not told") for note in finding.notes)
     assert finding.extended.effects == finding.model.effects
 
 

@@ -12,10 +12,11 @@ from vrdp_prob.discovery.candidates.kicked_at_contact import kicked_at_contact
 from vrdp_prob.discovery.candidates.proposals import hidden_things
 from vrdp_prob.discovery.candidates.scores import score_causes
 from vrdp_prob.discovery.finding import UpperBound
-from vrdp_prob.discovery.page.wording import cause_title, title
+from vrdp_prob.discovery.page.wording import cause_title
 from vrdp_prob.discovery.residuals.residual_model import ResidualModel
 from vrdp_prob.discovery.selection.refits import Refits
 from vrdp_prob.discovery.selection.trials import Trial
+from vrdp_prob.discovery.words import title
 from vrdp_prob.models.effects.external_impulse import ExternalImpulse
 from vrdp_prob.models.effects.hidden_obstacle import HiddenObstacle
 from vrdp_prob.models.effects.surface_tilt import SurfaceTilt

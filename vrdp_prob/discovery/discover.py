@@ -1,6 +1,7 @@
 """The search for what a model lacks."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +19,7 @@ from vrdp_prob.discovery.selection.estimates import mass_scale_notes, upper_boun
 from vrdp_prob.discovery.selection.mimics import Unlisted
 from vrdp_prob.discovery.selection.search import Search
 from vrdp_prob.discovery.selection.tried import tried_causes
+from vrdp_prob.discovery.words import title
 from vrdp_prob.inference import default_model
 from vrdp_prob.inference.assembly import limits_of_tracks
 from vrdp_prob.inference.infer import check_model
@@ -96,19 +98,19 @@ def discover(
             outcome = outcome if better is fit else outcome_of(better, looked_for, seed=seed, progress=progress)
         found, causes = outcome.found, outcome.causes
         tried = tried_causes(found, _names_of(found, causes), seed=seed)
-    doubtful = outcome.verdict is Verdict.UNKNOWN
+    doubtful, bounds = outcome.verdict is Verdict.UNKNOWN, _bounds(found, causes)
     return Finding(
         verdict=outcome.verdict,
         causes=causes,
         checks=outcome.checks,
         checks_after=outcome.after,
-        upper_bounds=tuple(_bounds(found, causes)),
+        upper_bounds=tuple(_without_strengths(bounds) if doubtful else bounds),
         model=physics,
         extended=extended_model(found.best, found.overdispersion),
         videos=tuple(tracks.video for tracks in videos),
         description=describe(found.best.fit, outcome.after) if doubtful else None,
         notes=(
-            *_notes(found, outcome.reasons, outcome.unlisted, doubtful=doubtful and bool(causes)),
+            *_notes(found, causes, outcome.reasons, outcome.unlisted, doubtful=doubtful),
             *rivals_outside((cause.effect for cause in causes if cause.named), outcome.checks),
             *mass_scale_notes(_told(found, causes), videos),
             *_limits(videos),
@@ -221,12 +223,28 @@ def _bounds(found: Search, told: Sequence[FoundCause]) -> list[UpperBound]:
     ]
 
 
-def _notes(found: Search, doubted: Sequence[Doubt], unlisted: Sequence[Unlisted], *, doubtful: bool) -> list[str]:
+def _without_strengths(bounds: Sequence[UpperBound]) -> list[UpperBound]:
+    """Bounds where something is left that may be hiding any strength; what paths leave no room for they leave none."""
+    return [one if one.measure is not None else replace(one, bound=None) for one in bounds]
+
+
+def _notes(
+    found: Search,
+    causes: Sequence[FoundCause],
+    doubted: Sequence[Doubt],
+    unlisted: Sequence[Unlisted],
+    *,
+    doubtful: bool,
+) -> list[str]:
     notes = []
-    if doubtful:
+    if doubtful and causes:
         notes.append(
             "Something outside the catalogue is at work. Causes may only follow it, as likely as not, which their "
             "probabilities count."
+        )
+    if doubtful:
+        notes.append(
+            "How strong other causes can be at most is not told: what no cause explains may be hiding any of them."
         )
     notes += [_unlisted_note(one) for one in unlisted]
     if not found.best.fit.joint.converged:
@@ -258,7 +276,7 @@ def _notes(found: Search, doubted: Sequence[Doubt], unlisted: Sequence[Unlisted]
 def _unlisted_note(unlisted: Unlisted) -> str:
     rest = ""
     if unlisted.mimics:
-        than = listed(f"'{name}'" for name in unlisted.mimics)
+        than = listed(f"'{title(name)}'" for name in unlisted.mimics)
         rest = f"; {than} may only follow it, and {'are' if len(unlisted.mimics) > 1 else 'is'} not named"
     laws = listed(f"{law.sentence[0].lower()}{law.sentence[1:].rstrip('.')}" for law in unlisted.laws)
     better = "better" if unlisted.gain > NORMAL_95 * unlisted.error else "at least as well, as far as they can tell,"

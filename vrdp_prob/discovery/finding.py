@@ -365,7 +365,8 @@ class Finding:
     checks
         Tests of the model that was given, and `checks_after` of the extended one.
     upper_bounds
-        Of every cause that `causes` does not tell of.
+        Of every cause that `causes` does not tell of; strengths have none where something is left that no cause
+        explains, which may be hiding any of them.
     model, extended
         The model that was given, and the same with the named causes for further videos of the same table: it believes
         what the videos say of what they share, and of single bodies (masses, restitutions, frictions) what they say of

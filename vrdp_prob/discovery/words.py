@@ -1,9 +1,14 @@
-"""Numbers and directions in sentences."""
+"""Names, numbers and directions in sentences."""
 
 import math
 
 NEAR_AXIS = math.radians(10.0)
 """Angle to an axis below which a direction is called by it."""
+
+
+def title(name: str) -> str:
+    """Name of a cause or parameter as words."""
+    return name.replace("_", " ")
 
 
 def number(value: float) -> str:

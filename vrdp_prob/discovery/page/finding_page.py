@@ -26,13 +26,13 @@ from vrdp_prob.discovery.page.wording import (
     p_words,
     parameter_words,
     ratio_words,
-    title,
     told_gains,
     tried_words,
     typeset,
     with_unit,
 )
 from vrdp_prob.discovery.selection.forecast import TENTHS
+from vrdp_prob.discovery.words import title
 from vrdp_prob.report.templating import asset, environment
 from vrdp_prob.report.wording import counted, listed, sentence
 from vrdp_prob.version import __version__

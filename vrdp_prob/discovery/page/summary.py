@@ -15,11 +15,11 @@ from vrdp_prob.discovery.page.wording import (
     length_unit,
     number,
     ratio_words,
-    title,
     told_gains,
     tried_words,
     with_unit,
 )
+from vrdp_prob.discovery.words import title
 from vrdp_prob.report.wording import counted, listed, number_word, sentence
 
 SURE = 0.9

@@ -13,6 +13,7 @@ from vrdp_prob.discovery.finding import (
     TriedCause,
     UpperBound,
 )
+from vrdp_prob.discovery.words import title
 from vrdp_prob.models.effects.effect import Effect
 from vrdp_prob.models.model_file import known_effects
 from vrdp_prob.models.physics import PhysicsModel
@@ -24,6 +25,8 @@ TOGETHER = "all named causes"
 """What a gain is of that all named causes bring together."""
 MINUS = "\N{MINUS SIGN}"
 TIMES = " \N{MULTIPLICATION SIGN} "
+LEAST_P_VALUE = 1e-99
+"""So far out no law of chance is known to hold."""
 PLAIN_FROM, PLAIN_TO = 1e-4, 1e5
 """Sizes that are written without a power of ten."""
 SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
@@ -121,7 +124,7 @@ def bound_words(bound: UpperBound) -> str:
     if bound.bound is None or not math.isfinite(bound.bound):
         return "no bound"
     if bound.measure is not None and bound.bound <= 0:
-        return "none"
+        return "no room for any"
     where = f" at {bound.told} of {bound.places} places, the others tell nothing" if bound.told < bound.places else ""
     return f"{_bound_size(bound)}{where}"
 
@@ -146,8 +149,8 @@ def p_words(p_value: float) -> str:
     """A p-value: two digits, and a power of ten where it is small."""
     if not 0 <= p_value <= 1:
         return UNDEFINED
-    if p_value == 0:
-        return "< 0.001"
+    if p_value < LEAST_P_VALUE:
+        return f"< {_power_of_ten(round(math.log10(LEAST_P_VALUE)))}"
     if p_value >= 0.001:
         return f"{p_value:.2g}"
     digit, power = f"{p_value:.0e}".split("e")
@@ -161,11 +164,6 @@ def length_unit(lengths: Iterable[float]) -> tuple[float, str]:
         (unit for unit in ((1.0, "m"), (1e3, "mm")) if largest * unit[0] >= 1 or largest == 0),
         (1e6, "µm"),
     )
-
-
-def title(name: str) -> str:
-    """Name of a cause or parameter as words."""
-    return name.replace("_", " ")
 
 
 def cause_title(cause: FoundCause | TriedCause | UpperBound) -> str:

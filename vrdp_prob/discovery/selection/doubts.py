@@ -16,6 +16,7 @@ from vrdp_prob.discovery.checks.measurement import DISTORTION
 from vrdp_prob.discovery.finding import Check
 from vrdp_prob.discovery.selection.estimates import surprise
 from vrdp_prob.discovery.selection.trials import Trial
+from vrdp_prob.discovery.words import title
 from vrdp_prob.models.effects.clock_error import ClockError
 from vrdp_prob.models.effects.contact_friction import ContactFriction
 from vrdp_prob.models.effects.contact_radius_error import ContactRadiusError
@@ -75,7 +76,7 @@ def doubts(trial: Trial, cause: Effect, left: Sequence[Check] = ()) -> Iterator[
     if of_parameters < SURPRISING:
         yield Doubt(
             of_parameters / SURPRISING,
-            f"The parameters of '{cause.name}' are far from what was expected of this cause: it may stand for "
+            f"The parameters of '{title(cause.name)}' are far from what was expected of this cause: it may stand for "
             "something that it has as its limit, and its probability counts that.",
         )
     own = sorted((one for one in left if one.name in OWN_CHECKS.get(cause.name, ())), key=lambda one: one.p_value)
@@ -84,8 +85,8 @@ def doubts(trial: Trial, cause: Effect, left: Sequence[Check] = ()) -> Iterator[
         otherwise = ", or it happened more often than was found" if happens_once(cause) else ""
         yield Doubt(
             by_chance / SURPRISING,
-            f"With '{cause.name}' the check of {own[0].name} fails still, which asks for just what this cause does: "
-            f"its law is another one{otherwise}, and its probability counts that.",
+            f"With '{title(cause.name)}' the check of {own[0].name} fails still, which asks for just what this cause "
+            f"does: its law is another one{otherwise}, and its probability counts that.",
         )
 
 

@@ -20,11 +20,13 @@ from tests.discovery.findings import (
 )
 from tests.report.browser import Browser, find_chromium
 from tests.report.outline import Outline
+from vrdp_prob.discovery.finding import Estimate
 from vrdp_prob.discovery.page.changed_answers import answers_sentence
 from vrdp_prob.discovery.page.finding_page import render
 from vrdp_prob.discovery.page.summary import lines, summary, verdict_sentence
 from vrdp_prob.discovery.page.wording import TIMES, typeset
 
+ROLLING = Estimate(0.5, 0.1, 0.3, 0.7, "1")
 DRAWING = """<?xml version="1.0"?>
 <!DOCTYPE svg PUBLIC "-//W3C//DTD SVG 1.1//EN" "http://www.w3.org/Graphics/SVG/1.1/DTD/svg11.dtd">
 <svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 9 9"><metadata>http://example.org</metadata>
@@ -261,3 +263,27 @@ def test_a_browser_shows_it_without_scrolling_sideways(browser, tmp_path, kind, 
     assert browser.run("document.documentElement.scrollWidth <= window.innerWidth")
     assert browser.problems == []
     assert all(request.startswith(("data:", file.as_uri())) for request in browser.requests)
+
+
+def test_values_of_single_bodies_are_folded_where_they_are_many():
+    many = {f"release_rolling[{body} in v{number}]": ROLLING for body in ("white", "red") for number in range(4)}
+    slip = replace(TILT, name="slip_to_roll", parameters={"slip_friction": ROLLING, **many}, way=None)
+    finding = replace(named(), causes=(slip,))
+    page = render(finding)
+    folded = re.search(r"<details>\s*<summary>Eight values of single bodies</summary>.*?</details>", page, re.DOTALL)
+    assert folded is not None
+    assert all(f"<code>{name}</code>" in folded[0] for name in many)
+    assert "<code>slip_friction</code>" not in folded[0]
+    told = "\n".join(lines(finding))
+    assert "slip friction 0.50" in told
+    assert "and eight values of single bodies" in told
+    assert "release rolling" not in told
+    few = replace(slip, parameters=dict(list(slip.parameters.items())[:4]))
+    assert "values of single bodies" not in render(replace(finding, causes=(few,)))
+
+
+def test_a_description_without_accelerations_tells_of_none():
+    finding = unknown()
+    without = replace(finding, description=replace(finding.description, size=0.0))
+    assert "The missing acceleration is" in text_of(render(finding))
+    assert "The missing acceleration is" not in text_of(render(without))

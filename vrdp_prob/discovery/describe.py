@@ -26,6 +26,8 @@ CLEARLY = 1.5
 """Ratio of sizes from which on one part of the motion is said to show more of an effect than another."""
 NOTABLE = 0.1
 """Share below which a part of what is unexplained is not worth a word."""
+FEWEST_WINDOWS = 6
+"""Windows of free flight from which a missing acceleration is told of."""
 MOST_CHECKS = 2
 """Checks that are quoted."""
 
@@ -67,7 +69,7 @@ def description_of(model: ResidualModel, checks: Sequence[Check]) -> Description
         *_contact_sentences(of_contacts, contact_formula, checks),
         *_check_sentences(checks),
     ]
-    size = float(np.sqrt(2)) * windows.size
+    size = float(np.sqrt(2)) * windows.size if _show_something(windows) else 0.0
     return Description(formula, found.explained, size, tuple(sentences), contact_formula, of_contacts.explained)
 
 
@@ -118,6 +120,10 @@ def _share_sentences(model: ResidualModel, freed: ResidualModel, noise: float) -
         yield "What is unexplained builds up in free flight, not at contacts."
 
 
+def _show_something(windows: Windows) -> bool:
+    return windows.size > 0 and len(windows.time) >= FEWEST_WINDOWS
+
+
 def _window_sentences(windows: Windows) -> Iterator[str]:
     """Size and direction of the missing acceleration, and where in speed, time and place there is more of it."""
     if windows.lost:
@@ -125,7 +131,7 @@ def _window_sentences(windows: Windows) -> Iterator[str]:
             f"Far more is missing in {listed(windows.lost)} than the tracks show where nothing touches, or than in the "
             "other videos, as where a contact is missed or lasts; that is left out of what is said of accelerations."
         )
-    if windows.size == 0 or len(windows.time) < 6:
+    if not _show_something(windows):
         if len(windows.time) or not windows.lost:
             yield "No missing acceleration shows in free flight" + (" of the others." if windows.lost else ".")
         return

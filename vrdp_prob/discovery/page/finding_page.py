@@ -2,7 +2,7 @@
 
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import Any
@@ -10,7 +10,7 @@ from typing import Any
 from markupsafe import Markup
 
 from vrdp_prob.datasets.folder import some
-from vrdp_prob.discovery.finding import Check, Description, Finding, FoundCause, Gain, UpperBound, Verdict
+from vrdp_prob.discovery.finding import Check, Description, Estimate, Finding, FoundCause, Gain, UpperBound, Verdict
 from vrdp_prob.discovery.page.changed_answers import rows
 from vrdp_prob.discovery.page.gain_figure import STRETCHES, error_figure, video_figure
 from vrdp_prob.discovery.page.summary import POSSIBLE, possible, summary, verdict_sentence
@@ -22,6 +22,7 @@ from vrdp_prob.discovery.page.wording import (
     difference_words,
     effect_of,
     estimate_words,
+    leading_and_own,
     number,
     p_words,
     parameter_words,
@@ -33,6 +34,7 @@ from vrdp_prob.discovery.page.wording import (
 )
 from vrdp_prob.discovery.selection.forecast import TENTHS
 from vrdp_prob.discovery.words import title
+from vrdp_prob.models.effects.effect import Effect
 from vrdp_prob.report.templating import asset, environment
 from vrdp_prob.report.wording import counted, listed, sentence
 from vrdp_prob.version import __version__
@@ -78,6 +80,7 @@ def render(finding: Finding) -> str:
 
 def _cause(cause: FoundCause, finding: Finding) -> dict[str, Any]:
     effect = effect_of(cause.effect, finding.extended)
+    leading, own = leading_and_own(cause, effect)
     said = chance(cause.probability)
     return {
         "title": cause_title(cause),
@@ -91,18 +94,25 @@ def _cause(cause: FoundCause, finding: Finding) -> dict[str, Any]:
             "chosen": cause.named,
             "label": f"{cause_title(cause)}: {said}",
         },
-        "parameters": [
-            {
-                "name": name,
-                "words": sentence(parameter_words(name, effect)),
-                **dict(zip(("mean", "interval"), estimate_words(estimate), strict=True)),
-            }
-            for name, estimate in cause.parameters.items()
-        ],
+        "parameters": _estimates(leading, effect),
+        "own": _estimates(own, effect),
+        "own_words": f"{sentence(counted(len(own), 'value'))} of single bodies",
         "law": effect.law if effect is not None else "",
         "source": effect.source if effect is not None else "",
         "difference": difference_words(cause.gain),
     }
+
+
+def _estimates(estimates: Mapping[str, Estimate], effect: Effect | type[Effect] | None) -> list[dict[str, str]]:
+    """Rows of a table of estimates."""
+    return [
+        {
+            "name": name,
+            "words": sentence(parameter_words(name, effect)),
+            **dict(zip(("mean", "interval"), estimate_words(estimate), strict=True)),
+        }
+        for name, estimate in estimates.items()
+    ]
 
 
 def _others(finding: Finding) -> dict[str, Any]:
@@ -237,7 +247,7 @@ def _description(description: Description) -> dict[str, Any]:
     return {
         "sentences": [typeset(one) for one in description.sentences],
         "formula": description.formula if description.has_formula else "",
-        "size": with_unit(number(description.size), "m/s^2"),
+        "size": with_unit(number(description.size), "m/s^2") if description.size else "",
         "explained": _percent(description.explained),
         "contact_formula": description.contact_formula,
         "contact_explained": _percent(description.contact_explained),

@@ -11,7 +11,9 @@ from vrdp_prob.discovery.page.wording import (
     cause_title,
     chance,
     difference_words,
+    effect_of,
     estimate_words,
+    leading_and_own,
     length_unit,
     number,
     ratio_words,
@@ -76,9 +78,11 @@ def lines(finding: Finding) -> list[str]:
     told = [verdict_sentence(finding)]
     for cause in finding.named:
         told.append(f"  {cause_title(cause)}: probability {chance(cause.probability)}; {_gain_line(cause.gain)}")
-        for name, estimate in cause.parameters.items():
+        leading, own = leading_and_own(cause, effect_of(cause.effect, finding.extended))
+        for name, estimate in leading.items():
             mean, interval = estimate_words(estimate)
             told.append(f"      {title(name)} {mean} (95 %: {interval})")
+        told += [f"      and {counted(len(own), 'value')} of single bodies"] if own else []
     told += [f"  {words}: {_gain_line(gain)}" for words, gain in told_gains(finding) if words == TOGETHER]
     if finding.description is not None:
         told += [f"  {line}" for line in finding.description.sentences]

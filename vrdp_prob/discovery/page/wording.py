@@ -16,6 +16,7 @@ from vrdp_prob.discovery.finding import (
 from vrdp_prob.discovery.words import title
 from vrdp_prob.models.effects.effect import Effect
 from vrdp_prob.models.model_file import known_effects
+from vrdp_prob.models.parameters import Scope
 from vrdp_prob.models.physics import PhysicsModel
 from vrdp_prob.report.wording import percent
 
@@ -27,6 +28,8 @@ MINUS = "\N{MINUS SIGN}"
 TIMES = " \N{MULTIPLICATION SIGN} "
 LEAST_P_VALUE = 1e-99
 """So far out no law of chance is known to hold."""
+MOST_OF_BODIES = 4
+"""Estimates of single bodies that stand among the others of a cause."""
 PLAIN_FROM, PLAIN_TO = 1e-4, 1e5
 """Sizes that are written without a power of ten."""
 SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
@@ -177,6 +180,18 @@ def effect_of(name: str, model: PhysicsModel) -> Effect | type[Effect] | None:
     """The effect of a name, of a model or the catalogue; None for a stranger."""
     own = next((effect for effect in model.effects if effect.name == name), None)
     return own if own is not None else known_effects().get(name)
+
+
+def leading_and_own(
+    cause: FoundCause, effect: Effect | type[Effect] | None
+) -> tuple[dict[str, Estimate], dict[str, Estimate]]:
+    """Estimates of a cause that lead, and those of single bodies where these are many and stand beside others."""
+    stated = () if effect is None else effect.parameters
+    own = {one.name for one in stated if one.scope is Scope.BODY}
+    of_bodies = {name: one for name, one in cause.parameters.items() if name.partition("[")[0] in own}
+    if len(of_bodies) <= MOST_OF_BODIES or len(of_bodies) == len(cause.parameters):
+        return dict(cause.parameters), {}
+    return {name: one for name, one in cause.parameters.items() if name not in of_bodies}, of_bodies
 
 
 def parameter_words(name: str, effect: Effect | type[Effect] | None) -> str:

@@ -1,5 +1,6 @@
 """Checks fire on what they are for: the generator's change of the measured places, on top of what a null leaves."""
 
+import re
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import cache
@@ -12,11 +13,12 @@ from tests.discovery.fitted import fitted, moved
 from tests.discovery.test_checks import by_name
 from tests.discovery.videos import Video, move, recorded
 from vrdp_prob.discovery.checks.clock import LOST, SINGLE
-from vrdp_prob.discovery.checks.contacts import DISTANCE, contact_checks
+from vrdp_prob.discovery.checks.contacts import DISTANCE, MOMENTUM, RUBBING, contact_checks
 from vrdp_prob.discovery.checks.flight import free_flight_checks
 from vrdp_prob.discovery.checks.kicks import KICK
 from vrdp_prob.discovery.checks.measurement import DISTORTION, OUTLIERS, measurement_checks
 from vrdp_prob.discovery.finding import Check
+from vrdp_prob.discovery.residuals.fitted_motion import FittedMotion
 from vrdp_prob.discovery.residuals.free_flight import FreeFlight
 from vrdp_prob.discovery.residuals.residual_model import ResidualModel
 from vrdp_prob.scene import Body, Shape
@@ -124,6 +126,136 @@ def test_a_push_to_the_side_of_some_bodies_is_told_by_what_they_are(
     assert before[check].p_value > CHANCE
     assert after[check].p_value < CHANCE
     assert after[check].sentence.startswith(says)
+
+
+def speed(motion: FittedMotion) -> Float[np.ndarray, "time body 1"]:
+    return np.linalg.norm(motion.velocity, axis=-1, keepdims=True)
+
+
+def forward(motion: FittedMotion) -> Float[np.ndarray, "time body 2"]:
+    return np.asarray(motion.velocity / np.maximum(speed(motion), 1e-6))
+
+
+def left(motion: FittedMotion) -> Float[np.ndarray, "time body 2"]:
+    return np.stack([-forward(motion)[..., 1], forward(motion)[..., 0]], axis=-1)
+
+
+def way(motion: FittedMotion) -> Float[np.ndarray, "time body 1"]:
+    return np.cumsum(speed(motion) * np.diff(motion.times, prepend=motion.times[0])[:, None, None], axis=0)
+
+
+def towards_others(motion: FittedMotion) -> Float[np.ndarray, "time body 2"]:
+    apart = motion.position[:, None] - motion.position[:, :, None]
+    return np.asarray((apart / (np.linalg.norm(apart, axis=-1, keepdims=True) ** 3 + 1e-3)).sum(axis=2))
+
+
+def sway(motion: FittedMotion) -> Float[np.ndarray, "time body 2"]:
+    return np.sin(9.0 * motion.times)[:, None, None] * np.ones_like(motion.velocity) * (1.0, 0.0)
+
+
+Field = Callable[[FittedMotion], Float[np.ndarray, "time body 2"]]
+FIELDS: dict[str, tuple[Field, str]] = {
+    "push in one direction": (
+        lambda one: np.ones_like(one.velocity) * (1.0, 0.0),
+        r"by 0\.(099|10) .* towards \+x",
+    ),
+    "push against place": (lambda one: one.position - one.position.mean(axis=(0, 1)), r"0\.1\d m/s\^2 per m away"),
+    "push against speed": (
+        lambda one: speed(one) * (1.0, 0.0),
+        r"towards \+x, the more .* 0\.(099|10) m/s\^2 per",
+    ),
+    "push against time": (sway, r"to and fro 1\.4 times a second"),
+    "acceleration along the velocity against speed": (
+        lambda one: -np.exp(-speed(one) / 0.15) * forward(one),
+        "in a way that changes with speed",
+    ),
+    "acceleration along the velocity against the direction of motion": (
+        lambda one: (forward(one)[..., :1] ** 2 - forward(one)[..., 1:] ** 2) * forward(one),
+        "depends on the direction of motion",
+    ),
+    "acceleration along the velocity against place": (
+        lambda one: one.position[..., :1] * forward(one),
+        "in a way that changes with the place",
+    ),
+    "acceleration along the velocity against time": (
+        lambda one: -one.times[:, None, None] * forward(one),
+        r"by -0\.(099|10)\d* m/s\^2 per s",
+    ),
+    "acceleration along the velocity against the way travelled": (
+        lambda one: -way(one) * forward(one),
+        r"by -0\.(099|10)\d* m/s\^2 per m",
+    ),
+    "acceleration across the velocity against speed": (left, r"\+0\.10 m/s\^2 to the left"),
+    "acceleration across the velocity against place": (
+        lambda one: one.position[..., :1] * speed(one) * left(one),
+        "pushed sideways .* changes with the place",
+    ),
+    "acceleration across the velocity against time": (
+        lambda one: one.times[:, None, None] * speed(one) * left(one),
+        "changes in the course of the video",
+    ),
+    "acceleration against the distance to other bodies": (towards_others, "attract each other"),
+}
+STRENGTH = 0.1
+"""Acceleration in m/s^2 of the fields, in units of m, m/s and s."""
+
+
+@pytest.mark.parametrize("name", FIELDS)
+def test_a_check_of_free_flight_fires_on_its_field_and_says_how_large_it_is(name: str) -> None:
+    _, model = null()
+    field, says = FIELDS[name]
+    changes = [video.motion.pushed(STRENGTH * field(video.motion)[..., None])[:, :, :2, 0] for video in model.videos]
+    before, after = (by_name(free_flight_checks(FreeFlight.of(one)))[name] for one in (model, moved(model, changes)))
+    assert before.p_value > CHANCE
+    assert after.p_value < CHANCE
+    assert re.search(says, after.sentence)
+
+
+def struck_aside(model: ResidualModel, back: float) -> list[Float[np.ndarray, "time body 2"]]:
+    """Contacts at which one body is struck along the side that it touches with, and the other back by a share of it."""
+    changes = []
+    for video in model.videos:
+        motion, events = video.motion, video.motion.events
+        acceleration = np.zeros_like(motion.velocity)
+        bodies = acceleration.shape[1]
+        for time, first, second in zip(events.time, events.first, events.second, strict=True):
+            frame = int(np.searchsorted(motion.times, time))
+            if not (0 <= first < bodies and 0 <= second < bodies and frame + 2 < len(motion.times)):
+                continue
+            apart = motion.position[frame, second] - motion.position[frame, first]
+            side = np.array([-apart[1], apart[0]]) / np.linalg.norm(apart)
+            impulse = 0.1 * side / (motion.times[frame + 1] - motion.times[frame])
+            acceleration[frame, first] += impulse / motion.mass[first]
+            acceleration[frame, second] -= back * impulse / motion.mass[second]
+        changes.append(motion.pushed(acceleration[..., None])[:, :, :2, 0])
+    return changes
+
+
+@pytest.mark.parametrize(
+    ("name", "back", "says"),
+    [(RUBBING, 1.0, "At contacts tangential impulses act"), (MOMENTUM, 0.0, "Momentum is not kept at contacts")],
+)
+def test_a_check_of_contacts_fires_on_its_impulses(name: str, back: float, says: str) -> None:
+    _, model = null()
+    found = checked(moved(model, struck_aside(model, back)))[name]
+    assert found.p_value < CHANCE
+    assert says in found.sentence
+
+
+def test_noise_that_remembers_is_told_by_its_memory_and_its_size() -> None:
+    _, model = null()
+    generator = np.random.default_rng(0)
+    changes = []
+    for video in model.videos:
+        noise = generator.normal(0, 0.002, video.motion.position.shape)
+        for frame in range(1, len(noise)):
+            noise[frame] = 0.7 * noise[frame - 1] + np.sqrt(1 - 0.7**2) * noise[frame]
+        changes.append(noise)
+    found = checked(moved(model, changes))
+    assert found["memory of the residuals"].p_value < CHANCE
+    assert "the noise has a memory" in found["memory of the residuals"].sentence
+    assert found["size of the residuals"].p_value < CHANCE
+    assert "times as large as the roughness" in found["size of the residuals"].sentence
 
 
 def grossly_wrong(model: ResidualModel, sd: float) -> ResidualModel:

@@ -37,6 +37,9 @@ RESULTS = Path("out") / "measured"
 FREE, GLIDERS, PUCKS = "glider_free_1d", "glider_collisions_1d_rubber", "puck_collisions_2d"
 TRUE_PARAMETER = {"surface_tilt": "tilt_x", "linear_drag": "linear_drag", "lens_distortion": "distortion"}
 
+ERRORS = ("rmse", "rmse_one_second", "rmse_end")
+"""Errors of predicted positions that are told: over all frames, one second ahead, and at the end."""
+
 
 @dataclass(frozen=True)
 class Task:
@@ -131,7 +134,7 @@ def _summary(finding: Finding) -> Result:
 def _findings(results: Sequence[Result], tasks: Mapping[str, Task]) -> list[str]:
     """What was found in the tracks as they are."""
     head: tuple[str, ...] = ("set", "videos", "verdict", "causes", "gain, nats", "error, mm", "one second ahead")
-    head += ("90 % hold", "noise, mm", "checks that fail", "CPU min", "commit")
+    head += ("at the end", "90 % hold", "noise, mm", "checks that fail", "CPU min", "commit")
     lines = [table_row(*head), table_row(*["---"] * len(head))]
     return lines + [table_row(*_row(result)) for result in results if tasks[result["name"]].way is None]
 
@@ -142,10 +145,7 @@ def _row(result: Result) -> list[str]:
     cells.append(", ".join(f"`{one['name']}` {one['probability']:.2f}" for one in named) or "-")
     gains = [one["held_out_gain"] for one in named]
     cells.append(", ".join(map(_nats, gains)) or "-")
-    cells += [
-        ", ".join(f"{_mm(one['before'][key])} → {_mm(one['after'][key])}" for one in gains) or "-"
-        for key in ("rmse", "rmse_one_second")
-    ]
+    cells += [", ".join(_errors(one)[k] for one in gains) or "-" for k in range(len(ERRORS))]
     cells.append(", ".join(_covered(one) for one in gains) or "-")
     noise = _mm(gains[0]["noise_sd"]) if gains else "-"
     return [*cells, noise, _failing(result), f"{result['seconds'] / 60:.0f}", f"`{result['version']}`"]
@@ -153,6 +153,11 @@ def _row(result: Result) -> list[str]:
 
 def _nats(gain: Result) -> str:
     return f"{gain['elpd_difference']:.0f} ± {gain['elpd_se']:.0f}"
+
+
+def _errors(gain: Result) -> list[str]:
+    """Errors of what is predicted of left-out videos, without and with a cause, in the order of `ERRORS`."""
+    return [f"{_mm(gain['before'][key])} → {_mm(gain['after'][key])}" for key in ERRORS]
 
 
 def _covered(gain: Result) -> str:
@@ -165,7 +170,7 @@ def _failing(result: Result) -> str:
     before, after = (
         sum(check["significant"] for check in result[when] or ()) for when in ("evidence", "evidence_after")
     )
-    extended = f" → {after}" if result["evidence_after"] else ""
+    extended = f" → {after}" if any(one["named"] for one in result["causes"]) else ""
     return f"{before}{extended} of {len(result['evidence'])}"
 
 
@@ -176,7 +181,8 @@ def _mm(value: float | None) -> str:
 def _recovered(results: Sequence[Result], tasks: Mapping[str, Task]) -> list[str]:
     """What became of the effects that were added."""
     head: tuple[str, ...] = ("set", "added", "strength", "verdict", "its probability", "found (95 %)", "inside")
-    head += ("gain, nats", "checks that fail", "named beside it", "commit")
+    head += ("gain, nats", "error, mm", "one second ahead", "at the end")
+    head += ("checks that fail", "named beside it", "commit")
     lines = ["", table_row(*head), table_row(*["---"] * len(head))]
     for result in results:
         task = tasks[result["name"]]
@@ -186,12 +192,13 @@ def _recovered(results: Sequence[Result], tasks: Mapping[str, Task]) -> list[str
         others = [one["name"] for one in result["causes"] if one["named"] and one["name"] != task.way]
         cells = [f"`{result['name'].partition('+')[0]}`", f"`{task.way}`", f"{task.strength:g}", result["verdict"]]
         if cause is None:
-            cells += ["-", "-", "-", "-"]
+            cells += ["-"] * (4 + len(ERRORS))
         else:
             found = cause["parameters"][TRUE_PARAMETER[task.way]]
             inside = "yes" if found["q025"] <= task.strength <= found["q975"] else "**no**"
             interval = f"{found['mean']:.3g} ({found['q025']:.3g} to {found['q975']:.3g})"
-            cells += [f"{cause['probability']:.2f}", interval, inside, _nats(cause["held_out_gain"])]
+            gain = cause["held_out_gain"]
+            cells += [f"{cause['probability']:.2f}", interval, inside, _nats(gain), *_errors(gain)]
         beside = ", ".join(f"`{one}`" for one in others) or "-"
         lines.append(table_row(*cells, _failing(result), beside, f"`{result['version']}`"))
     return lines

@@ -95,7 +95,7 @@ def test_nothing_is_found_where_nothing_is_hidden_and_the_same_seed_says_the_sam
     assert first.verdict is Verdict.NONE
     assert not first.named
     assert first.extended.effects == first.model.effects
-    assert first.upper_bounds
+    assert any(bound.bound is not None for bound in first.upper_bounds)
     assert again.checks == first.checks
     assert again.upper_bounds == first.upper_bounds
 
@@ -123,11 +123,30 @@ def test_with_no_cause_to_look_for_what_is_wrong_is_unknown(tmp_path: Path) -> N
     assert finding.extended.effects == finding.model.effects
 
 
+def test_two_causes_are_both_found(tmp_path: Path) -> None:
+    truth, finding = finding_of(
+        tmp_path, ["surface_tilt", "linear_drag"], seed=1, effect_size=5.0, setting=PAIRS, catalogue=SMOOTH
+    )
+    assert finding.verdict is Verdict.NAMED
+    assert {cause.name for cause in finding.named} == {cause.name for cause in truth.causes}
+    assert finding.gain is not None
+    assert finding.gain.elpd_difference > gain_needed(len(SMOOTH))
+
+
+def test_what_has_no_name_is_given_none(tmp_path: Path) -> None:
+    _, finding = finding_of(tmp_path, ["shaking"], seed=1, effect_size=6.0, setting=PAIRS, catalogue=SMOOTH)
+    assert finding.verdict is Verdict.UNKNOWN
+    assert all(cause.probability <= SURE for cause in finding.causes)
+    assert finding.description is not None
+    assert finding.description.size > 0
+    assert all(bound.bound is None for bound in finding.upper_bounds)
+
+
 @pytest.mark.slow
 def test_a_cause_that_is_not_looked_for_is_not_called_another_one(tmp_path: Path) -> None:
     _, finding = finding_of(tmp_path, ["surface_tilt"], seed=1, catalogue=SMOOTH[1:])
     assert finding.verdict is Verdict.UNKNOWN
-    assert all(cause.probability <= 0.45 for cause in finding.causes)
+    assert all(cause.probability <= 0.5 for cause in finding.causes)
 
 
 @pytest.mark.slow

@@ -28,6 +28,7 @@ from vrdp_prob.inference.runs.journal import journal
 from vrdp_prob.inference.runs.parallel import linear_algebra_in_one_thread, several_processes
 from vrdp_prob.inference.several_videos.fitting import fit_together
 from vrdp_prob.inference.several_videos.second_look import explained, loses_single_videos
+from vrdp_prob.inference.several_videos.spin_islands import with_other_spins
 from vrdp_prob.models.effects.effect import Effect
 from vrdp_prob.models.model_file import known_effects
 from vrdp_prob.models.physics import PhysicsModel
@@ -93,8 +94,9 @@ def discover(
             with (progress or SilentProgress()).stage("Searching lost videos anew"):
                 fit = fit.with_lost_courses(seed=seed)
         outcome = outcome_of(fit, looked_for, seed=seed, progress=progress)
-        if outcome.verdict is Verdict.UNKNOWN and not outcome.found.best.causes:
-            better = fit.with_other_courses(seed=seed) if explained(fit.fits) else fit
+        if outcome.verdict is Verdict.UNKNOWN and not outcome.found.best.causes and explained(fit.fits):
+            with (progress or SilentProgress()).stage("Searching all videos anew"):
+                better = with_other_spins(fit, seed=seed).with_other_courses(seed=seed)
             outcome = outcome if better is fit else outcome_of(better, looked_for, seed=seed, progress=progress)
         found, causes = outcome.found, outcome.causes
         tried = tried_causes(found, _names_of(found, causes), seed=seed)

@@ -19,7 +19,7 @@ from vrdp_prob.progress import ProgressDisplay
 
 MIMIC = 0.5
 """Probability that a cause only follows something outside the catalogue, where something outside it is at work."""
-EXPLAINED = 0.5
+EXPLAINED, MENDED = 0.5, 0.6
 """Share of what the model left unexplained beyond the noise, and of the checks that failed, that the named causes must
 explain for them to be the verdict where something is left."""
 LEFT_LEVEL = 0.005
@@ -116,9 +116,9 @@ def _verdict(found: Search, before: Sequence[Check], after: Sequence[Check]) -> 
     left = min((check.p_value for check in after), default=1.0) * len(after) < LEFT_LEVEL
     if not found.best.causes:
         return Verdict.UNKNOWN if left else Verdict.NONE
-    most = 1 - EXPLAINED
-    explained = _excess(found.best) <= most * _excess(found.base) and _failing(after) <= most * _failing(before)
-    return Verdict.UNKNOWN if left and not explained else Verdict.NAMED
+    explained = _excess(found.best) <= (1 - EXPLAINED) * _excess(found.base)
+    mended = _failing(after) <= (1 - MENDED) * _failing(before)
+    return Verdict.UNKNOWN if left and not (explained and mended) else Verdict.NAMED
 
 
 def _failing(checks: Sequence[Check]) -> int:

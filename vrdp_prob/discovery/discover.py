@@ -244,10 +244,6 @@ def _notes(
             "Something outside the catalogue is at work. Causes may only follow it, as likely as not, which their "
             "probabilities count."
         )
-    if doubtful:
-        notes.append(
-            "How strong other causes can be at most is not told: what no cause explains may be hiding any of them."
-        )
     notes += [_unlisted_note(one) for one in unlisted]
     if not found.best.fit.joint.converged:
         notes.append(
@@ -271,6 +267,10 @@ def _notes(
             f"{np.sqrt(found.overdispersion[worst]):.2g} times as large as noise would leave them in video "
             f"{found.base.fit.videos[worst]}. Gains are divided by the squares of such factors, and intervals "
             "are that much wider."
+        )
+    if doubtful:
+        notes.append(
+            "How strong other causes can be at most is not told: what no cause explains may be hiding any of them."
         )
     return notes
 

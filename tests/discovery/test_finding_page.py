@@ -278,6 +278,10 @@ def test_values_of_single_bodies_are_folded_where_they_are_many():
     assert "slip friction 0.50" in told
     assert "and eight values of single bodies" in told
     assert "release rolling" not in told
+    times = {f"impulse_time[v{number}]": ROLLING for number in range(4)}
+    sizes = {f"impulse_x[white in v{number}]": ROLLING for number in range(8)}
+    kicks = replace(slip, name="external_impulse", parameters={**times, **sizes})
+    assert "values of single bodies" not in render(replace(finding, causes=(kicks,)))
     few = replace(slip, parameters=dict(list(slip.parameters.items())[:4]))
     assert "values of single bodies" not in render(replace(finding, causes=(few,)))
 

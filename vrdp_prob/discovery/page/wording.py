@@ -185,11 +185,11 @@ def effect_of(name: str, model: PhysicsModel) -> Effect | type[Effect] | None:
 def leading_and_own(
     cause: FoundCause, effect: Effect | type[Effect] | None
 ) -> tuple[dict[str, Estimate], dict[str, Estimate]]:
-    """Estimates of a cause that lead, and those of single bodies where these are many and stand beside others."""
-    stated = () if effect is None else effect.parameters
-    own = {one.name for one in stated if one.scope is Scope.BODY}
-    of_bodies = {name: one for name, one in cause.parameters.items() if name.partition("[")[0] in own}
-    if len(of_bodies) <= MOST_OF_BODIES or len(of_bodies) == len(cause.parameters):
+    """Estimates of a cause that lead, and those of single bodies where these are many and something shared leads."""
+    scopes = {one.name: one.scope for one in (() if effect is None else effect.parameters)}
+    of = {name: scopes.get(name.partition("[")[0]) for name in cause.parameters}
+    of_bodies = {name: one for name, one in cause.parameters.items() if of[name] is Scope.BODY}
+    if len(of_bodies) <= MOST_OF_BODIES or not {Scope.SHARED, Scope.MATERIAL} & set(of.values()):
         return dict(cause.parameters), {}
     return {name: one for name, one in cause.parameters.items() if name not in of_bodies}, of_bodies
 

@@ -13,14 +13,12 @@ import torch
 from jaxtyping import Float
 
 from tests.simulator.comparison import scenes
-from tests.simulator.scenes import CUBE, DISC, FRAMES, SPHERE
-from vrdp_prob.models.effects.pair_force import PairForce
-from vrdp_prob.models.physics import PhysicsModel
+from tests.simulator.scenes import FRAMES
+from tests.simulator.test_differences import COUPLED, MIXES
 from vrdp_prob.models.simulator.rollout import simulate
 from vrdp_prob.models.simulator.source import CACHE_VARIABLE
 
 COUNT = 150
-MIXES = {"discs": (DISC, SPHERE, DISC, DISC), "mixed": (CUBE, DISC, CUBE, SPHERE)}
 WITHIN = {"discs": (1e-8, 1e-7), "mixed": (1e-7, 1e-5)}
 """Largest distance in m in the scene in the middle, and in the 95th of a hundred."""
 FINER = """
@@ -44,7 +42,7 @@ def paths(shapes: Sequence[object]) -> Float[np.ndarray, "scene time body column
     strengths = torch.linspace(-0.08, 0.08, COUNT, dtype=torch.float64)
     softening = torch.full((COUNT,), 0.1, dtype=torch.float64)
     worlds = replace(worlds, parameters={**worlds.parameters, "pair_strength": strengths, "pair_softening": softening})
-    found: np.ndarray = simulate(worlds, FRAMES, PhysicsModel.base().with_effect(PairForce())).trajectory.numpy()
+    found: np.ndarray = simulate(worlds, FRAMES, COUPLED).trajectory.numpy()
     return found
 
 

@@ -11,10 +11,10 @@ from dataclasses import replace
 from vrdp_prob.inference.search.yaw_search import tells_yaws_by_contacts
 from vrdp_prob.inference.several_videos.ascent import ImpossibleStartError
 from vrdp_prob.inference.several_videos.fitting import NEWS, SharedFit, fit_together
-from vrdp_prob.models.parameters import Parameter, Prior, Scope
+from vrdp_prob.models.parameters import ANGULAR_DRAG, Parameter, Prior, Scope
 from vrdp_prob.models.physics import PhysicsModel
 
-DECAY = "angular_drag"
+DECAY = ANGULAR_DRAG.name
 """The shared number on which the yaws hang."""
 PLACES, WIDTH = (-1.5, -0.5, 0.5, 1.5), 0.15
 """Where it is believed to be, and how surely, in standard deviations of its prior."""

@@ -26,6 +26,8 @@ SLACK = 1e-7
 """Depth in m of that, and of an overlap that is not yet an error."""
 STILL = 1e-9
 """Closing speed in m/s below which bodies do not collide, however deep: rounding errors of the velocities are less."""
+UNNOTICED = 1e-9
+"""Depth in m by which bodies that are SLACK deep, and do not close, may come closer between two looks."""
 CRAWL = 1e-6
 """Shortest walk in s while two bodies touch."""
 # Columns of `table`; a contact has 6 numbers of features (x, y, extent of the owner, the same of the other).
@@ -34,7 +36,7 @@ CONTACT_TIME, PAIR_KIND, OWNER, OVERLAPPING, LAST_CONTACT, PAIR_FEATURE, PRESSIN
 # that press already (whether there is one, whether the second body owns the side, the side's normal, the corner);
 # bounds on the fall of the rate in the frames of both; the corner nearest to a side; room for one polynomial.
 ANGLE_FIRST, LOOK, LOOK_FEATURE, KNOWN, BOUNDS, CORNER, POWERS = 2, 4, 5, 6, 8, 9, 10
-GAP, RATE, CURVATURE, STILL_RATE = 0, 1, 2, 3
+GAP, RATE, CURVATURE = 0, 1, 2
 
 
 Pairs = Bundle(
@@ -128,13 +130,9 @@ def walk(gap, rate, curvature):
 
 
 @compiled
-def touching_walk(gap, rate, curvature, still):
-    """Largest step of touching bodies: until they may be SLACK deep, or, where they are, until they may close again."""
-    if gap >= -SLACK:
-        return walk(gap + SLACK, rate, curvature)
-    if rate <= -still:
-        return 0.0
-    return (rate + still) / curvature if curvature > 0.0 else math.inf
+def touching_walk(gap, rate, curvature):
+    """Largest step of touching bodies: until they may be SLACK deep, or, where they are, noticeably deeper."""
+    return walk(max(gap + SLACK, UNNOTICED), rate, curvature)
 
 
 @compiled
@@ -234,7 +232,7 @@ def box_side(pairs, s, swapped, half_a, half_b, flat_b, face_x, face_y, curvatur
             # Corners that touch: the one that closes fastest counts.
             if least > TOUCHING or rate < corner[1]:
                 corner[0], corner[1], corner[2], corner[3] = gap, rate, sx, sy
-            step = min(step, touching_walk(gap, rate, curvature, pairs.local[LOOK, STILL_RATE]))
+            step = min(step, touching_walk(gap, rate, curvature))
         else:
             if gap < least:
                 corner[0], corner[1], corner[2], corner[3] = gap, rate, sx, sy

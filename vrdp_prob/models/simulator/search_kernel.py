@@ -26,8 +26,7 @@ from vrdp_prob.models.simulator.detection_kernel import (
     POWERS,
     PRESSING,
     RATE,
-    STILL,
-    STILL_RATE,
+    SLACK,
     TOUCHING,
     add_path,
     bound,
@@ -141,10 +140,25 @@ def certain_step(world, pairs, i, j, duration):
     if world.kind[i, SHAPE] != DISC and world.kind[j, SHAPE] != DISC:
         step = pairs.local[LOOK, CURVATURE]
     elif touching:
-        step = touching_walk(gap, rate, pairs.local[LOOK, CURVATURE], pairs.local[LOOK, STILL_RATE])
+        step = touching_walk(gap, rate, pairs.local[LOOK, CURVATURE])
     else:
         step = walk(gap, rate, pairs.local[LOOK, CURVATURE])
     return max(step, CRAWL / duration) if touching else step
+
+
+@compiled
+def closing(world, pairs, i, j, low, high, duration, curvature):
+    """First place behind one where touching bodies do not collide, and before one where they do, at which they do."""
+    while True:
+        middle = 0.5 * (low + high)
+        if middle <= low or middle >= high:
+            return high, look(world, pairs, i, j, high, curvature)
+        look(world, pairs, i, j, middle, curvature)
+        gap, rate = pairs.local[LOOK, GAP], pairs.local[LOOK, RATE] / duration
+        if gap <= TOUCHING and closes(gap, rate):
+            high = middle
+        else:
+            low = middle
 
 
 @compiled
@@ -168,8 +182,7 @@ def search(world, pairs, i, j, t, end):
     turning = outer_radius(world, i) * bound(pairs.local[ANGLE_FIRST], 1)
     turning += outer_radius(world, j) * bound(pairs.local[ANGLE_FIRST + 1], 1)
     fastest = plane_bound(pairs.local, 1) + turning
-    pairs.local[LOOK, STILL_RATE] = STILL * duration
-    s = 0.0
+    s, free = 0.0, 0.0
     while s <= 1.0:
         code = look(world, pairs, i, j, s, curvature)
         gap, rate = pairs.local[LOOK, GAP], pairs.local[LOOK, RATE] / duration
@@ -180,6 +193,8 @@ def search(world, pairs, i, j, t, end):
                 s += max(-gap / fastest, CLEARING / duration)
             continue
         if gap <= TOUCHING and closes(gap, rate):
+            if gap <= -SLACK:
+                s, code = closing(world, pairs, i, j, free, s, duration, curvature)
             pairs.table[i, j, CONTACT_TIME] = t + s * duration
             pairs.table[i, j, PAIR_KIND] = code % 2
             pairs.table[i, j, OWNER] = j if code >= 2 else i
@@ -188,6 +203,7 @@ def search(world, pairs, i, j, t, end):
             for c in range(6):
                 pairs.table[i, j, PAIR_FEATURE + c] = pairs.local[LOOK_FEATURE, c]
             return
+        free = s
         s += certain_step(world, pairs, i, j, duration)
 
 

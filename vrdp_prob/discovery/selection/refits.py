@@ -327,11 +327,12 @@ class Refits:
 
         Where the score of a cause promises more than any refit has brought, and its own brought far less, that goes on
         if it broke off on a long way; and where videos have lost their course of events on it, they are searched anew.
-        So it is with the cause whose score promises most of all, whatever others have brought. What happens once mends
-        any course, and is no measure of causes that last.
+        So it is with the cause whose score promises most of all, whatever others have brought, if that is as much as a
+        cause needs at all. What happens once mends any course, and is no measure of causes that last.
         """
         found = self._all(trial.with_cause, scores)
         promised = {one.effect.name: one.size / 2 for one in scores if not happens_once(one.effect)}
+        promised = {name: size for name, size in promised.items() if size > self.needed}
         leader = "" if lasting(beside) else max(promised, key=lambda name: promised[name], default="")
 
         def brought_most() -> float:

@@ -117,10 +117,13 @@ class _Ridges:
         The videos.
     ends
         Where each way that was gone has led.
+    hindering
+        Videos that lost too much with a share of a common step, the worst first.
     """
 
     videos: Sequence[LinkedVideo]
     ends: dict[tuple[int, bytes, bytes, bytes], Float[np.ndarray, "_"]] = field(default_factory=dict)
+    hindering: dict[float, list[int]] = field(default_factory=dict)
 
     def end(
         self,
@@ -236,12 +239,14 @@ def _improved(
 ) -> State:
     """The first share of a common step that brings something; where none does, the state itself.
 
-    What one video loses with a share by far more than is `expected` of the step is looked at first with the next one.
+    Videos that lost by far more than is `expected` of the step, with the same share before or with the one before it,
+    are looked at first.
     """
     before, most = state.total(numbers), TOO_DEAR * max(expected, STEEP)
     hindering: list[int] = []
     for share in SHARES:
         target = state.shared + share * step
+        hindering = ridges.hindering.get(share, hindering)
         followed = _followed(ridges, state, target, around, first=hindering, most=most)
         if followed is None:
             continue
@@ -249,7 +254,8 @@ def _improved(
         if trial.total(numbers) > before:
             return trial
         lost = np.array(state.values) - np.array(trial.values)
-        hindering = np.flatnonzero(lost > most).tolist()
+        hindering = [int(index) for index in np.argsort(-lost) if lost[index] > most]
+        ridges.hindering[share] = hindering
     return state
 
 
@@ -262,7 +268,7 @@ def _followed(
     first: Sequence[int],
     most: float,
 ) -> State | None:
-    """The state at other shared numbers, every video on its ridge; None where those that come first lose too much.
+    """The state at other shared numbers, every video on its ridge; None where one that comes first loses too much.
 
     A video whose best own numbers are at an edge, where a contact just happens, leaves its ridge with the first step;
     where the expansions `around` the state are given, the ridge is looked for on both sides of where they say it is.
@@ -276,9 +282,11 @@ def _followed(
         expected = own + around[index].slope @ (target - state.shared)
         return _best_of_cloud(video, target, expected, around[index].local_root, found)
 
-    locals_ = dict(zip(first, in_parallel(found, first), strict=True))
-    if any(state.values[index] - ridges.videos[index].value(target, own) > most for index, own in locals_.items()):
-        return None
+    locals_ = {}
+    for index in first:
+        locals_[index] = found(index)
+        if state.values[index] - ridges.videos[index].value(target, locals_[index]) > most:
+            return None
     rest = [index for index in range(len(ridges.videos)) if index not in locals_]
     locals_ |= zip(rest, in_parallel(found, rest), strict=True)
     return State.at(ridges.videos, target, [locals_[index] for index in range(len(ridges.videos))])

@@ -25,6 +25,7 @@ from vrdp_prob.inference.several_videos.second_look import (
     explained,
     lost_videos,
     may_take_another_course,
+    trusted,
 )
 from vrdp_prob.models.effects.effect import Effect
 from vrdp_prob.models.effects.external_impulse import ExternalImpulse
@@ -142,10 +143,15 @@ class Refits:
         Where nothing brings enough, causes are tried, too, for whose own traces a check has been made that fails: what
         lies in numbers that bodies have of their own anyway is hardly seen in residuals.
         """
-        scores = self.left(trial).scores
+        found = self._asked_by_most(trial)
+        if self.settled(trial, found) or any(not lost_videos(one.fit.fits) for one in found):
+            return found
+        known = {one.causes[-1].name for one in found}
+        scores = [one for one in self.left(trial).scores if one.effect.name not in known]
         likely = _shortlist(scores)
         close = _shortlist(scores, CLOSE)
-        found = self.made_of(trial, close)
+        found += self.made_of(trial, close, beside=found)
+        found.sort(key=merit, reverse=True)
         if not self.settled(trial, found):
             found += self.made_of(trial, [one for one in likely if one not in close], beside=found)
             found.sort(key=merit, reverse=True)
@@ -158,6 +164,21 @@ class Refits:
         if kicks is not None and (not found or found[0].causes[-1].name == kicks.effect.name):
             found += self._hidden(trial, found, kicks)
         return found
+
+    def _asked_by_most(self, trial: Trial) -> list[Trial]:
+        """Refits with what most videos ask for, the best first, where few others have lost their course by far.
+
+        What one such video leaves is more than what all others say, and calls for whatever bends its course; given
+        what these ask for, its own may be found. None where that is not so.
+        """
+        fits = trial.fit.fits
+        astray = np.flatnonzero(~trusted(fits)).tolist()
+        if not 0 < len(astray) <= len(fits) // MOST:
+            return []
+        asked = [one for one in _shortlist(self.left(trial).beside_chance, CLOSE) if not happens_once(one.effect)]
+        found = self.made_of(trial, asked)
+        searched = [self.searched_anew(one, astray) for one in found[:1]]
+        return sorted([*searched, *found[1:]], key=merit, reverse=True)
 
     def with_lost(self, trial: Trial) -> list[Trial]:
         """The refits, and where these leave something fits from the beginning, which count among them from then on.

@@ -171,8 +171,8 @@ def test_false_alarms_are_as_rare_as_stated() -> None:
             continue
         checks = run_checks(fit, seed=0)
         alarms.append(any(check.significant for check in checks))
-        p_values.append(by_name(checks)["push in one direction"].p_value)
-    assert len(alarms) > 20
+        p_values += [check.p_value for check in checks if check.name == "push in one direction"]
+    assert min(len(alarms), len(p_values)) > 20
     # At a rate of 5 % more than 6 of 40 alarms have a probability below 1 %.
     assert sum(alarms) <= 6
     assert kstest(p_values, "uniform").pvalue > 1e-3

@@ -32,6 +32,7 @@ def _refit(cause: str, gained: float, *, patches: bool = False) -> Mock:
 def tracks_show_no_walls(monkeypatch: pytest.MonkeyPatch) -> None:
     """No refit here has tracks to look at, nor fits of videos that could be explained or not."""
     monkeypatch.setattr(refits.Refits, "_placed", lambda _self, _trial: [])
+    monkeypatch.setattr(refits, "trusted", lambda _fits: np.ones(4, dtype=bool))
     monkeypatch.setattr(search, "explained", lambda _fits: True)
 
 
@@ -398,6 +399,67 @@ def test_the_most_promising_cause_is_followed_whatever_others_have_brought(
     sizes = {"wind": 900.0, "patch": 600.0}
     scores = [Mock(spec=CauseScore, effect=effects[name], size=size) for name, size in sizes.items()]
     assert _refits().made_of(nothing, scores)[0] is (found if followed else patch)
+
+
+@pytest.mark.parametrize(("promised", "followed"), [(20.0, True), (10.0, False)], ids=["enough", "too little"])
+def test_a_cause_is_not_followed_that_promises_less_than_it_needs(
+    promised: float, *, followed: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(refits, "happens_once", lambda _cause: False)
+    refit, effect = _refit("slip", -500.0), Mock()
+    effect.name, refit.causes, refit.fit.joint.converged = "slip", (effect,), False
+    refit.brought.return_value, refit.fallen_from.return_value = -500.0, [1]
+    refit.continued.return_value = refit.mended.return_value = refit
+    nothing = _refit("", 0.0)
+    nothing.with_cause = lambda _score: refit
+    assert _refits(needed=6.0).made_of(nothing, [Mock(spec=CauseScore, effect=effect, size=promised)]) == [refit]
+    assert refit.continued.called is followed
+
+
+@pytest.mark.parametrize(
+    ("astray", "is_asked"),
+    [([2], True), ([0, 3], True), ([], False), ([0, 1, 2], False)],
+    ids=["one video", "half of them", "none", "most"],
+)
+def test_what_most_videos_ask_for_comes_first_where_few_have_gone_astray(
+    astray: list[int], *, is_asked: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    trial, lens, anew, bowl = _refit("", 0.0), _refit("lens", 1.0), _refit("lens", 500.0), _refit("bowl", 0.5)
+    trial.fit.fits, anew.fit.fits = ["a", "b", "c", "d"], ["explained"]
+    usual = np.ones(4, dtype=bool)
+    usual[astray] = False
+    kicks, wide, clear, faint = (
+        Mock(spec=CauseScore, effect=effect, size=size, p_value=1e-9, sites=())
+        for effect, size in (
+            (ExternalImpulse(), 300.0),
+            (LensDistortion(), 200.0),
+            (Bowl(), 150.0),
+            (SurfaceTilt(), 50.0),
+        )
+    )
+    left = refits.Left((kicks,), (kicks, wide, clear, faint), np.ones(4))
+    made: list[list[CauseScore]] = []
+
+    def made_of(_self: object, _trial: Trial, asked: list[CauseScore], **_beside: object) -> list[Trial]:
+        made.append(list(asked))
+        return [lens, bowl] if wide in asked else []
+
+    def searched_anew(_self: object, one: Trial, videos: list[int]) -> Trial:
+        assert (one, list(videos)) == (lens, astray)
+        return anew
+
+    monkeypatch.setattr(refits, "trusted", lambda _fits: usual)
+    monkeypatch.setattr(refits, "lost_videos", lambda fits: [] if fits == ["explained"] else [2])
+    monkeypatch.setattr(refits.Refits, "left", lambda _self, _trial: left)
+    monkeypatch.setattr(refits.Refits, "made_of", made_of)
+    monkeypatch.setattr(refits.Refits, "searched_anew", searched_anew)
+    monkeypatch.setattr(refits.Refits, "settled", lambda _self, _trial, _found: False)
+    found = _refits()
+    if is_asked:
+        assert found._new(trial) == [anew, bowl]
+        assert made == [[wide, clear]]
+    else:
+        assert found._asked_by_most(trial) == made == []
 
 
 @pytest.mark.parametrize("once", [True, False], ids=["kicks", "a law"])

@@ -144,7 +144,7 @@ class Refits:
         lies in numbers that bodies have of their own anyway is hardly seen in residuals.
         """
         found = self._asked_by_most(trial)
-        if self.settled(trial, found) or any(not lost_videos(one.fit.fits) for one in found):
+        if found and (self.settled(trial, found) or any(not lost_videos(one.fit.fits) for one in found)):
             return found
         known = {one.causes[-1].name for one in found}
         scores = [one for one in self.left(trial).scores if one.effect.name not in known]

@@ -151,6 +151,7 @@ def test_a_cause_that_is_not_looked_for_is_not_called_another_one(tmp_path: Path
 
 
 @pytest.mark.slow
+@pytest.mark.timeout(1800)
 @pytest.mark.parametrize(
     "way", ["linear_drag", "rotating_table", "lens_distortion", "contact_radius_error", "slip_to_roll", "bowl"]
 )
@@ -171,6 +172,7 @@ def test_a_cause_is_named_alone_where_videos_easily_take_a_wrong_course(way: str
 
 
 @pytest.mark.slow
+@pytest.mark.timeout(1800)
 def test_a_friction_that_ends_all_sliding_may_be_larger_still(tmp_path: Path) -> None:
     truth, finding = finding_of(tmp_path, ["contact_friction"], seed=2, effect_size=3.0, setting=LARGER)
     assert [cause.name for cause in finding.named] == ["contact_friction"]

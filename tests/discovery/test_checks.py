@@ -27,6 +27,7 @@ from vrdp_prob.scene import Body, Shape, Tracks
 
 LARGER = Setting(videos=4, bodies=4)
 PAIRS = Setting(videos=3, bodies=2, frames=60)
+VORTEX = "push against place", "acceleration across the velocity against speed"
 WELL_FITTED = 1.5
 """Largest chi-square per number at which a fit counts as one that found its maximum."""
 
@@ -99,22 +100,22 @@ def test_a_tilt_is_a_push_in_one_direction_of_its_size() -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("way", "names"),
+    ("way", "size", "names"),
     [
-        ("linear_drag", ("acceleration along the velocity against speed",)),
-        ("cubic_drag", ("acceleration along the velocity against speed",)),
-        ("grain", ("acceleration along the velocity against the direction of motion",)),
-        ("shaking", ("push against time",)),
-        ("placed_field", ("acceleration across the velocity against place",)),
-        ("pair_force", ("acceleration against the distance to other bodies",)),
-        ("vortex", ("push against place", "acceleration across the velocity against speed")),
-        ("contact_friction", ("tangential against normal impulse",)),
-        ("clock_error", ("time stamps: lost frames",)),
+        ("linear_drag", 4.0, ("acceleration along the velocity against speed",)),
+        ("cubic_drag", 4.0, ("acceleration along the velocity against speed",)),
+        ("grain", 4.0, ("acceleration along the velocity against the direction of motion",)),
+        ("shaking", 4.0, ("push against time",)),
+        ("placed_field", 4.0, ("acceleration across the velocity against place",)),
+        ("pair_force", 4.0, ("acceleration against the distance to other bodies",)),
+        ("vortex", 2.0, VORTEX),
+        pytest.param("vortex", 4.0, VORTEX, marks=pytest.mark.xfail(reason="a video is lost: its contacts lead")),
+        ("contact_friction", 4.0, ("tangential against normal impulse",)),
+        ("clock_error", 4.0, ("time stamps: lost frames",)),
     ],
 )
-def test_the_check_of_the_effect_is_among_those_that_lead(way: str, names: tuple[str, ...]) -> None:
-    # A stronger vortex loses a video, and contacts that do not fit lead.
-    _, fit = fitted(way, 2.0 if way == "vortex" else 4.0, seed=5, setting=LARGER)
+def test_the_check_of_the_effect_is_among_those_that_lead(way: str, size: float, names: tuple[str, ...]) -> None:
+    _, fit = fitted(way, size, seed=5, setting=LARGER)
     assert set(names) & set(leading(run_checks(fit, seed=0), 3))
 
 

@@ -107,7 +107,7 @@ def test_of_two_causes_only_the_doubted_one_is_left_out(monkeypatch: pytest.Monk
     assert [one.name for one in finding.named] == [LinearDrag.name]
     assert [effect.name for effect in finding.extended.effects][-1] == LinearDrag.name
     assert SurfaceTilt.name not in finding.extended.text
-    assert all(one.bound is None for one in finding.upper_bounds)
+    assert finding.upper_bounds == ()
     assert finding.notes.count("It is something else.") == 1
 
 

@@ -401,18 +401,24 @@ def test_the_most_promising_cause_is_followed_whatever_others_have_brought(
     assert _refits().made_of(nothing, scores)[0] is (found if followed else patch)
 
 
+def _broken_off(promised: float) -> tuple[Mock, Mock, Mock]:
+    """A model, its refit with a cause, which has lost a video and brings nothing, and what the score had promised."""
+    refit, effect = _refit("cause", -1.0), Mock()
+    effect.name, refit.causes, refit.fit.joint.converged = "cause", (effect,), False
+    refit.brought.return_value, refit.fallen_from.return_value = -3.0, [1]
+    refit.continued.return_value = refit.mended.return_value = refit
+    nothing = _refit("", 0.0)
+    nothing.with_cause = lambda _score: refit
+    return nothing, refit, Mock(spec=CauseScore, effect=effect, size=promised)
+
+
 @pytest.mark.parametrize(("promised", "followed"), [(20.0, True), (10.0, False)], ids=["enough", "too little"])
 def test_a_cause_is_not_followed_that_promises_less_than_it_needs(
     promised: float, *, followed: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(refits, "happens_once", lambda _cause: False)
-    refit, effect = _refit("slip", -500.0), Mock()
-    effect.name, refit.causes, refit.fit.joint.converged = "slip", (effect,), False
-    refit.brought.return_value, refit.fallen_from.return_value = -500.0, [1]
-    refit.continued.return_value = refit.mended.return_value = refit
-    nothing = _refit("", 0.0)
-    nothing.with_cause = lambda _score: refit
-    assert _refits(needed=6.0).made_of(nothing, [Mock(spec=CauseScore, effect=effect, size=promised)]) == [refit]
+    nothing, refit, score = _broken_off(promised)
+    assert _refits(needed=6.0).made_of(nothing, [score]) == [refit]
     assert refit.continued.called is followed
 
 
@@ -465,13 +471,8 @@ def test_what_most_videos_ask_for_comes_first_where_few_have_gone_astray(
 @pytest.mark.parametrize("once", [True, False], ids=["kicks", "a law"])
 def test_a_refit_that_brings_nothing_is_followed_once_at_most(*, once: bool, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(refits, "happens_once", lambda _cause: once)
-    refit, effect = _refit("kicks", -1.0), Mock()
-    effect.name, refit.causes, refit.fit.joint.converged = "kicks", (effect,), False
-    refit.brought.return_value, refit.fallen_from.return_value = -3.0, [1]
-    refit.continued.return_value = refit.mended.return_value = refit
-    nothing = _refit("", 0.0)
-    nothing.with_cause = lambda _score: refit
-    assert _refits(needed=6.0).made_of(nothing, [Mock(spec=CauseScore, effect=effect, size=20.0)]) == [refit]
+    nothing, refit, score = _broken_off(20.0)
+    assert _refits(needed=6.0).made_of(nothing, [score]) == [refit]
     assert refit.mended.call_count == (0 if once else 1)
 
 

@@ -34,9 +34,11 @@ CRAWL = 1e-6
 CONTACT_TIME, PAIR_KIND, OWNER, OVERLAPPING, LAST_CONTACT, PAIR_FEATURE, PRESSING = 0, 1, 2, 3, 4, 5, 11
 # Rows of `local`: the difference of the positions and both angles as polynomials; a look; its features; two corners
 # that press already (whether there is one, whether the second body owns the side, the side's normal, the corner);
-# bounds on the fall of the rate in the frames of both; the corner nearest to a side; room for one polynomial.
+# bounds on what lets a rate fall; the corner nearest to a side; room for one polynomial.
 ANGLE_FIRST, LOOK, LOOK_FEATURE, KNOWN, BOUNDS, CORNER, POWERS = 2, 4, 5, 6, 8, 9, 10
 GAP, RATE, CURVATURE = 0, 1, 2
+# Columns of the bounds: the relative acceleration; what turning adds to it in the frame of each; the spin of each.
+ACCELERATION, TURNING, SPIN = 0, 1, 3
 
 
 Pairs = Bundle(
@@ -120,6 +122,25 @@ def plane_bound(path, order):
 
 
 @compiled
+def fall_along(pairs, own, x, y):
+    """Bound on the fall of the rate of a gap along a direction that turns with one of the bodies.
+
+    Of the relative acceleration only what is along the direction counts, and of the rest what the direction turns to.
+    """
+    path, bounds = pairs.local, pairs.local[BOUNDS]
+    along = bounds[SPIN + own] * bounds[ACCELERATION]
+    for power in range(2, 8):
+        along += power * (power - 1) * abs(x * path[0, power] + y * path[1, power])
+    return bounds[TURNING + own] + min(along, bounds[ACCELERATION])
+
+
+@compiled
+def fall_between_points(pairs, own):
+    """Bound on the fall of the rate of the distance of two points, in the frame of one of the bodies."""
+    return pairs.local[BOUNDS, TURNING + own] + pairs.local[BOUNDS, ACCELERATION]
+
+
+@compiled
 def walk(gap, rate, curvature):
     """Largest step that certainly keeps the gap positive."""
     if rate < 0.0:
@@ -142,21 +163,21 @@ def closes(gap, rate):
 
 
 @compiled
-def disc_disc(pairs, s, reach, curvature):
+def disc_disc(pairs, s, reach):
     """Gap of two discs."""
     dx, dy = value(pairs.local[0], s), value(pairs.local[1], s)
     distance = math.sqrt(dx * dx + dy * dy)
     rate = (dx * slope(pairs.local[0], s) + dy * slope(pairs.local[1], s)) / max(distance, 1e-300)
-    set_look(pairs, distance - reach, rate, curvature)
+    set_look(pairs, distance - reach, rate, fall_between_points(pairs, 0))
     set_feature(pairs, 0, 0.0, 0.0, 1.0)
     set_feature(pairs, 3, 0.0, 0.0, 1.0)
     return 0
 
 
 @compiled
-def box_disc(pairs, s, half, flat, radius, sign, curvature):
-    """Gap of a square (or a straight wall, `flat`) and a disc; `sign` is -1.0 where the square is the second body."""
-    angle_row = ANGLE_FIRST + 1 if sign < 0.0 else ANGLE_FIRST
+def box_disc(pairs, s, half, flat, radius, own):
+    """Gap of a square (or a straight wall, `flat`) and a disc; `own` is 1 where the square is the second body."""
+    sign, angle_row = 1.0 - 2.0 * own, ANGLE_FIRST + own
     dx, dy = sign * value(pairs.local[0], s), sign * value(pairs.local[1], s)
     vx, vy = sign * slope(pairs.local[0], s), sign * slope(pairs.local[1], s)
     angle, spin = value(pairs.local[angle_row], s), slope(pairs.local[angle_row], s)
@@ -186,7 +207,8 @@ def box_disc(pairs, s, half, flat, radius, sign, curvature):
         set_feature(pairs, 0, 0.0, ny, 0.0 if flat else 1.0)
     set_feature(pairs, 3, 0.0, 0.0, 1.0)
     wx, wy = cosine * nx - sine * ny, sine * nx + cosine * ny
-    set_look(pairs, distance - radius, wx * (vx + spin * dy) + wy * (vy - spin * dx), curvature)
+    fall = fall_between_points(pairs, own) if kind == 0 else fall_along(pairs, own, wx, wy)
+    set_look(pairs, distance - radius, wx * (vx + spin * dy) + wy * (vy - spin * dx), fall)
     return kind
 
 
@@ -202,7 +224,7 @@ def is_known(pairs, swapped, face_x, face_y, x, y):
 
 
 @compiled
-def box_side(pairs, s, swapped, half_a, half_b, flat_b, face_x, face_y, curvature, corner):
+def box_side(pairs, s, swapped, half_a, half_b, flat_b, face_x, face_y, corner):
     """Gap between a side of one box and its nearest corner of the other.
 
     Writes gap, rate and the chosen corner; returns the certain step over all corners. Corners that press already are
@@ -217,6 +239,7 @@ def box_side(pairs, s, swapped, half_a, half_b, flat_b, face_x, face_y, curvatur
     angle_b, spin_b = value(pairs.local[row_b], s), slope(pairs.local[row_b], s)
     nx = math.cos(angle_a) * face_x - math.sin(angle_a) * face_y
     ny = math.sin(angle_a) * face_x + math.cos(angle_a) * face_y
+    fall = fall_along(pairs, 1 if swapped else 0, nx, ny)
     cosine, sine = math.cos(angle_b), math.sin(angle_b)
     least, step = math.inf, math.inf
     for index in range(4):
@@ -232,18 +255,18 @@ def box_side(pairs, s, swapped, half_a, half_b, flat_b, face_x, face_y, curvatur
             # Corners that touch: the one that closes fastest counts.
             if least > TOUCHING or rate < corner[1]:
                 corner[0], corner[1], corner[2], corner[3] = gap, rate, sx, sy
-            step = min(step, touching_walk(gap, rate, curvature))
+            step = min(step, touching_walk(gap, rate, fall))
         else:
             if gap < least:
                 corner[0], corner[1], corner[2], corner[3] = gap, rate, sx, sy
-            step = min(step, walk(gap, rate, curvature))
+            step = min(step, walk(gap, rate, fall))
         least = min(least, gap)
     corner[4] = least
     return step
 
 
 @compiled
-def box_box(pairs, s, half_i, half_j, flat_i, flat_j, curvature):
+def box_box(pairs, s, half_i, half_j, flat_i, flat_j):
     """Gap of two boxes: the largest over the sides of both (separating axes).
 
     The look holds the certain step in place of the curvature. Returns 1, plus 2 where the second box owns the side.
@@ -260,7 +283,7 @@ def box_box(pairs, s, half_i, half_j, flat_i, flat_j, curvature):
                 continue
             x = 1.0 if index == 0 else (-1.0 if index == 2 else 0.0)
             y = 1.0 if index == 1 else (-1.0 if index == 3 else 0.0)
-            step = box_side(pairs, s, swapped == 1, height, half_b, flat_b, x, y, curvature[swapped], corner)
+            step = box_side(pairs, s, swapped == 1, height, half_b, flat_b, x, y, corner)
             if corner[4] > best:
                 best = corner[4]
                 result = 1 + 2 * swapped

@@ -9,6 +9,7 @@ import math
 from vrdp_prob.models.simulator.apart_kernel import search_pair_apart
 from vrdp_prob.models.simulator.cluster_kernel import TOUCH_A, TOUCH_B, TOUCH_FEATURE, touch_count
 from vrdp_prob.models.simulator.detection_kernel import (
+    ACCELERATION,
     ANGLE_FIRST,
     BOUNDS,
     CONTACT_TIME,
@@ -27,7 +28,9 @@ from vrdp_prob.models.simulator.detection_kernel import (
     PRESSING,
     RATE,
     SLACK,
+    SPIN,
     TOUCHING,
+    TURNING,
     add_path,
     bound,
     box_box,
@@ -106,30 +109,32 @@ def set_path(world, pairs, i, j, t, duration):
 
 
 @compiled
-def set_curvature(world, pairs, i, j, curvature):
-    """Bounds on the fall of the rate of the gap, in the frames of both bodies."""
-    path = pairs.local
+def set_bounds(world, pairs, i, j):
+    """Bounds on what lets the rate of a gap fall, in the frames of both bodies."""
+    path, bounds = pairs.local, pairs.local[BOUNDS]
     acceleration, velocity, distance = plane_bound(path, 2), plane_bound(path, 1), plane_bound(path, 0)
+    bounds[ACCELERATION] = acceleration
     for own in range(2):
         spin, other = bound(path[ANGLE_FIRST + own], 1), bound(path[ANGLE_FIRST + 1 - own], 1)
         change, other_change = bound(path[ANGLE_FIRST + own], 2), bound(path[ANGLE_FIRST + 1 - own], 2)
         reach = outer_radius(world, j if own == 0 else i)
-        curvature[own] = acceleration + 2.0 * spin * velocity + (spin * spin + change) * distance
-        curvature[own] += reach * ((spin + other) ** 2 + change + other_change)
+        bounds[TURNING + own] = 2.0 * spin * velocity + (spin * spin + change) * distance
+        bounds[TURNING + own] += reach * ((spin + other) ** 2 + change + other_change)
+        bounds[SPIN + own] = spin
 
 
 @compiled
-def look(world, pairs, i, j, s, curvature):
+def look(world, pairs, i, j, s):
     """Look at a pair at one place; returns 0 for point and point, 1 for line and point, plus 2 if j owns the line."""
     half_i, half_j = world.body[i, RADIUS], world.body[j, RADIUS]
     shape_i, shape_j = world.kind[i, SHAPE], world.kind[j, SHAPE]
     if shape_i == DISC and shape_j == DISC:
-        return disc_disc(pairs, s, half_i + half_j, curvature[0])
+        return disc_disc(pairs, s, half_i + half_j)
     if shape_i == DISC:
-        return 2 + box_disc(pairs, s, half_j, shape_j == WALL, half_i, -1.0, curvature[1])
+        return 2 + box_disc(pairs, s, half_j, shape_j == WALL, half_i, 1)
     if shape_j == DISC:
-        return box_disc(pairs, s, half_i, shape_i == WALL, half_j, 1.0, curvature[0])
-    return box_box(pairs, s, half_i, half_j, shape_i == WALL, shape_j == WALL, curvature)
+        return box_disc(pairs, s, half_i, shape_i == WALL, half_j, 0)
+    return box_box(pairs, s, half_i, half_j, shape_i == WALL, shape_j == WALL)
 
 
 @compiled
@@ -147,13 +152,13 @@ def certain_step(world, pairs, i, j, duration):
 
 
 @compiled
-def closing(world, pairs, i, j, low, high, duration, curvature):
+def closing(world, pairs, i, j, low, high, duration):
     """First place behind one where touching bodies do not collide, and before one where they do, at which they do."""
     while True:
         middle = 0.5 * (low + high)
         if middle <= low or middle >= high:
-            return high, look(world, pairs, i, j, high, curvature)
-        look(world, pairs, i, j, middle, curvature)
+            return high, look(world, pairs, i, j, high)
+        look(world, pairs, i, j, middle)
         gap, rate = pairs.local[LOOK, GAP], pairs.local[LOOK, RATE] / duration
         if gap <= TOUCHING and closes(gap, rate):
             high = middle
@@ -177,14 +182,13 @@ def search(world, pairs, i, j, t, end):
     if passing_distance(pairs.local) > reach:
         pairs.table[i, j, OVERLAPPING] = 0.0
         return
-    curvature = pairs.local[BOUNDS]
-    set_curvature(world, pairs, i, j, curvature)
+    set_bounds(world, pairs, i, j)
     turning = outer_radius(world, i) * bound(pairs.local[ANGLE_FIRST], 1)
     turning += outer_radius(world, j) * bound(pairs.local[ANGLE_FIRST + 1], 1)
     fastest = plane_bound(pairs.local, 1) + turning
     s, free = 0.0, 0.0
     while s <= 1.0:
-        code = look(world, pairs, i, j, s, curvature)
+        code = look(world, pairs, i, j, s)
         gap, rate = pairs.local[LOOK, GAP], pairs.local[LOOK, RATE] / duration
         if pairs.table[i, j, OVERLAPPING]:
             if gap >= 0.0:
@@ -194,7 +198,7 @@ def search(world, pairs, i, j, t, end):
             continue
         if gap <= TOUCHING and closes(gap, rate):
             if gap <= -SLACK:
-                s, code = closing(world, pairs, i, j, free, s, duration, curvature)
+                s, code = closing(world, pairs, i, j, free, s, duration)
             pairs.table[i, j, CONTACT_TIME] = t + s * duration
             pairs.table[i, j, PAIR_KIND] = code % 2
             pairs.table[i, j, OWNER] = j if code >= 2 else i
@@ -211,8 +215,7 @@ def search(world, pairs, i, j, t, end):
 def depth(world, pairs, i, j, t):
     """Gap of two bodies at one time."""
     set_path(world, pairs, i, j, t, 1.0)
-    curvature = pairs.local[BOUNDS]
-    look(world, pairs, i, j, 0.0, curvature)
+    look(world, pairs, i, j, 0.0)
     return pairs.local[LOOK, GAP]
 
 

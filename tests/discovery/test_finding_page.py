@@ -288,6 +288,6 @@ def test_values_of_single_bodies_are_folded_where_they_are_many():
 
 def test_a_description_without_accelerations_tells_of_none():
     finding = unknown()
-    without = replace(finding, description=replace(finding.description, size=0.0))
+    without = replace(finding, description=replace(finding.description, size=None))
     assert "The missing acceleration is" in text_of(render(finding))
     assert "The missing acceleration is" not in text_of(render(without))

@@ -7,10 +7,10 @@ import pytest
 
 from tests.discovery.fitted import fitted, moved
 from tests.discovery.test_describe import PAIRS
+from vrdp_prob.discovery import describe
 from vrdp_prob.discovery.checks.contacts import DISTANCE
 from vrdp_prob.discovery.checks.measurement import MEMORY
 from vrdp_prob.discovery.checks.neighbours import roughness
-from vrdp_prob.discovery.describe import description_of
 from vrdp_prob.discovery.page.figures import residual_figures, title_of
 from vrdp_prob.discovery.page.plots import Plot, side_by_side
 from vrdp_prob.discovery.residuals.free_flight import FreeFlight
@@ -63,9 +63,21 @@ def test_no_video_says_anything_of_accelerations_that_its_own_tracks_rule_out() 
     found = missing_acceleration(FreeFlight.of(spoilt).model, roughness(model))
     assert len(found.lost) == len(model.videos)
     assert len(found.time) == 0
-    description = description_of(spoilt, [])
-    assert description.size == 0.0
+    description = describe.description_of(spoilt, [])
+    assert description.size is None
     assert any(sentence.startswith("Far more is missing in") for sentence in description.sentences)
+
+
+def test_of_few_windows_no_size_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    _, tilted = fitted("surface_tilt", seed=2, setting=PAIRS)
+    model = ResidualModel.of(tilted)
+    number = len(windows(tilted).time)
+    monkeypatch.setattr(describe, "FEWEST_WINDOWS", number)
+    assert describe.description_of(model, []).size is not None
+    monkeypatch.setattr(describe, "FEWEST_WINDOWS", number + 1)
+    few = describe.description_of(model, [])
+    assert few.size is None
+    assert "No missing acceleration shows in free flight." in few.sentences
 
 
 def test_there_is_a_figure_of_each_aspect_and_it_is_an_svg_element() -> None:

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from vrdp_prob.discovery.candidates.scores import CauseScore
+from vrdp_prob.discovery.candidates.surfaces import Placed
 from vrdp_prob.discovery.finding import Check
 from vrdp_prob.discovery.selection import refits, search
 from vrdp_prob.discovery.selection.trials import Trial
@@ -190,6 +191,44 @@ def test_where_walls_that_tracks_show_are_plain_nothing_else_is_tried(
     monkeypatch.setattr(refits.Refits, "left", Mock())
     monkeypatch.setattr(refits.Refits, "doubted", lambda *_given: doubted)
     assert _refits(needed=6.0).of(plain) == ([walls] if alone else [walls, drag])
+
+
+@pytest.mark.parametrize(
+    ("stated", "explains", "leaves", "near", "taken"),
+    [
+        (20.0, True, False, 30.0, "stated"),
+        (20.0, True, True, 30.0, "near"),
+        (20.0, True, True, 10.0, "stated"),
+        (20.0, False, True, 30.0, "stated"),
+        (None, True, True, 30.0, "near"),
+        (None, True, True, None, None),
+    ],
+    ids=["nothing left", "a little off", "not off", "lost anyway", "overlaps what is seen", "no world"],
+)
+def test_walls_that_may_be_a_little_off_are_unknown_from_the_beginning(
+    stated: float | None,
+    near: float | None,
+    taken: str | None,
+    *,
+    explains: bool,
+    leaves: bool,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Where those that count as stated explain the videos and leave something, or have no world."""
+
+    def fitted(_trial: Trial, _placed: object, walls: list[object], *, seed: int) -> tuple[str, float]:
+        gained = stated if walls else near
+        if gained is None:
+            raise ImpossibleStartError
+        return ("stated" if walls else "near"), gained
+
+    monkeypatch.setattr(refits, "fit_with_surfaces", fitted)
+    monkeypatch.setattr(refits, "explained", lambda _fits: explains)
+    monkeypatch.setattr(refits.Refits, "_leaves_something", lambda _self, _trial: leaves)
+    trial = _refit("", 0.0)
+    trial.and_causes.side_effect = lambda _causes, fit: _refit(*fit)
+    found = _refits()._met(trial, [create_autospec(Placed, instance=True, effect=SurfaceTilt(), wall=Mock())])
+    assert (None if found is None else found.causes[0]) == taken
 
 
 def test_of_several_walls_at_once_none_is_a_merit_of_a_better_course(monkeypatch: pytest.MonkeyPatch) -> None:

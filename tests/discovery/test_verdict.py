@@ -1,6 +1,7 @@
 """When the causes that were found are the verdict, and when something else is left."""
 
 from dataclasses import replace
+from importlib import import_module
 from unittest.mock import Mock, create_autospec
 
 import numpy as np
@@ -12,7 +13,10 @@ from vrdp_prob.discovery.finding import Check, Verdict
 from vrdp_prob.discovery.selection import tried
 from vrdp_prob.discovery.selection.search import Search
 from vrdp_prob.discovery.selection.trials import Trial
+from vrdp_prob.inference.several_videos.fitting import SharedFit
 from vrdp_prob.models.effects.effect import Effect
+
+discover = import_module("vrdp_prob.discovery.discover")
 
 
 def _checks(failing: int, p_value: float = 1e-9) -> list[Check]:
@@ -61,6 +65,37 @@ def test_the_verdict(
     found = _search(causes)
     monkeypatch.setattr(outcome, "_excess", lambda trial: excess if trial is found.best else 3.0)
     assert outcome._verdict(found, _checks(12), after) is verdict
+
+
+@pytest.mark.parametrize(
+    ("verdict", "causes", "explains", "is_better", "taken"),
+    [
+        (Verdict.UNKNOWN, (), True, True, "anew"),
+        (Verdict.UNKNOWN, (), True, False, "before"),
+        (Verdict.UNKNOWN, (), False, True, "before"),
+        (Verdict.UNKNOWN, ("tilt",), True, True, "before"),
+        (Verdict.NONE, (), True, True, "before"),
+    ],
+    ids=["better courses", "no better courses", "most videos are lost", "a cause beside it", "nothing is left"],
+)
+def test_all_videos_are_searched_anew_where_no_cause_explains_what_is_left(
+    verdict: Verdict,
+    causes: tuple[str, ...],
+    taken: str,
+    *,
+    explains: bool,
+    is_better: bool,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    fit, better = create_autospec(SharedFit, instance=True), create_autospec(SharedFit, instance=True)
+    fit.fits, fit.with_other_courses.return_value = (), better if is_better else fit
+    before, anew = (create_autospec(outcome.Outcome, instance=True) for _ in range(2))
+    before.verdict, before.found = verdict, _search(causes)
+    monkeypatch.setattr(discover, "explained", lambda _fits: explains)
+    monkeypatch.setattr(discover, "with_other_spins", lambda given, *, seed: given)
+    monkeypatch.setattr(discover, "outcome_of", lambda given, *_given, **_named: {better: anew}[given])
+    found = discover._of_better_courses(fit, before, [], seed=0, progress=None)
+    assert found is {"anew": anew, "before": before}[taken]
 
 
 def test_a_cause_that_may_take_the_place_of_several_is_told_once() -> None:

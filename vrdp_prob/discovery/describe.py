@@ -69,7 +69,7 @@ def description_of(model: ResidualModel, checks: Sequence[Check]) -> Description
         *_contact_sentences(of_contacts, contact_formula, checks),
         *_check_sentences(checks),
     ]
-    size = float(np.sqrt(2)) * windows.size if _show_something(windows) else 0.0
+    size = float(np.sqrt(2)) * windows.size if _show_something(windows) else None
     return Description(formula, found.explained, size, tuple(sentences), contact_formula, of_contacts.explained)
 
 

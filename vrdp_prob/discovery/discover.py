@@ -10,7 +10,7 @@ from vrdp_prob.datasets.folder import some
 from vrdp_prob.discovery.checking import check_video_count
 from vrdp_prob.discovery.describe import describe
 from vrdp_prob.discovery.finding import Finding, FoundCause, UpperBound, Verdict
-from vrdp_prob.discovery.outcome import outcome_of
+from vrdp_prob.discovery.outcome import Outcome, outcome_of
 from vrdp_prob.discovery.page.figures import residual_figures
 from vrdp_prob.discovery.residuals.free_flight import NORMAL_95
 from vrdp_prob.discovery.selection.believed import extended_model, models_of_the_others
@@ -26,7 +26,7 @@ from vrdp_prob.inference.infer import check_model
 from vrdp_prob.inference.runs.checkpoint import Checkpoint, effects_facts, model_facts, program_facts, videos_facts
 from vrdp_prob.inference.runs.journal import journal
 from vrdp_prob.inference.runs.parallel import linear_algebra_in_one_thread, several_processes
-from vrdp_prob.inference.several_videos.fitting import fit_together
+from vrdp_prob.inference.several_videos.fitting import SharedFit, fit_together
 from vrdp_prob.inference.several_videos.second_look import explained, loses_single_videos
 from vrdp_prob.inference.several_videos.spin_islands import with_other_spins
 from vrdp_prob.models.effects.effect import Effect
@@ -93,11 +93,9 @@ def discover(
         if loses_single_videos(fit.fits):
             with (progress or SilentProgress()).stage("Searching lost videos anew"):
                 fit = fit.with_lost_courses(seed=seed)
-        outcome = outcome_of(fit, looked_for, seed=seed, progress=progress)
-        if outcome.verdict is Verdict.UNKNOWN and not outcome.found.best.causes and explained(fit.fits):
-            with (progress or SilentProgress()).stage("Searching all videos anew"):
-                better = with_other_spins(fit, seed=seed).with_other_courses(seed=seed)
-            outcome = outcome if better is fit else outcome_of(better, looked_for, seed=seed, progress=progress)
+        outcome = _of_better_courses(
+            fit, outcome_of(fit, looked_for, seed=seed, progress=progress), looked_for, seed=seed, progress=progress
+        )
         found, causes = outcome.found, outcome.causes
         tried = tried_causes(found, _names_of(found, causes), seed=seed)
     doubtful, bounds = outcome.verdict is Verdict.UNKNOWN, _bounds(found, causes)
@@ -129,6 +127,20 @@ def discover(
         tried=tuple(tried),
         gain=outcome.gain,
     )
+
+
+def _of_better_courses(
+    fit: SharedFit, outcome: Outcome, catalogue: Sequence[Effect], *, seed: int, progress: ProgressDisplay | None
+) -> Outcome:
+    """What is found where all videos are searched anew, if something is left that no cause explains.
+
+    Where the model explains most videos, and a search finds none of them better, the outcome stays.
+    """
+    if outcome.verdict is not Verdict.UNKNOWN or outcome.found.best.causes or not explained(fit.fits):
+        return outcome
+    with (progress or SilentProgress()).stage("Searching all videos anew"):
+        better = with_other_spins(fit, seed=seed).with_other_courses(seed=seed)
+    return outcome if better is fit else outcome_of(better, catalogue, seed=seed, progress=progress)
 
 
 def _not_asked(videos: Sequence[Tracks]) -> list[str]:

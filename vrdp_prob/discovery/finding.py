@@ -237,7 +237,7 @@ class UpperBound:
         The cause and its parameter.
     bound, unit
         How far the parameter may be from where the cause does nothing, at the place where it may be farthest of those
-        that tell anything; None where the data put no bound on it.
+        that tell anything; None where the data put no bound on it, or where something is left that may be hiding any.
     vanishes_at
         Where that is: a value, or the name of the parameter that it is then equal to.
     places, told
@@ -272,7 +272,7 @@ class Description:
     explained
         Share of the missing acceleration's variance in held-out videos that the formula explains.
     size
-        Root mean square of the missing acceleration (m/s^2).
+        Root mean square of the missing acceleration (m/s^2); None where none shows.
     sentences
         Where, when and how it shows.
     contact_formula, contact_explained
@@ -282,7 +282,7 @@ class Description:
 
     formula: str
     explained: float
-    size: float
+    size: float | None
     sentences: tuple[str, ...]
     contact_formula: str = ""
     contact_explained: float = 0.0

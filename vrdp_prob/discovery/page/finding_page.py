@@ -72,6 +72,7 @@ def render(finding: Finding) -> str:
         "checks": _checks(finding),
         "figures": [(name, _inline(figure, index)) for index, (name, figure) in enumerate(finding.figures.items())],
         "bounds": _bounds(finding),
+        "unbounded": finding.verdict is Verdict.UNKNOWN,
         "bounds_lead": finding.verdict is Verdict.NONE and bool(finding.upper_bounds),
         **_model(finding),
     }
@@ -247,7 +248,7 @@ def _description(description: Description) -> dict[str, Any]:
     return {
         "sentences": [typeset(one) for one in description.sentences],
         "formula": description.formula if description.has_formula else "",
-        "size": with_unit(number(description.size), "m/s^2") if description.size else "",
+        "size": with_unit(number(description.size), "m/s^2") if description.size is not None else "",
         "explained": _percent(description.explained),
         "contact_formula": description.contact_formula,
         "contact_explained": _percent(description.contact_explained),

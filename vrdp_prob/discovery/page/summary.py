@@ -187,7 +187,7 @@ def _bounds(bounds: Sequence[UpperBound]) -> list[str]:
 
 def _rest(finding: Finding) -> str:
     description = finding.description
-    if description is None or description.size == 0:
+    if description is None or description.size is None:
         return ""
     size = f"the missing acceleration is {with_unit(number(description.size), 'm/s^2')} on average (root mean square)"
     if not description.has_formula:

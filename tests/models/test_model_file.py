@@ -117,9 +117,16 @@ def test_the_example_of_the_documentation_is_a_model(tmp_path: Path) -> None:
     assert [effect.name for effect in model.effects] == [effect.name for effect in default_model().effects]
 
 
-def test_the_documentation_lists_every_effect() -> None:
+def test_the_documentation_lists_every_effect_with_where_it_does_nothing_and_its_sentence() -> None:
     text = (Path(__file__).parents[2] / "docs" / "effects.md").read_text(encoding="utf-8")
-    assert set(re.findall(r"^\| `(\w+)` \|", text, flags=re.MULTILINE)) == set(known_effects())
+    rows = re.findall(r"^\| `(\w+)` \| .* \| (.*) \| (.*) \| .* \|$", text, flags=re.MULTILINE)
+    told = {name: (nothing, sentence) for name, nothing, sentence in rows}
+    assert told.keys() == known_effects().keys()
+    for name, kind in known_effects().items():
+        effect = kind()
+        values = [f"`{one}` = {value:g}" for one, value in effect.vanishes_at.items()]
+        values += [f"`{one}` = `{other}`" for one, other in effect.vanishes_like.items()]
+        assert told[name] == (", ".join(values) or "-", effect.sentence)
 
 
 def test_a_file_that_is_not_there(tmp_path: Path) -> None:

@@ -11,6 +11,8 @@ from vrdp_prob.discovery.candidates.scores import score_causes
 from vrdp_prob.discovery.finding import HeldOut, VideoErrors
 from vrdp_prob.discovery.residuals.held_out import all_but_each, cavities, left_out
 from vrdp_prob.discovery.residuals.residual_model import ResidualModel
+from vrdp_prob.discovery.selection import estimates
+from vrdp_prob.discovery.selection.estimates import may_vanish
 from vrdp_prob.discovery.selection.forecast import SEEN_SHARE, _forecast, error_ratios, held_out
 from vrdp_prob.discovery.selection.trials import Trial, gain, gains, weights
 from vrdp_prob.inference.map_fit import MapFit
@@ -20,6 +22,7 @@ from vrdp_prob.inference.several_videos.fitting import fit_together
 from vrdp_prob.inference.several_videos.joint_fit import expand
 from vrdp_prob.inference.several_videos.second_look import doubtful
 from vrdp_prob.models.effects.linear_drag import LinearDrag
+from vrdp_prob.models.effects.material_friction import MaterialFriction
 from vrdp_prob.models.effects.surface_tilt import SurfaceTilt
 from vrdp_prob.models.parameters import ANGULAR_DRAG
 from vrdp_prob.scene import Tracks
@@ -131,6 +134,25 @@ def test_only_what_is_not_there_may_as_well_vanish() -> None:
         found = Trial((), fit).with_cause(score)
         assert found is not None
         assert found.may_vanish(cause, np.ones(len(fit.fits))) is may  # a drag vanishes infinitely far away
+
+
+@pytest.mark.parametrize(("shifts", "may"), [((-3.0, -3.0), True), ((-3.0, 0.0), False)], ids=["alike", "one"])
+def test_a_friction_that_is_less_for_every_material_alike_is_none_of_a_material(
+    shifts: tuple[float, float], *, may: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(estimates, "reaches", lambda *_given: {})
+    _, null = fitted(seed=1)
+    cause = MaterialFriction()
+    (score,) = score_causes(null, ResidualModel.of(null), [cause], seed=0)
+    found = Trial((), null).with_cause(score)
+    assert found is not None
+    joint = found.fit.joint
+    mean = joint.gaussian.mean.copy()
+    places = [place for place, (name, _) in enumerate(joint.numbers.keys) if name in cause.vanishes_at]
+    mean[places] = shifts
+    shifted = replace(joint, gaussian=replace(joint.gaussian, mean=mean))
+    trial = replace(found, fit=replace(found.fit, joint=shifted))
+    assert may_vanish(trial.fit, cause, unexplained=found.unexplained, overdispersion=np.ones(3)) is may
 
 
 @pytest.mark.slow

@@ -25,7 +25,7 @@ def _refit(cause: str, gained: float, *, patches: bool = False) -> Mock:
     refit.fit = Mock(videos=(0, 1, 2))
     refit.beyond = lambda base: tuple(one for one in refit.causes if one not in base.causes)
     refit.patches.return_value, refit.may_vanish.return_value = patches, False
-    refit.loses_videos_of.return_value = False
+    refit.loses_videos_of.return_value, refit.fallen_from.return_value = False, []
     return refit
 
 
@@ -166,6 +166,23 @@ def test_videos_with_kicks_are_searched_anew_without_them(
     assert base.causes[0] == goes_on_from
     assert (winner and winner.causes[0]) == taken
     tilt.mended.assert_called_once_with([2], seed=0, thorough=True)
+
+
+def test_a_better_course_is_not_gone_on_from_with_a_video_that_has_lost_its_own(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Or a cause that has kept both courses would get the credit for it."""
+    before, winner, without, mended = _refit("", 0.0), _refit("drag", 20.0), _refit("", 10.0), _refit("", 19.0)
+    winner.without.return_value = without
+    without.fallen_from.side_effect = lambda base: [1] if base is before else []
+    without.mended.return_value, without.fit.fits = mended, ["explained", "lost", "explained"]
+    monkeypatch.setattr(refits, "may_take_another_course", lambda _fit: True)
+    monkeypatch.setattr(search, "happens_once", lambda _cause: False)
+    _judge_by_gain(monkeypatch)
+    found, taken = _searcher(needed=5.0).chosen(before, search.Step(Mock(spec=refits.Left), (winner,)))
+    assert found is mended
+    assert taken is winner
+    without.mended.assert_called_once_with([1], seed=0, thorough=True)
 
 
 def _judge_by_gain(monkeypatch: pytest.MonkeyPatch) -> None:

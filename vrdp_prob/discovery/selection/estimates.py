@@ -89,7 +89,8 @@ def may_vanish(
     """Whether what all videos share of an effect is no further from where it vanishes than chance would have it.
 
     It is not where that is infinitely far away, where only single videos tell, or where a strength reaches farther than
-    its Gaussian, which then says nothing of where the strength is not.
+    its Gaussian, which then says nothing of where the strength is not. Of numbers that are told by their differences
+    only these count: a friction that is less for every material alike is a friction of all.
 
     Parameters
     ----------
@@ -110,10 +111,22 @@ def may_vanish(
         return False
     sd = widened(joint.gaussian.sd, overdispersion, unexplained)
     places = [place for place, *_ in strengths]
-    away = joint.gaussian.mean[places] - [transform.to_coordinate(value) for _, transform, value in strengths]
-    root = (sd / joint.gaussian.sd)[places, None] * joint.gaussian.root[places]
-    is_near = away @ np.linalg.solve(root @ root.T, away) < chi2.ppf(CERTAIN, len(places))
+    telling = _telling([joint.numbers.keys[place][0] for place in places], effect)
+    away = telling @ (
+        joint.gaussian.mean[places] - [transform.to_coordinate(value) for _, transform, value in strengths]
+    )
+    root = telling @ ((sd / joint.gaussian.sd)[places, None] * joint.gaussian.root[places])
+    is_near = away @ np.linalg.solve(root @ root.T, away) < chi2.ppf(CERTAIN, len(away))
     return bool(is_near) and not reaches(fit, vanishing, sd)
+
+
+def _telling(names: Sequence[str], effect: Effect) -> Float[np.ndarray, "telling strength"]:
+    """What tells of an effect: each of its strengths, or how far those of one name are from the first of them."""
+    rows = np.eye(len(names))
+    for place, name in enumerate(names):
+        if name in effect.told_by_differences:
+            rows[place, names.index(name)] -= 1.0
+    return rows[np.abs(rows).sum(axis=1) > 0]
 
 
 def mass_scale_notes(effects: Iterable[Effect], videos: Iterable[Tracks]) -> Iterator[str]:

@@ -235,12 +235,13 @@ class _Searcher:
 
         Where the winner's refit has found a better course of events, which is no merit of the cause, the model with
         that course is the one to go on from; so it is where a search finds one that the winner's kicks stood for.
+        Videos that have lost theirs on the way to it are searched anew.
         """
         winner = next((one for one in step.tried[:1] if gain(one, trial)[0] >= self.needed), None)
         if winner is not None:
             without = winner.without(*winner.beyond(trial))
             if gain(without, trial)[0] > self.needed:
-                trial = without
+                trial = self.refits.searched_anew(without, without.fallen_from(trial))
             if happens_once(winner.causes[-1]):
                 mended = self.refits.searched_anew(trial, winner.acting(winner.causes[-1]))
                 trial = mended if gain(mended, trial)[0] > self.needed else trial

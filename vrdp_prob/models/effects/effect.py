@@ -131,6 +131,8 @@ class Effect:
     """Values of parameters at which the effect is gone, so that the model without it is nested."""
     vanishes_like: ClassVar[Mapping[str, str]] = {}
     """Parameters, each with the one of another effect that leaves nothing of this one where both are equal."""
+    told_by_differences: ClassVar[frozenset[str]] = frozenset()
+    """Parameters that tell of the effect only as far as they differ: another one may have what they have in common."""
     reads_video_start: ClassVar[bool] = False
     """Whether its laws read `vrdp_prob.models.parameters.VIDEO_START` beside their parameters."""
     stepwise: ClassVar[frozenset[str]] = frozenset()

@@ -27,6 +27,7 @@ class MaterialFriction(Effect):
     source: ClassVar = "dry friction of two materials (Amontons)"
     parameters: ClassVar = (MATERIAL_RATIO,)
     vanishes_at: ClassVar = {"material_friction_ratio": 1.0}
+    told_by_differences: ClassVar = frozenset({"material_friction_ratio"})
 
     def friction_factor(self, time: Scalar, body: BodyView, parameters: Mapping[str, Scalar]) -> Scalar:
         """Ratio to the shared friction."""

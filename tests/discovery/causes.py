@@ -249,6 +249,7 @@ VARIANTS: dict[str, Cause] = {
     "obstacle_met_often": Cause(
         "hidden_obstacle", obstacle_met_often, "m", places.LARGEST_DISC, least=0.2, placed=True
     ),
+    "restitution_between_walls": Cause("speed_dependent_restitution", speed_dependent_restitution, "1", 1.0),
     "wall_met_often": Cause("wall", wall_met_often, "m", 1.0, least=0.3, placed=True),
 }
 """Other ways in which a cause of the catalogue shows; the name to find is the cause's."""

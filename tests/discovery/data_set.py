@@ -27,7 +27,7 @@ WEAKEST = 1e-4
 """Smallest share of the largest strength that the search tries."""
 ORDERS_FRICTION = ("mass_dependent_friction", "material_friction")
 """Causes that leave nothing where the refit gives each body a friction of its own."""
-ORDERS_RESTITUTION = ("speed_dependent_restitution", "sticky_contacts")
+ORDERS_RESTITUTION = ("speed_dependent_restitution", "restitution_between_walls", "sticky_contacts")
 """Causes that leave (almost) nothing where the refit gives each body a restitution of its own."""
 
 

@@ -16,6 +16,10 @@ SPINNING = ("magnus_curl", "contact_friction")
 """Causes that act by the spin, which is seen only where angles are measured."""
 MET_OFTEN = ("obstacle_met_often", "wall_met_often")
 """Hidden things that many bodies shall meet, so that these must come about."""
+BETWEEN_WALLS = ("restitution_between_walls",)
+"""Causes that act in contacts, of which there are more between walls where bodies glide, and with no unknown mass."""
+ARENA = 2.0
+"""Half the side in m of the square between these walls."""
 GLIDING = 0.2
 """Share of the usual friction and drag of a table on which bodies come about."""
 WHICH = ("", "second_", "third_", "fourth_")
@@ -44,7 +48,8 @@ def hide(
         What each leaves after a refit, in units of the noise.
     setting, measurement
         What kind of videos. Bodies have no friction or restitution of their own where that would hide a cause, tables
-        brake less where bodies shall come about, and angles are measured where a cause acts by the spin.
+        brake less where bodies shall come about, walls are there where there shall be more contacts, and angles are
+        measured where a cause acts by the spin.
     """
     setting, measurement = setting or Setting(), measurement or Measurement()
     if set(ways) & set(ORDERS_FRICTION):
@@ -53,8 +58,10 @@ def hide(
         setting = replace(setting, restitution_spread=0.0)
     if set(ways) & set(SPINNING):
         measurement = replace(measurement, angles=True)
-    if set(ways) & set(MET_OFTEN):
+    if set(ways) & {*MET_OFTEN, *BETWEEN_WALLS}:
         setting = replace(setting, resistance=GLIDING * setting.resistance)
+    if set(ways) & set(BETWEEN_WALLS):
+        setting = replace(setting, arena=ARENA)
     wanted = [Wanted(way, effect_size=effect_size) for way in ways]
     return draw(wanted, seed=seed, setting=setting, measurement=measurement)
 
@@ -137,6 +144,7 @@ def _lens(video: Video) -> dict[str, float]:
     return {"distortion": video.distortion, "lens_x": x, "lens_y": y}
 
 
+_RESTITUTION = _laws(restitution_exponent="restitution_power", restitution_speed="restitution_speed")
 _OF_THE_TABLE: Mapping[str, Callable[[Video], dict[str, float]]] = {
     "surface_tilt": _laws(tilt_x="tilt_x", tilt_y="tilt_y"),
     "linear_drag": _laws(linear_drag="linear_drag"),
@@ -152,9 +160,8 @@ _OF_THE_TABLE: Mapping[str, Callable[[Video], dict[str, float]]] = {
     "mass_dependent_friction": _exponent,
     "slip_to_roll": _laws(slip_friction="slip_friction"),
     "contact_friction": _laws(contact_friction="contact_friction", wall_friction="contact_friction"),
-    "speed_dependent_restitution": _laws(
-        restitution_exponent="restitution_power", restitution_speed="restitution_speed"
-    ),
+    "speed_dependent_restitution": _RESTITUTION,
+    "restitution_between_walls": _RESTITUTION,
     "hidden_obstacle": _disc,
     "obstacle_met_often": _disc,
     "lens_distortion": _lens,

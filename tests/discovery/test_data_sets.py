@@ -8,7 +8,7 @@ from scipy.optimize import least_squares
 
 from tests.discovery.causes import CATALOGUE
 from tests.discovery.data_set import DataSet, Wanted, Yardstick, draw
-from tests.discovery.hidden import GLIDING, MET_OFTEN
+from tests.discovery.hidden import GLIDING, MET_OFTEN, hide
 from tests.discovery.laws import GRAVITY, Laws
 from tests.discovery.measurement import Measurement
 from tests.discovery.other_effects import ALL
@@ -153,6 +153,17 @@ def test_hidden_things_that_are_to_be_met_often_are_met_more_than_once(way: str)
     assert sum(met) >= 3
     assert sum(count > 0 for count in met) >= 2
     assert cause.name in CATALOGUE
+
+
+def test_between_walls_there_are_more_contacts() -> None:
+    few = Setting(videos=6, bodies=2)
+    contacts = {
+        way: sum(len(video.motion.pairs) for video in hide([way], seed=1, setting=few).truth.videos)
+        for way in ("speed_dependent_restitution", "restitution_between_walls")
+    }
+    assert contacts["restitution_between_walls"] > 1.5 * contacts["speed_dependent_restitution"]
+    (cause,) = hide(["restitution_between_walls"], seed=1, setting=few).truth.causes
+    assert cause.effect_size == pytest.approx(3.0, rel=0.1)
 
 
 def test_a_cause_that_no_body_feels_leaves_no_trace() -> None:

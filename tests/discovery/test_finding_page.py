@@ -286,6 +286,14 @@ def test_values_of_single_bodies_are_folded_where_they_are_many():
     assert "values of single bodies" not in render(replace(finding, causes=(few,)))
 
 
+def test_it_says_why_strengths_have_no_bound():
+    finding = unknown()
+    unbounded = replace(finding, upper_bounds=tuple(replace(one, bound=None) for one in finding.upper_bounds))
+    why = "what no cause explains may be hiding any of them"
+    assert why in text_of(render(unbounded))
+    assert why not in text_of(render(finding))
+
+
 def test_a_description_without_accelerations_tells_of_none():
     finding = unknown()
     without = replace(finding, description=replace(finding.description, size=None))

@@ -72,7 +72,8 @@ def render(finding: Finding) -> str:
         "checks": _checks(finding),
         "figures": [(name, _inline(figure, index)) for index, (name, figure) in enumerate(finding.figures.items())],
         "bounds": _bounds(finding),
-        "unbounded": finding.verdict is Verdict.UNKNOWN,
+        "unbounded": finding.verdict is Verdict.UNKNOWN
+        and all(one.bound is None for one in finding.upper_bounds if one.measure is None),
         "bounds_lead": finding.verdict is Verdict.NONE and bool(finding.upper_bounds),
         **_model(finding),
     }

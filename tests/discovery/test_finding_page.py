@@ -288,9 +288,11 @@ def test_values_of_single_bodies_are_folded_where_they_are_many():
 
 def test_it_says_why_strengths_have_no_bound():
     finding = unknown()
-    unbounded = replace(finding, upper_bounds=tuple(replace(one, bound=None) for one in finding.upper_bounds))
+    strengths = tuple(replace(one, bound=None) for one in finding.upper_bounds)
+    size = replace(finding.upper_bounds[0], name="hidden_obstacle", parameter="obstacle_radius", measure="its radius")
     why = "what no cause explains may be hiding any of them"
-    assert why in text_of(render(unbounded))
+    assert why in text_of(render(replace(finding, upper_bounds=(*strengths, size))))
+    assert why not in text_of(render(replace(finding, upper_bounds=(size,))))
     assert why not in text_of(render(finding))
 
 

@@ -151,8 +151,19 @@ def test_a_friction_that_is_less_for_every_material_alike_is_none_of_a_material(
     places = [place for place, (name, _) in enumerate(joint.numbers.keys) if name in cause.vanishes_at]
     mean[places] = shifts
     shifted = replace(joint, gaussian=replace(joint.gaussian, mean=mean))
-    trial = replace(found, fit=replace(found.fit, joint=shifted))
-    assert may_vanish(trial.fit, cause, unexplained=found.unexplained, overdispersion=np.ones(3)) is may
+    assert _may_vanish(replace(found, fit=replace(found.fit, joint=shifted)), cause) is may
+
+
+def test_where_all_bodies_are_of_one_material_their_friction_is_none_of_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(estimates, "reaches", lambda *_given: {})
+    _, null = fitted(seed=1)
+    cause = MaterialFriction()
+    alike = [replace(one, bodies=tuple(replace(body, material="") for body in one.bodies)) for one in null.tracks]
+    assert _may_vanish(Trial((), fit_together(alike, model=null.model.with_effect(cause), model_error=False)), cause)
+
+
+def _may_vanish(trial: Trial, cause: MaterialFriction) -> bool:
+    return may_vanish(trial.fit, cause, unexplained=trial.unexplained, overdispersion=np.ones(3))
 
 
 @pytest.mark.slow

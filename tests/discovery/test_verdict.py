@@ -68,31 +68,40 @@ def test_the_verdict(
 
 
 @pytest.mark.parametrize(
-    ("verdict", "causes", "explains", "is_better", "taken"),
+    ("verdict", "causes", "explains", "better_by", "taken"),
     [
-        (Verdict.UNKNOWN, (), True, True, "anew"),
-        (Verdict.UNKNOWN, (), True, False, "before"),
-        (Verdict.UNKNOWN, (), False, True, "before"),
-        (Verdict.UNKNOWN, ("tilt",), True, True, "before"),
-        (Verdict.NONE, (), True, True, "before"),
+        (Verdict.UNKNOWN, (), True, "courses", "anew"),
+        (Verdict.UNKNOWN, (), True, "spins", "anew"),
+        (Verdict.UNKNOWN, (), True, "nothing", "before"),
+        (Verdict.UNKNOWN, (), False, "courses", "before"),
+        (Verdict.UNKNOWN, ("tilt",), True, "courses", "before"),
+        (Verdict.NONE, (), True, "courses", "before"),
     ],
-    ids=["better courses", "no better courses", "most videos are lost", "a cause beside it", "nothing is left"],
+    ids=[
+        "better courses",
+        "better spins",
+        "nothing better",
+        "most videos are lost",
+        "a cause beside it",
+        "nothing is left",
+    ],
 )
 def test_all_videos_are_searched_anew_where_no_cause_explains_what_is_left(
     verdict: Verdict,
     causes: tuple[str, ...],
+    better_by: str,
     taken: str,
     *,
     explains: bool,
-    is_better: bool,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     fit, better = create_autospec(SharedFit, instance=True), create_autospec(SharedFit, instance=True)
-    fit.fits, fit.with_other_courses.return_value = (), better if is_better else fit
+    fit.fits, fit.with_other_courses.return_value = (), better if better_by == "courses" else fit
+    better.with_other_courses.return_value = better
     before, anew = (create_autospec(outcome.Outcome, instance=True) for _ in range(2))
     before.verdict, before.found = verdict, _search(causes)
     monkeypatch.setattr(discover, "explained", lambda _fits: explains)
-    monkeypatch.setattr(discover, "with_other_spins", lambda given, *, seed: given)
+    monkeypatch.setattr(discover, "with_other_spins", lambda _given, *, seed: better if better_by == "spins" else fit)
     monkeypatch.setattr(discover, "outcome_of", lambda given, *_given, **_named: {better: anew}[given])
     found = discover._of_better_courses(fit, before, [], seed=0, progress=None)
     assert found is {"anew": anew, "before": before}[taken]

@@ -134,7 +134,7 @@ def _of_better_courses(
 ) -> Outcome:
     """What is found where all videos are searched anew, if something is left that no cause explains.
 
-    Where the model explains most videos, and a search finds none of them better, the outcome stays.
+    The outcome stays where the model does not explain most videos, or where the searches find nothing better.
     """
     if outcome.verdict is not Verdict.UNKNOWN or outcome.found.best.causes or not explained(fit.fits):
         return outcome

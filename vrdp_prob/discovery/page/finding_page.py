@@ -52,6 +52,7 @@ NOT_EXCLUDED = "The likeliest causes of the catalogue. None of them explains the
 def render(finding: Finding) -> str:
     """The page as HTML text; the same finding gives the same text."""
     named, gains = finding.named, told_gains(finding)
+    strengths = [one for one in finding.upper_bounds if one.measure is None]
     values = {
         "css": asset("page.css"),
         "verdict": typeset(verdict_sentence(finding)),
@@ -72,8 +73,7 @@ def render(finding: Finding) -> str:
         "checks": _checks(finding),
         "figures": [(name, _inline(figure, index)) for index, (name, figure) in enumerate(finding.figures.items())],
         "bounds": _bounds(finding),
-        "unbounded": finding.verdict is Verdict.UNKNOWN
-        and all(one.bound is None for one in finding.upper_bounds if one.measure is None),
+        "unbounded": finding.verdict is Verdict.UNKNOWN and {one.bound for one in strengths} == {None},
         "bounds_lead": finding.verdict is Verdict.NONE and bool(finding.upper_bounds),
         **_model(finding),
     }

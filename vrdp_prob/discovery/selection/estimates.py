@@ -112,6 +112,8 @@ def may_vanish(
     sd = widened(joint.gaussian.sd, overdispersion, unexplained)
     places = [place for place, *_ in strengths]
     telling = _telling([joint.numbers.keys[place][0] for place in places], effect)
+    if not len(telling):
+        return True
     away = telling @ (
         joint.gaussian.mean[places] - [transform.to_coordinate(value) for _, transform, value in strengths]
     )

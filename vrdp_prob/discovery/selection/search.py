@@ -235,13 +235,12 @@ class _Searcher:
 
         Where the winner's refit has found a better course of events, which is no merit of the cause, the model with
         that course is the one to go on from; so it is where a search finds one that the winner's kicks stood for.
-        Videos that have lost theirs on the way to it are searched anew.
         """
         winner = next((one for one in step.tried[:1] if gain(one, trial)[0] >= self.needed), None)
         if winner is not None:
             without = winner.without(*winner.beyond(trial))
             if gain(without, trial)[0] > self.needed:
-                trial = self.refits.searched_anew(without, without.fallen_from(trial))
+                trial = self._with_both_courses(without, trial)
             if happens_once(winner.causes[-1]):
                 mended = self.refits.searched_anew(trial, winner.acting(winner.causes[-1]))
                 trial = mended if gain(mended, trial)[0] > self.needed else trial
@@ -258,8 +257,16 @@ class _Searcher:
         if not before:
             return [last]
         lesser = self._left_out(last, *last.beyond(before[-1]))
-        gains = gain(lesser, before[-1])[0] > self.needed
-        return self.handed_back([*before[:-1], lesser]) if gains else list(chain)
+        if gain(lesser, before[-1])[0] <= self.needed:
+            return list(chain)
+        return self.handed_back([*before[:-1], self._with_both_courses(lesser, before[-1])])
+
+    def _with_both_courses(self, better: Trial, before: Trial) -> Trial:
+        """A model with a better course of events than before, and with videos that have lost theirs searched anew.
+
+        A cause beside which both courses are kept would have the credit for the one that is lost without it.
+        """
+        return self.refits.searched_anew(better, better.fallen_from(before))
 
     def or_first_of(self, pair: tuple[Trial, Trial] | None, winner: Trial | None) -> Trial | None:
         """The best single cause, or the first of an established pair that brings more.

@@ -125,19 +125,15 @@ def plane_bound(path, order):
 def fall_along(pairs, own, x, y):
     """Bound on the fall of the rate of a gap along a direction that turns with one of the bodies.
 
-    Of the relative acceleration only what is along the direction counts, and of the rest what the direction turns to.
+    Of the relative acceleration only what is along the direction counts, and of the rest what the direction turns to:
+    by less than the bound on the spin, since the overlap is [0, 1] long. The distance of two points is never less than
+    that along a direction, so the bound holds for it, too.
     """
     path, bounds = pairs.local, pairs.local[BOUNDS]
     along = bounds[SPIN + own] * bounds[ACCELERATION]
     for power in range(2, 8):
         along += power * (power - 1) * abs(x * path[0, power] + y * path[1, power])
     return bounds[TURNING + own] + min(along, bounds[ACCELERATION])
-
-
-@compiled
-def fall_between_points(pairs, own):
-    """Bound on the fall of the rate of the distance of two points, in the frame of one of the bodies."""
-    return pairs.local[BOUNDS, TURNING + own] + pairs.local[BOUNDS, ACCELERATION]
 
 
 @compiled
@@ -167,8 +163,9 @@ def disc_disc(pairs, s, reach):
     """Gap of two discs."""
     dx, dy = value(pairs.local[0], s), value(pairs.local[1], s)
     distance = math.sqrt(dx * dx + dy * dy)
-    rate = (dx * slope(pairs.local[0], s) + dy * slope(pairs.local[1], s)) / max(distance, 1e-300)
-    set_look(pairs, distance - reach, rate, fall_between_points(pairs, 0))
+    nx, ny = dx / max(distance, 1e-300), dy / max(distance, 1e-300)
+    rate = nx * slope(pairs.local[0], s) + ny * slope(pairs.local[1], s)
+    set_look(pairs, distance - reach, rate, fall_along(pairs, 0, nx, ny))
     set_feature(pairs, 0, 0.0, 0.0, 1.0)
     set_feature(pairs, 3, 0.0, 0.0, 1.0)
     return 0
@@ -207,8 +204,8 @@ def box_disc(pairs, s, half, flat, radius, own):
         set_feature(pairs, 0, 0.0, ny, 0.0 if flat else 1.0)
     set_feature(pairs, 3, 0.0, 0.0, 1.0)
     wx, wy = cosine * nx - sine * ny, sine * nx + cosine * ny
-    fall = fall_between_points(pairs, own) if kind == 0 else fall_along(pairs, own, wx, wy)
-    set_look(pairs, distance - radius, wx * (vx + spin * dy) + wy * (vy - spin * dx), fall)
+    rate = wx * (vx + spin * dy) + wy * (vy - spin * dx)
+    set_look(pairs, distance - radius, rate, fall_along(pairs, own, wx, wy))
     return kind
 
 

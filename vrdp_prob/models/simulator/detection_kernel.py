@@ -129,11 +129,11 @@ def fall_along(pairs, own, x, y):
     by less than the bound on the spin, since the overlap is [0, 1] long. The distance of two points is never less than
     that along a direction, so the bound holds for it, too.
     """
-    path, bounds = pairs.local, pairs.local[BOUNDS]
-    along = bounds[SPIN + own] * bounds[ACCELERATION]
+    path, bounds, place = pairs.local, pairs.local[BOUNDS], int(own)
+    along = bounds[SPIN + place] * bounds[ACCELERATION]
     for power in range(2, 8):
         along += power * (power - 1) * abs(x * path[0, power] + y * path[1, power])
-    return bounds[TURNING + own] + min(along, bounds[ACCELERATION])
+    return bounds[TURNING + place] + min(along, bounds[ACCELERATION])
 
 
 @compiled
@@ -165,7 +165,7 @@ def disc_disc(pairs, s, reach):
     distance = math.sqrt(dx * dx + dy * dy)
     nx, ny = dx / max(distance, 1e-300), dy / max(distance, 1e-300)
     rate = nx * slope(pairs.local[0], s) + ny * slope(pairs.local[1], s)
-    set_look(pairs, distance - reach, rate, fall_along(pairs, 0, nx, ny))
+    set_look(pairs, distance - reach, rate, fall_along(pairs, 0.0, nx, ny))
     set_feature(pairs, 0, 0.0, 0.0, 1.0)
     set_feature(pairs, 3, 0.0, 0.0, 1.0)
     return 0
@@ -173,8 +173,8 @@ def disc_disc(pairs, s, reach):
 
 @compiled
 def box_disc(pairs, s, half, flat, radius, own):
-    """Gap of a square (or a straight wall, `flat`) and a disc; `own` is 1 where the square is the second body."""
-    sign, angle_row = 1.0 - 2.0 * own, ANGLE_FIRST + own
+    """Gap of a square (or a straight wall, `flat`) and a disc; `own` is 1.0 where the square is the second body."""
+    sign, angle_row = 1.0 - 2.0 * own, ANGLE_FIRST + int(own)
     dx, dy = sign * value(pairs.local[0], s), sign * value(pairs.local[1], s)
     vx, vy = sign * slope(pairs.local[0], s), sign * slope(pairs.local[1], s)
     angle, spin = value(pairs.local[angle_row], s), slope(pairs.local[angle_row], s)
@@ -236,7 +236,7 @@ def box_side(pairs, s, swapped, half_a, half_b, flat_b, face_x, face_y, corner):
     angle_b, spin_b = value(pairs.local[row_b], s), slope(pairs.local[row_b], s)
     nx = math.cos(angle_a) * face_x - math.sin(angle_a) * face_y
     ny = math.sin(angle_a) * face_x + math.cos(angle_a) * face_y
-    fall = fall_along(pairs, 1 if swapped else 0, nx, ny)
+    fall = fall_along(pairs, 1.0 if swapped else 0.0, nx, ny)
     cosine, sine = math.cos(angle_b), math.sin(angle_b)
     least, step = math.inf, math.inf
     for index in range(4):

@@ -131,9 +131,9 @@ def look(world, pairs, i, j, s):
     if shape_i == DISC and shape_j == DISC:
         return disc_disc(pairs, s, half_i + half_j)
     if shape_i == DISC:
-        return 2 + box_disc(pairs, s, half_j, shape_j == WALL, half_i, 1)
+        return 2 + box_disc(pairs, s, half_j, shape_j == WALL, half_i, 1.0)
     if shape_j == DISC:
-        return box_disc(pairs, s, half_i, shape_i == WALL, half_j, 0)
+        return box_disc(pairs, s, half_i, shape_i == WALL, half_j, 0.0)
     return box_box(pairs, s, half_i, half_j, shape_i == WALL, shape_j == WALL)
 
 

@@ -479,12 +479,12 @@ def test_a_cause_is_not_followed_that_promises_less_than_it_needs(
 
 
 @pytest.mark.parametrize(
-    ("astray", "is_asked"),
-    [([2], True), ([0, 3], True), ([], False), ([0, 1, 2], False)],
-    ids=["one video", "half of them", "none", "most"],
+    ("astray", "outweighing", "is_asked"),
+    [([2], True, True), ([0, 3], True, True), ([2], False, False), ([], True, False), ([0, 1, 2], True, False)],
+    ids=["one video", "half of them", "one that leaves less than all others", "none", "most"],
 )
 def test_what_most_videos_ask_for_comes_first_where_few_have_gone_astray(
-    astray: list[int], *, is_asked: bool, monkeypatch: pytest.MonkeyPatch
+    astray: list[int], *, outweighing: bool, is_asked: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     trial, lens, anew, bowl = _refit("", 0.0), _refit("lens", 1.0), _refit("lens", 500.0), _refit("bowl", 0.5)
     trial.fit.fits, anew.fit.fits = ["a", "b", "c", "d"], ["explained"]
@@ -511,6 +511,7 @@ def test_what_most_videos_ask_for_comes_first_where_few_have_gone_astray(
         return anew
 
     monkeypatch.setattr(refits, "trusted", lambda _fits: usual)
+    monkeypatch.setattr(refits, "outweigh", lambda fits, some: outweighing and (fits, some) == (trial.fit.fits, astray))
     monkeypatch.setattr(refits, "lost_videos", lambda fits: [] if fits == ["explained"] else [2])
     monkeypatch.setattr(refits.Refits, "left", lambda _self, _trial: left)
     monkeypatch.setattr(refits.Refits, "made_of", made_of)

@@ -2,6 +2,7 @@
 
 from unittest.mock import Mock, create_autospec
 
+import numpy as np
 import pytest
 
 from tests.inference.several_videos.videos import sliding
@@ -72,6 +73,21 @@ def test_few_lost_videos_lack_their_course_rather_than_a_cause(ratios: list[floa
     assert second_look.loses_single_videos(_fits(ratios)) is loses
 
 
+@pytest.mark.parametrize(
+    ("ratios", "some", "more"),
+    [([17.0, 1.5, 1.5, 1.8], [0], True), ([2.1, 1.6, 1.6, 1.6], [0], False), ([2.1, 0.9, 0.9, 0.9], [0], True)],
+    ids=["far off", "a little worse than the others", "the only one"],
+)
+def test_lost_videos_outweigh_others_by_what_they_leave_beyond_the_noise(
+    ratios: list[float], some: list[int], *, more: bool
+) -> None:
+    fits = _fits(ratios)
+    assert second_look.outweigh(fits, some) is more
+    fits[0].clues.tracks.seen = np.ones((1, 2), dtype=bool)
+    fits[1].clues.tracks.seen = np.ones((400, 2), dtype=bool)
+    assert second_look.outweigh(fits, some) is (ratios[1] < 1.0)
+
+
 def test_what_has_one_course_only_is_not_lost() -> None:
     assert second_look.lost_videos(_fits([2.0, 1.0, 3.0], bodies=1)) == []
 
@@ -112,5 +128,11 @@ def test_where_the_worst_are_not_found_the_other_lost_ones_are_searched_and_none
 
 def _fits(ratios: list[float], *, bodies: int = 2) -> list[Mock]:
     """Fits of videos with such residuals in units of the noise, in which nothing happens."""
-    clues, rollout = Mock(tracks=Mock(bodies=("",) * bodies, walls=())), Mock(events=())
-    return [Mock(spec=MapFit, misfit=Mock(ratio=ratio), clues=clues, rollout=rollout) for ratio in ratios]
+
+    def tracks() -> Mock:
+        return Mock(bodies=("",) * bodies, walls=(), seen=np.ones((20, bodies), dtype=bool))
+
+    return [
+        Mock(spec=MapFit, misfit=Mock(ratio=ratio), clues=Mock(tracks=tracks()), rollout=Mock(events=()))
+        for ratio in ratios
+    ]

@@ -25,6 +25,7 @@ from vrdp_prob.inference.several_videos.second_look import (
     explained,
     lost_videos,
     may_take_another_course,
+    outweigh,
     trusted,
 )
 from vrdp_prob.models.effects.effect import Effect
@@ -168,12 +169,12 @@ class Refits:
     def _asked_by_most(self, trial: Trial) -> list[Trial]:
         """Refits with what most videos ask for, the best first, where few others have lost their course by far.
 
-        What one such video leaves is more than what all others say, and calls for whatever bends its course; given
-        what these ask for, its own may be found. None where that is not so.
+        Where one such video leaves more than all others, it calls for whatever bends its course; given what these ask
+        for, its own may be found. None where that is not so.
         """
         fits = trial.fit.fits
         astray = np.flatnonzero(~trusted(fits)).tolist()
-        if not 0 < len(astray) <= len(fits) // MOST:
+        if not 0 < len(astray) <= len(fits) // MOST or not outweigh(fits, astray):
             return []
         asked = [one for one in _shortlist(self.left(trial).beside_chance, CLOSE) if not happens_once(one.effect)]
         found = self.made_of(trial, asked)

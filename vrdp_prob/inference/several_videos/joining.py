@@ -50,9 +50,9 @@ def joined(
 ) -> tuple[list[MapFit], JointFit]:
     """The videos' own fits, some of them searched anew, and the joint fit from what they agree on.
 
-    Where a video strays in it though each is explained by itself, cubes may be on wrong islands of yaw and spin. Then
-    the cubes of all videos are turned, and where a video strays still, the videos are joined without what cubes say of
-    the decay of spins; the most probable fit is taken.
+    Where a video strays in it though most are explained by themselves, cubes may be on wrong islands of yaw and spin.
+    Then the cubes of all videos are turned, and where a video strays still, the videos are joined without what cubes
+    say of the decay of spins; the most probable fit is taken.
 
     Parameters
     ----------
@@ -65,10 +65,11 @@ def joined(
     """
     join = partial(_joined, model=model, shared=shared, seed=seed, plan=plan)
     found = [join(alone, islands=False)]
-    if not plan.alternatives or not _strays(*found[0]) or not any(_has_unseen_yaws(fit) for fit in alone):
+    may_be_turned = plan.alternatives and explained(alone) and any(_has_unseen_yaws(fit) for fit in alone)
+    if not may_be_turned or not _strays(*found[0]):
         return found[0]
-    turned = _turned(alone, model, seed=seed, optimiser=plan.optimiser) if explained(alone) else alone
-    found += [join(turned, islands=False)] if turned is not alone else []
+    turned = _turned(alone, model, seed=seed, optimiser=plan.optimiser)
+    found.append(join(turned, islands=False))
     if _strays(*found[-1]):
         found.append(join(turned, islands=True))
     return max(found, key=lambda one: one[1].log_density)

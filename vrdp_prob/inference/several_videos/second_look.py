@@ -86,6 +86,13 @@ def loses_single_videos(fits: Sequence[MapFit]) -> bool:
     return explained(fits) and 0 < len(lost_videos(fits)) <= max(len(fits) // SINGLE, 1)
 
 
+def outweigh(fits: Sequence[MapFit], some: Collection[int]) -> bool:
+    """Whether some videos leave more beyond the noise than all others together, in squares of their residuals."""
+    beyond = np.array([one.clues.tracks.seen.sum() * (one.misfit.ratio**2 - 1.0) for one in fits])
+    among = np.isin(np.arange(len(fits)), list(some))
+    return bool(beyond[among].sum() > beyond[~among].sum())
+
+
 def lost_together(fits: Sequence[MapFit]) -> list[list[int]]:
     """Lost videos in groups that are searched one after the other, each of half of all videos at most.
 

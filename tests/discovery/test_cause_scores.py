@@ -16,6 +16,7 @@ from vrdp_prob.discovery.candidates.scores import (
     _one_sided,
     _p_value,
     happens_once,
+    mends_any_course,
     score_causes,
 )
 from vrdp_prob.discovery.finding import UpperBound
@@ -163,6 +164,12 @@ def test_which_effects_happen_once() -> None:
     assert happens_once(ExternalImpulse())
     assert happens_once(ClockError())
     assert not happens_once(SurfaceTilt())
+
+
+def test_a_jump_of_the_clock_bends_no_path_and_mends_no_course_of_events() -> None:
+    assert mends_any_course(ExternalImpulse())
+    assert not mends_any_course(ClockError())
+    assert not mends_any_course(SurfaceTilt())
 
 
 def test_a_cause_without_a_vanishing_strength_has_no_score() -> None:

@@ -18,9 +18,12 @@ from vrdp_prob.discovery.selection.trials import Trial, gain, gains, weights
 from vrdp_prob.inference.map_fit import MapFit
 from vrdp_prob.inference.several_videos import fitting
 from vrdp_prob.inference.several_videos.agreement import following_ones
-from vrdp_prob.inference.several_videos.fitting import fit_together
+from vrdp_prob.inference.several_videos.fitting import SharedFit, fit_together
 from vrdp_prob.inference.several_videos.joint_fit import expand
 from vrdp_prob.inference.several_videos.second_look import doubtful
+from vrdp_prob.models.effects.clock_error import ClockError
+from vrdp_prob.models.effects.effect import Effect
+from vrdp_prob.models.effects.external_impulse import ExternalImpulse
 from vrdp_prob.models.effects.linear_drag import LinearDrag
 from vrdp_prob.models.effects.material_friction import MaterialFriction
 from vrdp_prob.models.effects.surface_tilt import SurfaceTilt
@@ -188,6 +191,19 @@ def test_a_new_search_of_a_video_never_makes_a_fit_worse() -> None:
     trial = Trial((), fit)
     assert trial.mended([], seed=0) is trial
     assert trial.mended([1], seed=0).fit.joint.log_density >= fit.joint.log_density
+
+
+@pytest.mark.parametrize(("cause", "keeps"), [(ExternalImpulse(), True), (ClockError(), False)], ids=["kicks", "clock"])
+def test_videos_with_kicks_keep_the_course_on_which_these_were_found(
+    cause: Effect, *, keeps: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    _, fit = fitted("surface_tilt", 3.0, seed=2)
+    better = replace(fit)
+    monkeypatch.setattr(SharedFit, "mended", lambda _fit, _lost, **_how: better)
+    monkeypatch.setattr(SharedFit, "with_other_courses", lambda _fit, **_how: better)
+    trial = Trial((cause,), fit)
+    assert (trial.mended([1], seed=0) is trial) is keeps
+    assert (trial.with_other_courses(seed=0) is trial) is keeps
 
 
 def test_a_video_is_searched_beside_others_that_have_followed_what_they_agree_on(

@@ -12,6 +12,8 @@ from vrdp_prob.discovery.selection import refits, search
 from vrdp_prob.discovery.selection.trials import Trial
 from vrdp_prob.inference.several_videos.ascent import ImpossibleStartError
 from vrdp_prob.models.effects.bowl import Bowl
+from vrdp_prob.models.effects.clock_error import ClockError
+from vrdp_prob.models.effects.effect import Effect
 from vrdp_prob.models.effects.external_impulse import ExternalImpulse
 from vrdp_prob.models.effects.lens_distortion import LensDistortion
 from vrdp_prob.models.effects.mass_dependent_friction import MassDependentFriction
@@ -88,14 +90,14 @@ def test_two_causes_are_found_of_which_neither_stands_out_beside_chance(
     [(2.0, 200.0, "tilt"), (70.0, 200.0, None), (2.0, 400.0, None)],
     ids=["enough", "too little", "a trifle of what lacks"],
 )
-def test_the_first_of_two_is_what_lasts_and_brings_most_where_all_else_is_noise(
+def test_the_first_of_two_is_what_brings_most_but_for_kicks_where_all_else_is_noise(
     least: float, lacking: float, name: str | None, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     nothing, tilt, drag, kicks = (_refit(*one) for one in (("", 0.0), ("tilt", -1.0), ("drag", 0.5), ("kicks", 0.2)))
     for one, brought in ((nothing, 0.0), (tilt, 60.0), (drag, 20.0), (kicks, 90.0)):
         one.brought.return_value = brought
     nothing.lacking = lacking
-    monkeypatch.setattr(refits, "happens_once", lambda cause: cause == "kicks")
+    monkeypatch.setattr(refits, "mends_any_course", lambda cause: cause == "kicks")
     found = _searcher(needed=least)._provisional(nothing, [drag, kicks, tilt])
     assert found is (tilt if name else None)
 
@@ -107,7 +109,7 @@ def test_a_law_is_none_to_go_on_from_that_loses_most_videos_which_were_explained
     nothing, tilt, drag = (_refit(*one) for one in (("", 0.0), ("tilt", 1.0), ("drag", 0.5)))
     for one, brought, explains in ((nothing, 0.0, before), (tilt, 60.0, False), (drag, 20.0, True)):
         one.brought.return_value, one.fit.fits, one.lacking = brought, explains, 50.0
-    monkeypatch.setattr(refits, "happens_once", lambda _cause: False)
+    monkeypatch.setattr(refits, "mends_any_course", lambda _cause: False)
     monkeypatch.setattr(search, "explained", lambda fits: fits)
     found = _searcher(needed=2.0)._provisional(nothing, [drag, tilt])
     assert found is not None
@@ -139,7 +141,7 @@ def test_what_a_better_course_of_events_brings_is_no_merit_of_the_cause(
     nothing, winner, better = _refit("", 0.0), _refit("tilt", 10.0), _refit("better course", without)
     winner.without.return_value = better
 
-    monkeypatch.setattr(search, "happens_once", lambda _cause: False)
+    monkeypatch.setattr(search, "mends_any_course", lambda _cause: False)
     _judge_by_gain(monkeypatch)
     base, found = _searcher(needed=2.0).chosen(nothing, search.Step(Mock(spec=refits.Left), (winner,)))
     assert base.causes[0] == goes_on_from
@@ -160,7 +162,7 @@ def test_videos_with_kicks_are_searched_anew_without_them(
     kicked.acting.return_value = [0, 2]
     tilt.fit = Mock(fits=["of one course only", "", ""])
     monkeypatch.setattr(refits, "may_take_another_course", lambda fit: fit != "of one course only")
-    monkeypatch.setattr(search, "happens_once", lambda _cause: True)
+    monkeypatch.setattr(search, "mends_any_course", lambda _cause: True)
     _judge_by_gain(monkeypatch)
     base, winner = _searcher(needed=2.0).chosen(tilt, search.Step(Mock(spec=refits.Left), (kicked,)))
     assert base.causes[0] == goes_on_from
@@ -177,7 +179,7 @@ def test_a_better_course_is_not_gone_on_from_with_a_video_that_has_lost_its_own(
     without.fallen_from.side_effect = lambda base: [1] if base is before else []
     without.mended.return_value, without.fit.fits = mended, ["explained", "lost", "explained"]
     monkeypatch.setattr(refits, "may_take_another_course", lambda _fit: True)
-    monkeypatch.setattr(search, "happens_once", lambda _cause: False)
+    monkeypatch.setattr(search, "mends_any_course", lambda _cause: False)
     _judge_by_gain(monkeypatch)
     found, taken = _searcher(needed=5.0).chosen(before, search.Step(Mock(spec=refits.Left), (winner,)))
     assert found is mended
@@ -252,7 +254,7 @@ def test_of_several_walls_at_once_none_is_a_merit_of_a_better_course(monkeypatch
     """The model to go on from is that without any of them."""
     tilt, walls = _refit("tilt", 0.0), _refit("tilt+wall+second_wall", 50.0)
     walls.without.return_value = _refit("tilt", 0.5)
-    monkeypatch.setattr(search, "happens_once", lambda _cause: False)
+    monkeypatch.setattr(search, "mends_any_course", lambda _cause: False)
     _judge_by_gain(monkeypatch)
     step = search.Step(Mock(spec=refits.Left), (walls,))
     assert _searcher(needed=2.0).chosen(tilt, step) == (tilt, walls)
@@ -438,7 +440,7 @@ def test_a_course_for_which_another_video_loses_its_own_is_a_wrong_one(
 def test_the_most_promising_cause_is_followed_whatever_others_have_brought(
     brought: float, *, followed: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(refits, "happens_once", lambda _cause: False)
+    monkeypatch.setattr(refits, "mends_any_course", lambda _cause: False)
     effects = {name: Mock() for name in ("wind", "patch")}
     names = ("wind", "wind", "wind", "patch")
     wind, further, found, patch = all_ = [
@@ -472,7 +474,7 @@ def _broken_off(promised: float) -> tuple[Mock, Mock, Mock]:
 def test_a_cause_is_not_followed_that_promises_less_than_it_needs(
     promised: float, *, followed: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(refits, "happens_once", lambda _cause: False)
+    monkeypatch.setattr(refits, "mends_any_course", lambda _cause: False)
     nothing, refit, score = _broken_off(promised)
     assert _refits(needed=6.0).made_of(nothing, [score]) == [refit]
     assert refit.continued.called is followed
@@ -527,10 +529,23 @@ def test_what_most_videos_ask_for_comes_first_where_few_have_gone_astray(
 
 @pytest.mark.parametrize("once", [True, False], ids=["kicks", "a law"])
 def test_a_refit_that_brings_nothing_is_followed_once_at_most(*, once: bool, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(refits, "happens_once", lambda _cause: once)
+    monkeypatch.setattr(refits, "mends_any_course", lambda _cause: once)
     nothing, refit, score = _broken_off(20.0)
     assert _refits(needed=6.0).made_of(nothing, [score]) == [refit]
     assert refit.mended.call_count == (0 if once else 1)
+
+
+@pytest.mark.parametrize(
+    ("cause", "explain"), [(ExternalImpulse(), False), (ClockError(), True)], ids=["kicks", "jumps of the clock"]
+)
+def test_kicks_in_several_videos_explain_none_of_them_though_they_leave_nothing(
+    cause: Effect, *, explain: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    nothing, found = _refit("", 0.0), _refit("", 90.0)
+    found.causes, found.acting.return_value = (cause,), [0, 2]
+    monkeypatch.setattr(refits, "gain", lambda trial, _base: (90.0 if trial is found else 0.0, 1.0))
+    monkeypatch.setattr(refits.Refits, "left", lambda _self, _trial: refits.Left((), (), np.ones(3)))
+    assert _refits(needed=6.0).settled(nothing, [found]) is explain
 
 
 def test_kicks_are_no_measure_of_laws(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -117,7 +117,7 @@ def test_a_contact_before_the_second_frame_is_found() -> None:
 def test_bodies_that_begin_to_meet_on_the_way_get_their_unknowns() -> None:
     fit, _ = fitted(4)
     likelihood, points = fit.likelihood, [mode.point for mode in fit.modes]
-    complete = structure_at(likelihood, points, fit.clues.moving)
+    complete = structure_at(likelihood, points, Structure(fit.clues.moving, frozenset()))
     assert complete.colliding
     assert with_all_that_meet(likelihood, complete, points) is None
     bare = replace(complete, colliding=frozenset())

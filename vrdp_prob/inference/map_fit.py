@@ -38,7 +38,7 @@ from vrdp_prob.models.likelihood import Likelihood
 from vrdp_prob.models.noise import NoiseFamily
 from vrdp_prob.models.physics import PhysicsModel
 from vrdp_prob.models.simulator.rollout import Rollout
-from vrdp_prob.models.unknowns import MOTION, NOISE, Structure, unknowns
+from vrdp_prob.models.unknowns import MOTION, NOISE, Held, Structure, unknowns
 from vrdp_prob.progress import ProgressDisplay, SilentProgress
 from vrdp_prob.scene import Tracks
 
@@ -126,6 +126,7 @@ def fit_map(
     noise: NoiseFamily | None = None,
     plan: FitPlan | None = None,
     model_error: bool = True,
+    held: Held | None = None,
 ) -> MapFit:
     """Find the most probable values of a video.
 
@@ -146,6 +147,8 @@ def fit_map(
         Stages and optimiser; `FitPlan()` where None.
     model_error
         Whether what the model leaves unexplained is looked for, and widens the density.
+    held
+        Numbers that are not unknown though the model has them; none where None.
 
     Raises
     ------
@@ -157,11 +160,12 @@ def fit_map(
         raise InputError(f"{tracks.video}: no object moves, so nothing can be inferred; give tracks with motion.")
     family = clues.noise_family if noise is None else noise
     stages = FitPlan() if plan is None else plan
-    task = _Task(clues, model, family, stages)
+    known = Structure(moving=clues.moving, colliding=frozenset(), held=held or {})
+    task = _Task(clues, model, family, stages, known)
     attempts = _attempts(task, generator, progress)
     everything = attempts[0].likelihood
     starts = [one.point for one in merged(everything, [one for fit in attempts for one in fit.hypotheses])]
-    structure = structure_at(everything, starts, clues.moving)
+    structure = structure_at(everything, starts, known)
     likelihood = Likelihood(tracks, model, unknowns(tracks, model, structure, family), family)
     refined = partial(_refined, plan=stages)
     found = refined(everything, starts, likelihood)
@@ -204,7 +208,7 @@ def fit_map(
         climbed = _climbed(widened, found)
         likelihood = widened
         evaluations += sum(one.evaluations for one in (*found, *climbed))
-    likelihood, modes = without_idle(likelihood, distinct_modes(likelihood, climbed), structure.moving)
+    likelihood, modes = without_idle(likelihood, distinct_modes(likelihood, climbed), structure)
     converged = at_the_top(found, climbed)
     search = ModeSearch(stages.alternatives, len(attempts), not _in_doubt(attempts), all_orders)
     return MapFit(likelihood, modes, converged, search, clues, misfit, evaluations, believed_at_rest)
@@ -269,12 +273,13 @@ def _climbed(likelihood: Likelihood, found: Sequence[Refined]) -> list[Refined]:
 
 @dataclass(frozen=True)
 class _Task:
-    """What is fitted, and how."""
+    """What is fitted, and how; `known` is which bodies move, and what is held."""
 
     clues: Clues
     model: PhysicsModel
     noise: NoiseFamily
     plan: FitPlan
+    known: Structure
 
 
 def _attempts(task: _Task, generator: np.random.Generator, progress: ProgressDisplay | None) -> list[GrowingFit]:
@@ -307,7 +312,7 @@ def _grow(task: _Task, generator: np.random.Generator, progress: ProgressDisplay
     """
     clues, tracks, plan = task.clues, task.clues.tracks, task.plan
     everything = frozenset(body for body, one in enumerate(tracks.bodies) if one.radius is not None)
-    structure = Structure(moving=clues.moving, colliding=everything)
+    structure = replace(task.known, colliding=everything)
     left_out = clues.outliers if task.noise is NoiseFamily.STUDENT_T else None
     likelihood = Likelihood(tracks, task.model, unknowns(tracks, task.model, structure), left_out=left_out)
     growing = GrowingFit(likelihood, _start(likelihood, clues), clues, generator, plan)

@@ -45,6 +45,11 @@ YAW_SD = 1.5
 ANGLE_ZERO_SD = 3.0
 """Prior standard deviation in rad of the arbitrary zero of measured angles."""
 
+Owned = tuple[str, int | None]
+"""A number of a video: its name and its owner, None for the video's."""
+Held = Mapping[Owned, float | None]
+"""Numbers that are not unknown though the model has them, and the value that each keeps; None for its default."""
+
 
 @dataclass(frozen=True)
 class Structure:
@@ -63,15 +68,14 @@ class Structure:
     passing
         Cubes that come so near to something that their yaw decides whether they meet it.
     held
-        Quantities (with their owner, None for the video's) that are not unknown though the model has them, and the
-        value that each keeps; None for its default.
+        Quantities that are not unknown though the model has them.
     """
 
     moving: frozenset[int]
     colliding: frozenset[int]
     bouncing: frozenset[int] = frozenset()
     passing: frozenset[int] = frozenset()
-    held: Mapping[tuple[str, int | None], float | None] = field(default_factory=dict)
+    held: Held = field(default_factory=dict)
 
     @property
     def meeting(self) -> frozenset[int]:

@@ -18,8 +18,9 @@ from vrdp_prob.inference.several_videos.parts import stream
 from vrdp_prob.inference.several_videos.second_look import doubtful, look_again
 from vrdp_prob.models.coordinates import Coordinate, Coordinates
 from vrdp_prob.models.likelihood import Likelihood
-from vrdp_prob.models.parameters import Prior, Transform
+from vrdp_prob.models.parameters import SLIDING_FRICTION, Prior, Transform
 from vrdp_prob.models.physics import PhysicsModel
+from vrdp_prob.models.unknowns import Held
 
 SHARPNESS = 1e5
 """One over the standard deviation of the direction that is known best."""
@@ -101,6 +102,23 @@ def test_a_video_that_is_worse_than_the_others_is_fitted_anew() -> None:
     assert (found[0], found[2]) == (fits[0], fits[2])
     assert found[1].misfit.residual_sd == pytest.approx(fits[1].misfit.residual_sd, rel=0.02)
     assert found[1].likelihood.model == default_model()
+
+
+def test_what_is_held_in_a_video_is_held_in_a_new_search_of_it() -> None:
+    videos = [colliding(0), colliding(1)]
+    held: list[Held] = [{}, {(SLIDING_FRICTION.name, None): 0.25}]
+    fits = [
+        fit_map(one, default_model(), stream(0, one.video), model_error=False, held=kept)
+        for one, kept in zip(videos, held, strict=True)
+    ]
+    coordinates = fits[1].likelihood.coordinates
+    assert (SLIDING_FRICTION.name, None) not in coordinates.places
+    assert coordinates.defaults[SLIDING_FRICTION.name] == 0.25
+    spoilt = replace(fits[1], misfit=replace(fits[1].misfit, residual_sd=3 * fits[1].misfit.residual_sd))
+    found = look_again([fits[0], spoilt], [1], default_model(), None, seed=0, held=held)
+    assert found[1] is not spoilt
+    assert found[1].likelihood.coordinates.places == coordinates.places
+    assert found[1].likelihood.coordinates.defaults[SLIDING_FRICTION.name] == 0.25
 
 
 @pytest.mark.slow

@@ -35,7 +35,7 @@ def test_where_nobody_is_trusted_nothing_is_told(monkeypatch: pytest.MonkeyPatch
     fit = fit_together([sliding(1), sliding(2), sliding(3)], model=PhysicsModel.base(), model_error=False)
 
     def told() -> PhysicsModel:
-        return second_look._told(fit.fits, fit.model, None, [1], islands=False)
+        return second_look._told(fit.fits, fit.structures, fit.model, None, [1], islands=False)
 
     assert told().beliefs["sliding_friction"].prior.sd < 0.5 * SLIDING_FRICTION.prior.sd
     monkeypatch.setattr(second_look, "trusted", lambda fits: [index != 1 for index in range(len(fits))])

@@ -127,6 +127,14 @@ def happens_once(effect: Effect) -> bool:
     return any(parameter.scope is Scope.VIDEO for parameter in effect.parameters)
 
 
+def mends_any_course(effect: Effect) -> bool:
+    """Whether an effect happens once and bends paths, so that it mends a wrong course of events as well as a right one.
+
+    What happens to the clock shifts bodies along their paths and bends none.
+    """
+    return happens_once(effect) and not effect.overrides("measured_times")
+
+
 def score_causes(fit: SharedFit, model: ResidualModel, effects: Iterable[Effect], *, seed: int) -> list[CauseScore]:
     """Scores of causes that have a strength at which they vanish, the least probable by chance first."""
     vanishing = [effect for effect in effects if effect.vanishes_at or effect.vanishes_like]

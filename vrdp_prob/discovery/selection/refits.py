@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Float
 
 from vrdp_prob.discovery.candidates.proposals import hidden_things
-from vrdp_prob.discovery.candidates.scores import CauseScore, happens_once, score_causes
+from vrdp_prob.discovery.candidates.scores import CauseScore, happens_once, mends_any_course, score_causes
 from vrdp_prob.discovery.candidates.single_videos import causes_of_lost_videos
 from vrdp_prob.discovery.candidates.surfaces import Placed, placed_surfaces
 from vrdp_prob.discovery.checks.battery import run_checks
@@ -350,15 +350,15 @@ class Refits:
         Where the score of a cause promises more than any refit has brought, and its own brought far less, that goes on
         if it broke off on a long way; and where videos have lost their course of events on it, they are searched anew.
         So it is with the cause whose score promises most of all, whatever others have brought, if that is as much as a
-        cause needs at all. What happens once mends any course, and is no measure of causes that last.
+        cause needs at all. What mends any course is no measure of other causes.
         """
         found = self._all(trial.with_cause, scores)
-        promised = {one.effect.name: one.size / 2 for one in scores if not happens_once(one.effect)}
+        promised = {one.effect.name: one.size / 2 for one in scores if not mends_any_course(one.effect)}
         promised = {name: size for name, size in promised.items() if size > self.needed}
-        leader = "" if lasting(beside) else max(promised, key=lambda name: promised[name], default="")
+        leader = "" if explaining(beside) else max(promised, key=lambda name: promised[name], default="")
 
         def brought_most() -> float:
-            return max((one.brought(trial) for one in lasting([*beside, *found])), default=0.0)
+            return max((one.brought(trial) for one in explaining([*beside, *found])), default=0.0)
 
         for _ in range(MENDINGS):
             most = brought_most()
@@ -394,15 +394,15 @@ def merit(trial: Trial) -> float:
     return float(trial.log_density.sum()) + trial.log_prior
 
 
-def lasting(trials: Sequence[Trial]) -> list[Trial]:
-    """Those whose last cause acts all the time."""
-    return [one for one in trials if not happens_once(one.causes[-1])]
+def explaining(trials: Sequence[Trial]) -> list[Trial]:
+    """Those whose last cause does not just mend any course."""
+    return [one for one in trials if not mends_any_course(one.causes[-1])]
 
 
 def _mends_several(trial: Trial) -> bool:
-    """Whether the last cause of a model happens once in each of several videos."""
+    """Whether the last cause of a model mends any course, and does so in several videos."""
     cause = trial.causes[-1]
-    return happens_once(cause) and len(trial.acting(cause)) > 1
+    return mends_any_course(cause) and len(trial.acting(cause)) > 1
 
 
 def _kicks(score: CauseScore) -> bool:

@@ -7,8 +7,8 @@ from functools import partial
 import numpy as np
 from jaxtyping import Float
 
-from vrdp_prob.discovery.candidates.scores import happens_once
-from vrdp_prob.discovery.selection.refits import HOPEFUL, Left, Refits, lasting, merit
+from vrdp_prob.discovery.candidates.scores import mends_any_course
+from vrdp_prob.discovery.selection.refits import HOPEFUL, Left, Refits, explaining, merit
 from vrdp_prob.discovery.selection.trials import Trial, gain, with_own_population
 from vrdp_prob.inference.runs.parallel import in_processes
 from vrdp_prob.inference.several_videos.fitting import SharedFit
@@ -213,8 +213,8 @@ class _Searcher:
         return Step(self.refits.left(trial), tuple(self._in_order(trial, found)), pair)
 
     def _provisional(self, trial: Trial, found: Sequence[Trial]) -> Trial | None:
-        """The lasting cause that brings most where all else is noise: enough, and a good part of what lacks."""
-        possible = [one for one in lasting(found) if not _loses_most(one, trial)]
+        """The cause that brings most where all else is noise, but for kicks: enough, and a good part of what lacks."""
+        possible = [one for one in explaining(found) if not _loses_most(one, trial)]
         first = max(possible, key=lambda one: one.brought(trial) + one.log_prior, default=trial)
         return None if first.brought(trial) < max(self.needed, FIRST_SHARE * trial.lacking) else first
 
@@ -241,7 +241,7 @@ class _Searcher:
             without = winner.without(*winner.beyond(trial))
             if gain(without, trial)[0] > self.needed:
                 trial = self._with_both_courses(without, trial)
-            if happens_once(winner.causes[-1]):
+            if mends_any_course(winner.causes[-1]):
                 mended = self.refits.searched_anew(trial, winner.acting(winner.causes[-1]))
                 trial = mended if gain(mended, trial)[0] > self.needed else trial
             if self.doubted(winner, trial, self.refits.left(winner).overdispersion):

@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Float
 
 from vrdp_prob.discovery.candidates.kicked_at_contact import kicked_at_contact
-from vrdp_prob.discovery.candidates.scores import CauseScore, happens_once
+from vrdp_prob.discovery.candidates.scores import CauseScore, happens_once, mends_any_course
 from vrdp_prob.discovery.finding import HeldOut
 from vrdp_prob.discovery.residuals.held_out import Cavity, cavities
 from vrdp_prob.discovery.residuals.jitter import alike_in_neighbours
@@ -17,12 +17,13 @@ from vrdp_prob.discovery.residuals.unexplained import Unexplained, unexplained
 from vrdp_prob.discovery.selection.estimates import may_vanish
 from vrdp_prob.discovery.selection.forecast import held_out
 from vrdp_prob.inference.several_videos.ascent import Effort, ImpossibleStartError
-from vrdp_prob.inference.several_videos.fitting import Owned, SharedFit
+from vrdp_prob.inference.several_videos.fitting import SharedFit
 from vrdp_prob.inference.several_videos.population import own_parameters, with_learned_population
 from vrdp_prob.inference.several_videos.second_look import LOST, MOST, lost_videos
 from vrdp_prob.models.effects.effect import Effect
 from vrdp_prob.models.parameters import Parameter, Scope
 from vrdp_prob.models.physics import PhysicsModel
+from vrdp_prob.models.unknowns import Held, Owned
 
 EACH_PARAMETER = 1.0
 """Nats by which a cause is believed less for each of its parameters.
@@ -255,12 +256,19 @@ class Trial:
         return kicked_at_contact(part.rollout.events, part.likelihood.tracks.times, kicked)
 
     def mended(self, lost: Sequence[int], *, seed: int, thorough: bool = False) -> "Trial":
-        """The fit with some videos searched anew; itself where that finds nothing better."""
+        """The fit with some videos searched anew; itself where that finds nothing better, or with kicks.
+
+        These are found on the courses that there are.
+        """
+        if any(mends_any_course(cause) for cause in self.causes):
+            return self
         fit = self.fit.mended(lost, seed=seed, thorough=thorough)
         return self if fit is self.fit else replace(self, fit=fit)
 
     def with_other_courses(self, *, seed: int) -> "Trial":
-        """The fit with all videos searched anew; itself where that finds nothing much better."""
+        """The fit with all videos searched anew; itself where that finds nothing much better, or with kicks."""
+        if any(mends_any_course(cause) for cause in self.causes):
+            return self
         fit = self.fit.with_other_courses(seed=seed)
         return self if fit is self.fit else replace(self, fit=fit)
 
@@ -275,7 +283,7 @@ class Trial:
         kept = tuple(one for one in self.causes if one.name not in gone)
         return replace(self, causes=kept, fit=with_own_population(fit), choices=choices)
 
-    def _held_without(self, *causes: Effect) -> list[dict[Owned, float | None]]:
+    def _held_without(self, *causes: Effect) -> list[Held]:
         """Numbers of each video that are held, but those of some causes."""
         gone = {parameter.name for cause in causes for parameter in cause.parameters}
         return [{key: one.held[key] for key in one.held if key[0] not in gone} for one in self.fit.structures]

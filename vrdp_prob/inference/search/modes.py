@@ -47,7 +47,7 @@ def with_all_that_meet(
 
     None where none do.
     """
-    met = structure_at(likelihood, points, structure.moving)
+    met = structure_at(likelihood, points, structure)
     wider = replace(
         structure,
         colliding=structure.colliding | met.colliding,
@@ -68,11 +68,11 @@ def in_unknowns_of(likelihood: Likelihood, structure: Structure) -> Likelihood:
 
 
 def without_idle(
-    likelihood: Likelihood, modes: Sequence[Mode], moving: frozenset[int]
+    likelihood: Likelihood, modes: Sequence[Mode], known: Structure
 ) -> tuple[Likelihood, tuple[Mode, ...]]:
     """The same modes without the unknowns of bodies that meet nobody in any of them, or too late to tell."""
-    structure = structure_at(likelihood, [mode.point for mode in modes], moving)
-    idle = _uninformed(likelihood, modes, moving)
+    structure = structure_at(likelihood, [mode.point for mode in modes], known)
+    idle = _uninformed(likelihood, modes, known.moving)
     structure = replace(structure, colliding=structure.colliding - idle, bouncing=structure.bouncing - idle)
     coordinates = in_unknowns_of(likelihood, structure).coordinates
     if len(coordinates) == len(likelihood.coordinates):
@@ -113,9 +113,12 @@ def _uninformed(likelihood: Likelihood, modes: Sequence[Mode], moving: frozenset
 
 
 def structure_at(
-    likelihood: Likelihood, points: Sequence[Float[np.ndarray, "dimension"]], moving: frozenset[int]
+    likelihood: Likelihood, points: Sequence[Float[np.ndarray, "dimension"]], known: Structure
 ) -> Structure:
-    """Bodies that move, that meet another one or a fixed thing, and cubes that just pass one, at some of the points."""
+    """Bodies that meet another one or a fixed thing, and cubes that just pass one, at some of the points.
+
+    Which bodies move, and what is held, is `known`.
+    """
     with torch.no_grad():
         rollout = likelihood.rollout(torch.from_numpy(np.array(points)))
     colliding = frozenset(body for pairs in collision_sequences(rollout) for pair in pairs for body in pair)
@@ -124,4 +127,4 @@ def structure_at(
         body for world in range(len(points)) for body, _ in contacts_with_fixed_things(rollout, world, walls)
     )
     passing = close_passes(likelihood.tracks, rollout.trajectory.numpy())
-    return Structure(moving, colliding, bouncing, passing - colliding - bouncing)
+    return replace(known, colliding=colliding, bouncing=bouncing, passing=passing - colliding - bouncing)

@@ -33,7 +33,7 @@ from vrdp_prob.inference.several_videos.transfer import first_numbers
 from vrdp_prob.models.effects.effect import Effect
 from vrdp_prob.models.likelihood import Likelihood
 from vrdp_prob.models.physics import PhysicsModel
-from vrdp_prob.models.unknowns import Structure, structure_of, unknowns
+from vrdp_prob.models.unknowns import Held, Owned, Structure, structure_of, unknowns
 from vrdp_prob.progress import ProgressDisplay, SilentProgress
 from vrdp_prob.scene import Tracks
 
@@ -43,9 +43,6 @@ as long as it finds more."""
 
 NEWS = 5.0
 """Gain (nats) of other courses of events that is worth a change of all that follows from a fit."""
-
-Owned = tuple[str, int | None]
-"""A number of a video: its name and its owner, None for the video's."""
 
 
 @dataclass(frozen=True)
@@ -120,7 +117,7 @@ class SharedFit:
         *,
         start: Mapping[str, float] | None = None,
         own: Sequence[Mapping[Owned, float]] | None = None,
-        held: Sequence[Mapping[Owned, float | None]] | None = None,
+        held: Sequence[Held] | None = None,
         least: float | None = None,
         effort: Effort = WHOLE,
         model_error: bool = True,
@@ -137,8 +134,7 @@ class SharedFit:
         own
             Where further numbers of each video begin, by name and owner and in their units.
         held
-            Numbers of each video that are not unknown though the model has them, and the value that each keeps (None
-            for its default); those that do now where None.
+            Numbers of each video that are not unknown though the model has them; those that are none now where None.
         least
             Log posterior that must be reached at the start, where the videos' own numbers alone have followed.
         effort
@@ -173,7 +169,7 @@ class SharedFit:
     def mended(self, lost: Sequence[int], *, seed: int, thorough: bool = False) -> "SharedFit":
         """The fit with a new search for what happened in some videos, given what the others say; the better of both.
 
-        Videos in which single numbers are held keep what they have.
+        Numbers of a video that are held are held in its search, too.
 
         Parameters
         ----------
@@ -185,7 +181,6 @@ class SharedFit:
             Whether a search goes on where it explains a video as well as others are explained.
         """
         joint = self.joint
-        lost = [index for index in lost if not self.structures[index].held]
         others = [index for index in range(len(self.fits)) if index not in lost]
         if not lost or not others:
             return self
@@ -209,13 +204,16 @@ class SharedFit:
             looks=MENDING_LOOKS,
             asked=others,
             thorough=thorough,
+            held=[structure.held for structure in self.structures],
         )
         changed = [index for index in lost if fits[index] is not settled[index]]
         if not changed:
             return self
         structures = list(self.structures)
         for index in changed:
-            structures[index] = structure_of(fits[index].likelihood.coordinates)
+            structures[index] = replace(
+                structure_of(fits[index].likelihood.coordinates), held=self.structures[index].held
+            )
         numbers, videos = link_fits(fits, self.model, self.shared, structures)
         agreed, _ = first_numbers(rest, numbers, {}, {})
         locals_ = following_ones(numbers, videos, carried_starts(fits, videos), agreed)

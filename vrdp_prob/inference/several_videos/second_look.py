@@ -17,7 +17,7 @@ from vrdp_prob.inference.several_videos.agreement import consensus
 from vrdp_prob.inference.several_videos.parts import carried_starts, link_fits, plain_likelihood, stream
 from vrdp_prob.models.parameters import Prior, Scope
 from vrdp_prob.models.physics import PhysicsModel
-from vrdp_prob.models.unknowns import structure_of
+from vrdp_prob.models.unknowns import Held, Structure, structure_of
 
 WORSE = 1.08
 """Residuals that are larger than those of the video in the middle by this factor call for another look..."""
@@ -121,6 +121,7 @@ def look_again(
     asked: Collection[int] | None = None,
     thorough: bool = False,
     optimiser: Optimiser = Optimiser.GAUSS_NEWTON,
+    held: Sequence[Held] | None = None,
 ) -> list[MapFit]:
     """The fits of single videos, with some of them searched anew, and improved where that is better.
 
@@ -146,6 +147,8 @@ def look_again(
         Whether the looks go on where a fit is as good as those of other videos.
     optimiser
         What refines starts.
+    held
+        Numbers of each video that are not unknown though the model has them; none where None.
     """
     if not chosen:
         return list(fits)
@@ -155,8 +158,12 @@ def look_again(
     ways = [(look % 2 == 0, IN_DOUBT) for look in range(looks)] + ([(True, turning)] if explained(fits) else [])
     ways = [(believing, replace(plan, optimiser=optimiser)) for believing, plan in ways]
     among = range(len(fits)) if asked is None else asked
-    look = _Look(model, _told(fits, model, shared, among, islands=islands), goal, seed, tuple(ways))
-    doubted = [(fits[index], bool(excess[index] >= FAR_WORSE)) for index in chosen]
+    structures = [
+        replace(structure_of(fit.likelihood.coordinates), held=known)
+        for fit, known in zip(fits, held or [{}] * len(fits), strict=True)
+    ]
+    look = _Look(model, _told(fits, structures, model, shared, among, islands=islands), goal, seed, tuple(ways))
+    doubted = [(fits[index], bool(excess[index] >= FAR_WORSE), structures[index].held) for index in chosen]
     improved = dict(zip(chosen, in_processes(look, doubted), strict=True))
     return [improved.get(index) or fit for index, fit in enumerate(fits)]
 
@@ -185,9 +192,12 @@ class _Look:
     seed: int
     ways: tuple[tuple[bool, FitPlan], ...]
 
-    def __call__(self, doubted: tuple[MapFit, bool]) -> MapFit | None:
-        """A better fit, if there is one; with a fit comes whether it is far worse than those of other videos."""
-        (best, far_worse), better = doubted, None
+    def __call__(self, doubted: tuple[MapFit, bool, Held]) -> MapFit | None:
+        """A better fit, if there is one.
+
+        With a fit comes whether it is far worse than those of other videos, and which of its numbers are held.
+        """
+        (best, far_worse, held), better = doubted, None
         settled: set[tuple[bool, FitPlan]] = set()
         for look, way in enumerate(self.ways):
             if way in settled:
@@ -195,10 +205,11 @@ class _Look:
             believing, plan = way
             generator = stream(self.seed, f"{best.clues.tracks.video} {look}")
             model = self.told if believing else self.model
-            found = fit_map(best.clues.tracks, model, generator, plan=plan, model_error=False)
+            found = fit_map(best.clues.tracks, model, generator, plan=plan, model_error=False, held=held)
             gained = best.misfit.residual_sd / found.misfit.residual_sd - 1
             if gained > SAME and found.log_density > best.log_density - FELL:
-                likelihood = plain_likelihood(found.clues, self.model, structure_of(found.likelihood.coordinates))
+                structure = replace(structure_of(found.likelihood.coordinates), held=held)
+                likelihood = plain_likelihood(found.clues, self.model, structure)
                 best = better = replace(found, likelihood=likelihood)
             if best.misfit.residual_sd < self.goal:
                 break
@@ -215,6 +226,7 @@ def _excess(fits: Sequence[MapFit]) -> np.ndarray:
 
 def _told(
     fits: Sequence[MapFit],
+    structures: Sequence[Structure],
     model: PhysicsModel,
     shared: Sequence[str] | None,
     asked: Collection[int],
@@ -225,7 +237,7 @@ def _told(
 
     Where none of them is trusted it stays as it is.
     """
-    numbers, videos = link_fits(fits, model, shared)
+    numbers, videos = link_fits(fits, model, shared, structures)
     points = [starts[0] for starts in carried_starts(fits, videos)]
     believed = [bool(one) and index in asked for index, one in enumerate(trusted(fits))]
     if not any(believed):

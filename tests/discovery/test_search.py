@@ -548,6 +548,31 @@ def test_kicks_in_several_videos_explain_none_of_them_though_they_leave_nothing(
     assert _refits(needed=6.0).settled(nothing, [found]) is explain
 
 
+@pytest.mark.parametrize(
+    ("before", "p_value", "is_tried"),
+    [(("tilt",), 0.02, False), (("tilt",), 1e-4, True), ((), 0.02, True)],
+    ids=["chance makes as much", "chance does not", "no cause is there yet"],
+)
+def test_beside_a_cause_none_is_tried_where_no_score_stands_out_from_chance(
+    before: tuple[str, ...], p_value: float, *, is_tried: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    trial = _refit("", 0.0)
+    trial.causes, trial.fit.fits = before, _explained(3)
+    clear, beside = (Mock(spec=CauseScore, effect=Bowl(), size=30.0, p_value=one, sites=()) for one in (1e-9, p_value))
+    tried: list[list[CauseScore]] = []
+    monkeypatch.setattr(refits.Refits, "left", lambda _self, _trial: refits.Left((clear,), (beside,), np.ones(3)))
+    monkeypatch.setattr(refits, "causes_with_own_check_failing", lambda _checks: set())
+    monkeypatch.setattr(refits.Refits, "checks", lambda _self, _trial: ())
+    monkeypatch.setattr(refits.Refits, "made_of", lambda _self, _trial, asked, **_beside: tried.append(asked) or [])
+    assert _refits(needed=6.0)._new(trial) == []
+    assert ([clear] in tried) is is_tried
+
+
+def _explained(count: int) -> list[Mock]:
+    """Fits of so many videos that leave nothing but noise."""
+    return [Mock(misfit=Mock(ratio=1.0)) for _ in range(count)]
+
+
 def test_kicks_are_no_measure_of_laws(monkeypatch: pytest.MonkeyPatch) -> None:
     sizes = {"kicks": 1000.0, "patch": 150.0, "drag": 100.0, "curl": 20.0, "wind": 45.0, "a jump of the clock": 90.0}
     scores = [Mock(spec=CauseScore, effect=cause, size=size, p_value=1e-9) for cause, size in sizes.items()]

@@ -142,8 +142,11 @@ class Refits:
         """Refits in any order; hidden things are tried only where nothing explains the videos better than kicks do.
 
         Where nothing brings enough, causes are tried, too, for whose own traces a check has been made that fails: what
-        lies in numbers that bodies have of their own anyway is hardly seen in residuals.
+        lies in numbers that bodies have of their own anyway is hardly seen in residuals. Beside a cause none is tried
+        where no score stands out from what is left to chance: beside that is counted, too, what refits bring.
         """
+        if trial.causes and all(one.p_value >= SHORTLIST_LEVEL for one in self.left(trial).beside_chance):
+            return []
         found = self._asked_by_most(trial)
         if found and (self.settled(trial, found) or any(not lost_videos(one.fit.fits) for one in found)):
             return found

@@ -573,24 +573,6 @@ def _explained(count: int) -> list[Mock]:
     return [Mock(misfit=Mock(ratio=1.0)) for _ in range(count)]
 
 
-def test_kicks_are_no_measure_of_laws(monkeypatch: pytest.MonkeyPatch) -> None:
-    sizes = {"kicks": 1000.0, "patch": 150.0, "drag": 100.0, "curl": 20.0, "wind": 45.0, "a jump of the clock": 90.0}
-    scores = [Mock(spec=CauseScore, effect=cause, size=size, p_value=1e-9) for cause, size in sizes.items()]
-    monkeypatch.setattr(refits, "happens_once", lambda cause: cause in {"kicks", "a jump of the clock"})
-    assert [one.effect for one in refits._shortlist(scores)] == ["kicks", "patch", "drag"]
-    assert [one.effect for one in refits._shortlist(scores, 0.8)] == ["kicks", "patch"]
-
-
-@pytest.mark.parametrize(("sixth", "refitted"), [(96.0, 6), (94.0, 5)])
-def test_causes_that_score_as_well_as_the_last_that_is_refitted_are_refitted_too(
-    sixth: float, refitted: int, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(refits, "happens_once", lambda _cause: False)
-    sizes = [300.0, 200.0, 150.0, 110.0, 100.0, sixth, 60.0]
-    scores = [Mock(spec=refits.CauseScore, effect=f"cause {size}", size=size, p_value=0.0) for size in sizes]
-    assert len(refits._shortlist(scores)) == refitted
-
-
 @pytest.mark.parametrize(
     ("before", "brought", "is_tried"),
     [((), 1.0, True), ((), 9.0, False), (("tilt",), 1.0, False)],

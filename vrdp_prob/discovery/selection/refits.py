@@ -16,6 +16,7 @@ from vrdp_prob.discovery.finding import Check
 from vrdp_prob.discovery.residuals.overdispersion import overdispersion
 from vrdp_prob.discovery.selection.doubts import causes_with_own_check_failing
 from vrdp_prob.discovery.selection.met_surfaces import fit_with_surfaces
+from vrdp_prob.discovery.selection.shortlist import CLOSE, SHORTLIST_LEVEL, shortlist
 from vrdp_prob.discovery.selection.trials import Trial, gain, weights
 from vrdp_prob.inference.runs.parallel import in_processes
 from vrdp_prob.inference.several_videos.ascent import ImpossibleStartError
@@ -32,17 +33,6 @@ from vrdp_prob.models.effects.effect import Effect
 from vrdp_prob.models.effects.external_impulse import ExternalImpulse
 from vrdp_prob.progress import Advance
 
-SHORTLIST_LEVEL = 0.01
-"""Causes whose score chance makes as large more often are not refitted."""
-CLOSE = 0.5
-"""Share of the largest statistic (see `_shortlist`) below which a cause is refitted only if those above it leave
-something."""
-HOPEFUL = 0.2
-"""Share of the largest statistic (see `_shortlist`) below which a cause cannot be the best one, nor a rival of it."""
-TRIFLE = 0.05
-"""Share of any statistic, also of what happens once in a video, below which nothing is refitted."""
-MOST_REFITTED, ALIKE = 5, 0.95
-"""Causes that are refitted at most, but for those whose statistic is this share of that of the last one at least."""
 ESTABLISHED = 0.8
 """Probability that a cause must have beside the model without it."""
 PLAIN_TURNS = 4
@@ -152,8 +142,8 @@ class Refits:
             return found
         known = {one.causes[-1].name for one in found}
         scores = [one for one in self.left(trial).scores if one.effect.name not in known]
-        likely = _shortlist(scores)
-        close = _shortlist(scores, CLOSE)
+        likely = shortlist(scores)
+        close = shortlist(scores, CLOSE)
         found += self.made_of(trial, close, beside=found)
         found.sort(key=merit, reverse=True)
         if not self.settled(trial, found):
@@ -179,7 +169,7 @@ class Refits:
         astray = np.flatnonzero(~trusted(fits)).tolist()
         if not 0 < len(astray) <= len(fits) // MOST or not outweigh(fits, astray):
             return []
-        asked = [one for one in _shortlist(self.left(trial).beside_chance, CLOSE) if not happens_once(one.effect)]
+        asked = [one for one in shortlist(self.left(trial).beside_chance, CLOSE) if not happens_once(one.effect)]
         found = self.made_of(trial, asked)
         searched = [self.searched_anew(one, astray) for one in found[:1]]
         return sorted([*searched, *found[1:]], key=merit, reverse=True)
@@ -255,7 +245,7 @@ class Refits:
         if trial.choices:
             return []
         left = self.further(trial)
-        likely = {one.effect.name for one in _shortlist(self.left(trial).scores)}
+        likely = {one.effect.name for one in shortlist(self.left(trial).scores)}
         reached = {one.causes[-1].name: one.brought(trial) for one in reversed(found)}
         best = next((one.fit.fits for one in found if not _mends_several(one)), trial.fit.fits)
         still_lost = lost_videos(best)
@@ -410,19 +400,3 @@ def _mends_several(trial: Trial) -> bool:
 
 def _kicks(score: CauseScore) -> bool:
     return isinstance(score.effect, ExternalImpulse)
-
-
-def _shortlist(scores: Sequence[CauseScore], share: float = HOPEFUL) -> list[CauseScore]:
-    """Causes whose statistic is more than a share of the largest one, that of lasting causes for those that last.
-
-    What happens once mends the course of a lost video better than any law does from where the fit is; so it is no good
-    measure of laws, as long as these are no mere trifle beside it.
-    """
-    largest = max((one.size for one in scores), default=0.0)
-    likely = [one for one in scores if one.p_value < SHORTLIST_LEVEL and one.size > TRIFLE * largest]
-    likely.sort(key=lambda one: -one.size)
-    lasting = [one for one in likely if not happens_once(one.effect)]
-    compared = [(one, lasting if one in lasting else likely) for one in likely]
-    chosen = [one for one, others in compared if one.size > share * others[0].size]
-    least = ALIKE * chosen[MOST_REFITTED - 1].size if len(chosen) > MOST_REFITTED else 0.0
-    return [one for one in chosen if one.size >= least]

@@ -8,7 +8,8 @@ import numpy as np
 from jaxtyping import Float
 
 from vrdp_prob.discovery.candidates.scores import mends_any_course
-from vrdp_prob.discovery.selection.refits import HOPEFUL, Left, Refits, explaining, merit
+from vrdp_prob.discovery.selection.refits import Left, Refits, explaining, merit
+from vrdp_prob.discovery.selection.shortlist import HOPEFUL
 from vrdp_prob.discovery.selection.trials import Trial, gain, with_own_population
 from vrdp_prob.inference.runs.parallel import in_processes
 from vrdp_prob.inference.several_videos.fitting import SharedFit

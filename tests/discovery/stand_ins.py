@@ -1,0 +1,30 @@
+"""Stand-ins for refits, and for what makes them."""
+
+from unittest.mock import Mock, create_autospec
+
+import numpy as np
+import pytest
+
+from vrdp_prob.discovery.selection import refits
+from vrdp_prob.discovery.selection.trials import Trial
+
+
+def refit_with(cause: str, gained: float, *, patches: bool = False) -> Mock:
+    """A refit, with what it gains in each of three videos, and whether its cause patches several of them."""
+    refit = create_autospec(Trial, instance=True)
+    refit.causes, refit.log_density, refit.log_prior = tuple(cause.split("+")), np.full(3, gained), 0.0
+    refit.fit = Mock(videos=(0, 1, 2))
+    refit.beyond = lambda base: tuple(one for one in refit.causes if one not in base.causes)
+    refit.patches.return_value, refit.may_vanish.return_value = patches, False
+    refit.loses_videos_of.return_value, refit.fallen_from.return_value = False, []
+    return refit
+
+
+def refits_with(needed: float = 0.0) -> refits.Refits:
+    return refits.Refits((), seed=0, needed=needed, advance=lambda _count: None)
+
+
+def without_tracks(monkeypatch: pytest.MonkeyPatch) -> None:
+    """No refit has tracks to look at, nor fits of videos that could be explained or not."""
+    monkeypatch.setattr(refits.Refits, "_placed", lambda _self, _trial: [])
+    monkeypatch.setattr(refits, "trusted", lambda _fits: np.ones(4, dtype=bool))

@@ -1,0 +1,413 @@
+"""Which causes are tried on a model, and which videos are searched anew for it."""
+
+from unittest.mock import Mock, create_autospec
+
+import numpy as np
+import pytest
+
+from tests.discovery.stand_ins import refit_with, refits_with, without_tracks
+from vrdp_prob.discovery.candidates.scores import CauseScore
+from vrdp_prob.discovery.candidates.surfaces import Placed
+from vrdp_prob.discovery.finding import Check
+from vrdp_prob.discovery.selection import refits
+from vrdp_prob.discovery.selection.trials import Trial
+from vrdp_prob.inference.several_videos.ascent import ImpossibleStartError
+from vrdp_prob.models.effects.bowl import Bowl
+from vrdp_prob.models.effects.clock_error import ClockError
+from vrdp_prob.models.effects.effect import Effect
+from vrdp_prob.models.effects.external_impulse import ExternalImpulse
+from vrdp_prob.models.effects.lens_distortion import LensDistortion
+from vrdp_prob.models.effects.mass_dependent_friction import MassDependentFriction
+from vrdp_prob.models.effects.surface_tilt import SurfaceTilt
+
+
+@pytest.fixture(autouse=True)
+def tracks_show_no_walls(monkeypatch: pytest.MonkeyPatch) -> None:
+    without_tracks(monkeypatch)
+
+
+@pytest.mark.parametrize(
+    ("turns", "doubted", "alone"),
+    [(6, False, True), (2, False, False), (6, True, False)],
+    ids=["plain", "of few turns", "doubted"],
+)
+def test_where_walls_that_tracks_show_are_plain_nothing_else_is_tried(
+    turns: int, *, doubted: bool, alone: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    plain, walls, drag = refit_with("", 0.0), refit_with("wall+second_wall", 20.0), refit_with("drag", 5.0)
+    monkeypatch.setattr(refits.Refits, "_placed", lambda _self, _trial: [Mock(seen=Mock(turns=turns))])
+    monkeypatch.setattr(refits.Refits, "_met", lambda _self, _trial, _placed: walls)
+    monkeypatch.setattr(refits.Refits, "_new", lambda _self, _trial: [drag])
+    monkeypatch.setattr(refits.Refits, "left", Mock())
+    monkeypatch.setattr(refits.Refits, "doubted", lambda *_given: doubted)
+    assert refits_with(needed=6.0).of(plain) == ([walls] if alone else [walls, drag])
+
+
+@pytest.mark.parametrize(
+    ("stated", "explains", "leaves", "near", "taken"),
+    [
+        (20.0, True, False, 30.0, "stated"),
+        (20.0, True, True, 30.0, "near"),
+        (20.0, True, True, 10.0, "stated"),
+        (20.0, False, True, 30.0, "stated"),
+        (None, True, True, 30.0, "near"),
+        (None, True, True, None, None),
+    ],
+    ids=["nothing left", "a little off", "not off", "lost anyway", "overlaps what is seen", "no world"],
+)
+def test_walls_that_may_be_a_little_off_are_unknown_from_the_beginning(
+    stated: float | None,
+    near: float | None,
+    taken: str | None,
+    *,
+    explains: bool,
+    leaves: bool,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Where those that count as stated explain the videos and leave something, or have no world."""
+
+    def fitted(_trial: Trial, _placed: object, walls: list[object], *, seed: int) -> tuple[str, float]:
+        gained = stated if walls else near
+        if gained is None:
+            raise ImpossibleStartError
+        return ("stated" if walls else "near"), gained
+
+    monkeypatch.setattr(refits, "fit_with_surfaces", fitted)
+    monkeypatch.setattr(refits, "explained", lambda _fits: explains)
+    monkeypatch.setattr(refits.Refits, "_leaves_something", lambda _self, _trial: leaves)
+    trial = refit_with("", 0.0)
+    trial.and_causes.side_effect = lambda _causes, fit: refit_with(*fit)
+    found = refits_with()._met(trial, [create_autospec(Placed, instance=True, effect=SurfaceTilt(), wall=Mock())])
+    assert (None if found is None else found.causes[0]) == taken
+
+
+@pytest.mark.parametrize("enough", [True, False], ids=["enough", "too little"])
+@pytest.mark.parametrize("refitted", [True, False], ids=["refitted before", "not refitted"])
+def test_lost_videos_are_searched_once_and_refits_made_only_where_that_leaves_something(
+    *, refitted: bool, enough: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    tilt, drag, lost = refit_with("tilt", 1.0), refit_with("drag", 5.0), refit_with("tilt+friction", 50.0)
+    asked: list[Trial] = []
+
+    def searched(_self: object, trial: Trial, _found: object) -> list[Trial]:
+        asked.append(trial)
+        return [lost]
+
+    monkeypatch.setattr(refits.Refits, "_new", lambda _self, _trial: [drag])
+    monkeypatch.setattr(refits.Refits, "settled", lambda _self, _trial, found: enough and found[:1] == [lost])
+    monkeypatch.setattr(refits.Refits, "_lost", searched)
+    found = refits_with()
+    if refitted:
+        found.of(tilt)
+    for _ in range(2):
+        assert found.with_lost(tilt) == ([lost] if enough and not refitted else [lost, drag])
+    assert found.of(tilt) == found.with_lost(tilt)
+    assert asked == [tilt]
+
+
+def test_lost_videos_are_not_searched_where_refits_leave_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    plain, drag = refit_with("", 0.0), refit_with("drag", 5.0)
+    monkeypatch.setattr(refits.Refits, "_new", lambda _self, _trial: [drag])
+    monkeypatch.setattr(refits.Refits, "settled", lambda _self, _trial, found: found == [drag])
+    monkeypatch.setattr(refits.Refits, "_lost", Mock(side_effect=AssertionError))
+    found = refits_with()
+    assert found.of(plain) == found.with_lost(plain) == [drag]
+
+
+@pytest.mark.parametrize(
+    ("lost", "kicked", "asked", "taken"),
+    [
+        ([2], [], [2], "tilt searched anew"),
+        ([2], [], [2], "tilt"),
+        ([2], [2, 2], [2], "tilt searched anew"),
+        ([], [1], [1], "tilt searched anew"),
+        ([0, 1], [3], None, "tilt"),
+        ([], [], None, "tilt"),
+    ],
+    ids=["a better course", "no better one", "a lost one is kicked", "a kicked one", "more than half", "none"],
+)
+def test_a_cause_has_its_few_lost_videos_searched_anew(
+    lost: list[int],
+    kicked: list[int],
+    asked: list[int] | None,
+    taken: str,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    nothing, tilt, drag = refit_with("", 0.0), refit_with("tilt", 5.0), refit_with("drag", 7.0)
+    tilt.fit = Mock(fits=[""] * 4)
+    anew = refit_with("tilt searched anew", 9.0)
+    tilt.mended.return_value, anew.mended.return_value = anew if taken != "tilt" else tilt, anew
+    tilt.fallen_from.return_value = anew.fallen_from.return_value = []
+    kicks = Mock(spec=CauseScore, effect=ExternalImpulse(), sites=[Mock(video=video) for video in kicked])
+    monkeypatch.setattr(refits, "lost_videos", lambda _fit: lost)
+    monkeypatch.setattr(refits, "may_take_another_course", lambda _fit: True)
+    monkeypatch.setattr(refits.Refits, "left", lambda _self, _trial: Mock(scores=[kicks], beside_chance=[]))
+    monkeypatch.setattr(refits.Refits, "_new", lambda _self, _trial: [drag, tilt])
+    found = refits_with()
+    first = found.with_lost_found(nothing, tilt)
+    assert first.causes == (taken,)
+    assert [call.args for call in tilt.mended.call_args_list] == ([] if asked is None else [(asked,)])
+    assert [one.causes[0] for one in found.of(nothing)] == (
+        ["drag", "tilt"] if taken == "tilt" else ["tilt searched anew", "drag"]
+    )
+
+
+@pytest.mark.parametrize(
+    ("p_value", "explains", "loses", "taken"),
+    [
+        (1e-5, True, False, "all searched anew"),
+        (1e-5, True, True, "tilt"),
+        (1e-5, False, False, "tilt"),
+        (0.2, True, False, "tilt"),
+    ],
+    ids=["something is left", "a video is lost with it", "most videos are not explained", "nothing is left"],
+)
+def test_where_a_cause_leaves_something_all_videos_are_searched_anew(
+    p_value: float, taken: str, *, explains: bool, loses: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    nothing, tilt, anew = refit_with("", 0.0), refit_with("tilt", 5.0), refit_with("all searched anew", 9.0)
+    anew.loses_videos_of.return_value = loses
+    tilt.fit = Mock(fits=[""] * 4)
+    tilt.with_other_courses.return_value = anew
+    left = Mock(scores=[], beside_chance=[Mock(p_value=p_value)])
+    monkeypatch.setattr(refits, "lost_videos", lambda _fit: [])
+    monkeypatch.setattr(refits, "explained", lambda _fits: explains)
+    monkeypatch.setattr(refits.Refits, "left", lambda _self, _trial: left)
+    monkeypatch.setattr(refits.Refits, "_new", lambda _self, _trial: [tilt])
+    found = refits_with()
+    assert found.with_lost_found(nothing, tilt).causes == (taken,)
+    assert [one.causes[0] for one in found.of(nothing)] == [taken]
+
+
+def test_a_video_is_searched_again_only_where_the_last_search_has_found_something_or_it_has_fallen_since(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    tilt, followed, better = refit_with("tilt", 5.0), refit_with("two videos followed", 7.0), refit_with("all did", 9.0)
+    tilt.fit = better.fit = Mock(fits=[""] * 4)
+    tilt.mended.return_value, followed.mended.return_value, better.mended.return_value = followed, better, better
+    tilt.fallen_from.return_value = [2]
+    followed.fallen_from.side_effect = lambda other: [3] if other is tilt else []
+    better.fallen_from.return_value = []
+    monkeypatch.setattr(refits, "may_take_another_course", lambda _fit: True)
+    found = refits_with()
+    assert found.searched_anew(tilt, [1, 2]) is better
+    for _ in range(2):
+        assert found.searched_anew(better, [1, 2]) is better
+    tilt.mended.assert_called_once_with([1, 2], seed=0, thorough=True)
+    followed.mended.assert_called_once_with([3], seed=0)
+    better.mended.assert_called_once_with([2], seed=1, thorough=True)
+
+
+@pytest.mark.parametrize("is_wrong", [True, False], ids=["lost", "explained still"])
+def test_a_course_for_which_another_video_loses_its_own_is_a_wrong_one(
+    *, is_wrong: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    tilt, other = refit_with("tilt", 5.0), refit_with("another course", 9.0)
+    tilt.fit = other.fit = Mock(fits=[""] * 4)
+    tilt.mended.return_value = other.mended.return_value = other
+    tilt.fallen_from.return_value, other.fallen_from.return_value = [], [3]
+    other.loses_videos_of.return_value = is_wrong
+    monkeypatch.setattr(refits, "may_take_another_course", lambda _fit: True)
+    found = refits_with()
+    for _ in range(2 if is_wrong else 1):
+        assert found.searched_anew(tilt, [2]) is (tilt if is_wrong else other)
+    tilt.mended.assert_called_once_with([2], seed=0, thorough=True)
+
+
+@pytest.mark.parametrize(("brought", "followed"), [(200.0, True), (500.0, False)], ids=["less", "as promised"])
+def test_the_most_promising_cause_is_followed_whatever_others_have_brought(
+    brought: float, *, followed: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(refits, "mends_any_course", lambda _cause: False)
+    effects = {name: Mock() for name in ("wind", "patch")}
+    names = ("wind", "wind", "wind", "patch")
+    wind, further, found, patch = all_ = [
+        refit_with(name, gained) for name, gained in zip(names, (1, 2, 9, 3), strict=True)
+    ]
+    for one, name, gained in zip(all_, names, (brought, 400.0, 2000.0, 1000.0), strict=True):
+        effects[name].name = name
+        one.causes, one.brought.return_value = (effects[name],), gained
+        one.fallen_from.return_value = [1] if one is further else []
+        one.fit.joint.converged = one is not wind
+    wind.continued.return_value, further.mended.return_value = further, found
+    nothing = refit_with("", 0.0)
+    nothing.with_cause = lambda score: wind if score.effect is effects["wind"] else patch
+    sizes = {"wind": 900.0, "patch": 600.0}
+    scores = [Mock(spec=CauseScore, effect=effects[name], size=size) for name, size in sizes.items()]
+    assert refits_with().made_of(nothing, scores)[0] is (found if followed else patch)
+
+
+def _broken_off(promised: float) -> tuple[Mock, Mock, Mock]:
+    """A model, its refit with a cause, which has lost a video and brings nothing, and what the score had promised."""
+    refit, effect = refit_with("cause", -1.0), Mock()
+    effect.name, refit.causes, refit.fit.joint.converged = "cause", (effect,), False
+    refit.brought.return_value, refit.fallen_from.return_value = -3.0, [1]
+    refit.continued.return_value = refit.mended.return_value = refit
+    nothing = refit_with("", 0.0)
+    nothing.with_cause = lambda _score: refit
+    return nothing, refit, Mock(spec=CauseScore, effect=effect, size=promised)
+
+
+@pytest.mark.parametrize(("promised", "followed"), [(20.0, True), (10.0, False)], ids=["enough", "too little"])
+def test_a_cause_is_not_followed_that_promises_less_than_it_needs(
+    promised: float, *, followed: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(refits, "mends_any_course", lambda _cause: False)
+    nothing, refit, score = _broken_off(promised)
+    assert refits_with(needed=6.0).made_of(nothing, [score]) == [refit]
+    assert refit.continued.called is followed
+
+
+@pytest.mark.parametrize(
+    ("astray", "outweighing", "is_asked"),
+    [([2], True, True), ([0, 3], True, True), ([2], False, False), ([], True, False), ([0, 1, 2], True, False)],
+    ids=["one video", "half of them", "one that leaves less than all others", "none", "most"],
+)
+def test_what_most_videos_ask_for_comes_first_where_few_have_gone_astray(
+    astray: list[int], *, outweighing: bool, is_asked: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    trial, lens, anew, bowl = (
+        refit_with("", 0.0),
+        refit_with("lens", 1.0),
+        refit_with("lens", 500.0),
+        refit_with("bowl", 0.5),
+    )
+    trial.fit.fits, anew.fit.fits = ["a", "b", "c", "d"], ["explained"]
+    usual = np.ones(4, dtype=bool)
+    usual[astray] = False
+    kicks, wide, clear, faint = (
+        Mock(spec=CauseScore, effect=effect, size=size, p_value=1e-9, sites=())
+        for effect, size in (
+            (ExternalImpulse(), 300.0),
+            (LensDistortion(), 200.0),
+            (Bowl(), 150.0),
+            (SurfaceTilt(), 50.0),
+        )
+    )
+    left = refits.Left((kicks,), (kicks, wide, clear, faint), np.ones(4))
+    made: list[list[CauseScore]] = []
+
+    def made_of(_self: object, _trial: Trial, asked: list[CauseScore], **_beside: object) -> list[Trial]:
+        made.append(list(asked))
+        return [lens, bowl] if wide in asked else []
+
+    def searched_anew(_self: object, one: Trial, videos: list[int]) -> Trial:
+        assert (one, list(videos)) == (lens, astray)
+        return anew
+
+    monkeypatch.setattr(refits, "trusted", lambda _fits: usual)
+    monkeypatch.setattr(refits, "outweigh", lambda fits, some: outweighing and (fits, some) == (trial.fit.fits, astray))
+    monkeypatch.setattr(refits, "lost_videos", lambda fits: [] if fits == ["explained"] else [2])
+    monkeypatch.setattr(refits.Refits, "left", lambda _self, _trial: left)
+    monkeypatch.setattr(refits.Refits, "made_of", made_of)
+    monkeypatch.setattr(refits.Refits, "searched_anew", searched_anew)
+    monkeypatch.setattr(refits.Refits, "settled", lambda _self, _trial, _found: False)
+    found = refits_with()
+    if is_asked:
+        assert found._new(trial) == [anew, bowl]
+        assert made == [[wide, clear]]
+    else:
+        assert found._asked_by_most(trial) == made == []
+
+
+@pytest.mark.parametrize("once", [True, False], ids=["kicks", "a law"])
+def test_a_refit_that_brings_nothing_is_followed_once_at_most(*, once: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(refits, "mends_any_course", lambda _cause: once)
+    nothing, refit, score = _broken_off(20.0)
+    assert refits_with(needed=6.0).made_of(nothing, [score]) == [refit]
+    assert refit.mended.call_count == (0 if once else 1)
+
+
+@pytest.mark.parametrize(
+    ("cause", "explain"), [(ExternalImpulse(), False), (ClockError(), True)], ids=["kicks", "jumps of the clock"]
+)
+def test_kicks_in_several_videos_explain_none_of_them_though_they_leave_nothing(
+    cause: Effect, *, explain: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    nothing, found = refit_with("", 0.0), refit_with("", 90.0)
+    found.causes, found.acting.return_value = (cause,), [0, 2]
+    monkeypatch.setattr(refits, "gain", lambda trial, _base: (90.0 if trial is found else 0.0, 1.0))
+    monkeypatch.setattr(refits.Refits, "left", lambda _self, _trial: refits.Left((), (), np.ones(3)))
+    assert refits_with(needed=6.0).settled(nothing, [found]) is explain
+
+
+@pytest.mark.parametrize(
+    ("before", "p_value", "is_tried"),
+    [(("tilt",), 0.02, False), (("tilt",), 1e-4, True), ((), 0.02, True)],
+    ids=["chance makes as much", "chance does not", "no cause is there yet"],
+)
+def test_beside_a_cause_none_is_tried_where_no_score_stands_out_from_chance(
+    before: tuple[str, ...], p_value: float, *, is_tried: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    trial = refit_with("", 0.0)
+    trial.causes, trial.fit.fits = before, _explained(3)
+    clear, beside = (Mock(spec=CauseScore, effect=Bowl(), size=30.0, p_value=one, sites=()) for one in (1e-9, p_value))
+    tried: list[list[CauseScore]] = []
+    monkeypatch.setattr(refits.Refits, "left", lambda _self, _trial: refits.Left((clear,), (beside,), np.ones(3)))
+    monkeypatch.setattr(refits, "causes_with_own_check_failing", lambda _checks: set())
+    monkeypatch.setattr(refits.Refits, "checks", lambda _self, _trial: ())
+    monkeypatch.setattr(refits.Refits, "made_of", lambda _self, _trial, asked, **_beside: tried.append(asked) or [])
+    assert refits_with(needed=6.0)._new(trial) == []
+    assert ([clear] in tried) is is_tried
+
+
+def _explained(count: int) -> list[Mock]:
+    """Fits of so many videos that leave nothing but noise."""
+    return [Mock(misfit=Mock(ratio=1.0)) for _ in range(count)]
+
+
+@pytest.mark.parametrize(
+    ("before", "brought", "is_tried"),
+    [((), 1.0, True), ((), 9.0, False), (("tilt",), 1.0, False)],
+    ids=["nothing brings enough", "something does", "there is a cause already"],
+)
+def test_a_cause_whose_own_check_fails_is_tried_where_nothing_brings_enough(
+    before: tuple[str, ...], brought: float, *, is_tried: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    trial, other = refit_with("nothing", 0.0), refit_with("bowl", 1.0)
+    trial.causes, other.causes = before, (Bowl(),)
+    other.brought.return_value = brought
+    clear, faint = (
+        Mock(spec=CauseScore, effect=effect, size=size, p_value=p_value, sites=())
+        for effect, size, p_value in ((Bowl(), 50.0, 1e-9), (MassDependentFriction(), 4.0, 0.04))
+    )
+    scores = (clear, faint)
+    made: list[list[str]] = []
+
+    def made_of(_self: object, _trial: Trial, asked: list[CauseScore], **_beside: object) -> list[Trial]:
+        made.append([one.effect.name for one in asked])
+        return [other] if made[-1] == ["bowl"] else []
+
+    failing = Check("friction of the bodies against mass", 0.07, 1e-9, True, "")
+    monkeypatch.setattr(refits, "run_checks", lambda _fit, *, seed: (failing,))
+    monkeypatch.setattr(refits.Refits, "made_of", made_of)
+    monkeypatch.setattr(refits.Refits, "settled", lambda _self, _trial, _found: True)
+    monkeypatch.setattr(refits.Refits, "left", lambda _self, _trial: refits.Left(scores, scores, np.ones(3)))
+    assert refits_with(needed=6.0).of(trial) == [other]
+    assert (["mass_dependent_friction"] in made) is is_tried
+
+
+def test_a_cause_with_which_no_joint_world_can_begin_is_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
+    def impossible(*_given: object, **_named: object) -> None:
+        raise ImpossibleStartError
+
+    monkeypatch.setattr(refits, "fit_together", impossible)
+    monkeypatch.setattr(refits, "lost_videos", lambda _fit: [0])
+    monkeypatch.setattr(refits, "causes_of_lost_videos", lambda *_given, **_named: [((SurfaceTilt(),), 50.0)])
+    monkeypatch.setattr(refits.Refits, "left", lambda _self, _trial: Mock(scores=()))
+    trial = refit_with("", 0.0)
+    trial.choices, trial.names, trial.fit = {}, (), Mock(fits=[], model=Mock(effects=()))
+    assert refits_with()._lost(trial, []) == []
+
+
+@pytest.mark.parametrize(
+    ("may_vanish", "is_doubted"),
+    [((False,), False), ((True,), True), ((True, False), False), ((True, True), True)],
+    ids=["there", "perhaps nothing", "one of two perhaps nothing", "both perhaps nothing"],
+)
+def test_what_may_as_well_be_nothing_is_not_established(may_vanish: tuple[bool, ...], is_doubted: bool) -> None:
+    names = ["tilt", "drag"][: len(may_vanish)]
+    nothing, found = refit_with("", 0.0), refit_with("+".join(names), 10.0)
+    nothing.causes = ()
+    found.may_vanish.side_effect = lambda cause, _divisor: may_vanish[names.index(cause)]
+    assert refits_with(needed=2.0).doubted(found, nothing, np.ones(3)) is is_doubted

@@ -16,7 +16,8 @@ def refit_with(cause: str, gained: float, *, patches: bool = False) -> Mock:
     refit.fit = Mock(videos=(0, 1, 2))
     refit.beyond = lambda base: tuple(one for one in refit.causes if one not in base.causes)
     refit.patches.return_value, refit.may_vanish.return_value = patches, False
-    refit.loses_videos_of.return_value, refit.fallen_from.return_value = False, []
+    refit.loses_videos_of.return_value = refit.loses_most_of.return_value = False
+    refit.fallen_from.return_value = []
     return refit
 
 

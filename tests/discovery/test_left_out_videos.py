@@ -193,6 +193,17 @@ def test_a_new_search_of_a_video_never_makes_a_fit_worse() -> None:
     assert trial.mended([1], seed=0).fit.joint.log_density >= fit.joint.log_density
 
 
+@pytest.mark.parametrize(("before", "after", "loses"), [(1.0, 1.5, True), (1.5, 1.5, False), (1.0, 1.1, False)])
+def test_a_law_loses_most_videos_that_explains_them_no_more(before: float, after: float, *, loses: bool) -> None:
+    _, fit = fitted("surface_tilt", 3.0, seed=2)
+
+    def trial(ratio: float) -> Trial:
+        worse = [replace(one.misfit, residual_sd=ratio * one.misfit.noise_sd) for one in fit.fits]
+        return Trial((), replace(fit, fits=tuple(replace(a, misfit=b) for a, b in zip(fit.fits, worse, strict=True))))
+
+    assert trial(after).loses_most_of(trial(before)) is loses
+
+
 @pytest.mark.parametrize(("cause", "keeps"), [(ExternalImpulse(), True), (ClockError(), False)], ids=["kicks", "clock"])
 def test_videos_with_kicks_keep_the_course_on_which_these_were_found(
     cause: Effect, *, keeps: bool, monkeypatch: pytest.MonkeyPatch

@@ -14,16 +14,95 @@ from vrdp_prob.discovery.selection.trials import Trial
 from vrdp_prob.inference.several_videos.ascent import ImpossibleStartError
 from vrdp_prob.models.effects.bowl import Bowl
 from vrdp_prob.models.effects.clock_error import ClockError
+from vrdp_prob.models.effects.contact_radius_error import ContactRadiusError
 from vrdp_prob.models.effects.effect import Effect
 from vrdp_prob.models.effects.external_impulse import ExternalImpulse
 from vrdp_prob.models.effects.lens_distortion import LensDistortion
 from vrdp_prob.models.effects.mass_dependent_friction import MassDependentFriction
 from vrdp_prob.models.effects.surface_tilt import SurfaceTilt
 
+RADIUS, LENS = ContactRadiusError.name, LensDistortion.name
+
 
 @pytest.fixture(autouse=True)
 def tracks_show_no_walls(monkeypatch: pytest.MonkeyPatch) -> None:
     without_tracks(monkeypatch)
+
+
+@pytest.mark.parametrize(
+    ("least", "lacking", "name"),
+    [(2.0, 200.0, "tilt"), (70.0, 200.0, None), (2.0, 400.0, None)],
+    ids=["enough", "too little", "a trifle of what lacks"],
+)
+def test_the_first_of_two_is_what_brings_most_but_for_kicks_where_all_else_is_noise(
+    least: float, lacking: float, name: str | None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    nothing, tilt, drag, kicks = (
+        refit_with(*one) for one in (("", 0.0), ("tilt", -1.0), ("drag", 0.5), ("kicks", 0.2))
+    )
+    for one, brought in ((nothing, 0.0), (tilt, 60.0), (drag, 20.0), (kicks, 90.0)):
+        one.brought.return_value = brought
+    nothing.lacking = lacking
+    monkeypatch.setattr(refits, "mends_any_course", lambda cause: cause == "kicks")
+    found = refits_with(needed=least).provisional(nothing, [drag, kicks, tilt])
+    assert found is (tilt if name else None)
+
+
+@pytest.mark.parametrize(("loses_most", "taken"), [(True, "drag"), (False, "tilt")])
+def test_a_law_is_none_to_go_on_from_that_loses_most_videos_which_were_explained(
+    loses_most: bool, taken: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    nothing, tilt, drag = (refit_with(*one) for one in (("", 0.0), ("tilt", 1.0), ("drag", 0.5)))
+    for one, brought in ((nothing, 0.0), (tilt, 60.0), (drag, 20.0)):
+        one.brought.return_value, one.lacking = brought, 50.0
+    tilt.loses_most_of.return_value = loses_most
+    monkeypatch.setattr(refits, "mends_any_course", lambda _cause: False)
+    found = refits_with(needed=2.0).provisional(nothing, [drag, tilt])
+    assert found is not None
+    assert found.causes == (taken,)
+
+
+@pytest.mark.parametrize(
+    ("lost", "explains", "mends", "tried"),
+    [
+        ([2], True, True, [[RADIUS]]),
+        ([2], True, False, [[RADIUS], [LENS]]),
+        ([0, 1, 2], True, True, [[RADIUS], [LENS]]),
+        ([2], False, True, [[RADIUS], [LENS]]),
+        ([], True, True, [[RADIUS], [LENS]]),
+    ],
+    ids=["a lost video", "one that is not found", "most", "no video is explained", "none"],
+)
+def test_lost_videos_of_the_best_cause_are_searched_before_lesser_causes_are_tried(
+    lost: list[int], explains: bool, mends: bool, tried: list[list[str]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    nothing, radius, found, lens = (
+        refit_with(*one) for one in (("", 0.0), ("radius", 20.0), ("radius", 90.0), ("lens", 5.0))
+    )
+    nothing.causes, nothing.lacking, radius.brought.return_value = (), 100.0, 60.0
+    radius.fit.fits = [""] * 4
+    clear, faint = (
+        Mock(spec=CauseScore, effect=effect, size=size, p_value=1e-9, sites=())
+        for effect, size in ((ContactRadiusError(), 300.0), (LensDistortion(), 100.0))
+    )
+    asked: list[list[str]] = []
+
+    def made_of(_self: object, _trial: Trial, scores: list[CauseScore], **_beside: object) -> list[Trial]:
+        if scores:
+            asked.append([one.effect.name for one in scores])
+        return [radius if one is clear else lens for one in scores]
+
+    monkeypatch.setattr(refits, "mends_any_course", lambda _cause: False)
+    monkeypatch.setattr(refits, "lost_videos", lambda _fits: lost)
+    monkeypatch.setattr(refits, "explained", lambda _fits: explains)
+    monkeypatch.setattr(refits.Refits, "_asked_by_most", lambda _self, _trial: [])
+    monkeypatch.setattr(refits.Refits, "left", lambda _self, _trial: refits.Left((clear, faint), (), np.ones(3)))
+    monkeypatch.setattr(refits.Refits, "settled", lambda _self, _trial, made: found in made)
+    monkeypatch.setattr(refits.Refits, "made_of", made_of)
+    monkeypatch.setattr(refits.Refits, "searched_anew", lambda _self, one, videos: found if mends else one)
+    made = refits_with(needed=2.0)._new(nothing)
+    assert asked == tried
+    assert made[0] is (found if tried == [[RADIUS]] else radius)
 
 
 @pytest.mark.parametrize(

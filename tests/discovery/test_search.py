@@ -16,7 +16,6 @@ from vrdp_prob.models.effects.surface_tilt import SurfaceTilt
 @pytest.fixture(autouse=True)
 def tracks_show_no_walls(monkeypatch: pytest.MonkeyPatch) -> None:
     without_tracks(monkeypatch)
-    monkeypatch.setattr(search, "explained", lambda _fits: True)
 
 
 def _searcher(needed: float = 0.0) -> search._Searcher:
@@ -59,39 +58,6 @@ def test_two_causes_are_found_of_which_neither_stands_out_beside_chance(
     monkeypatch.setattr(refits.Refits, "left", Mock())
     monkeypatch.setattr(search._Searcher, "doubted", lambda *_given: in_doubt)
     assert _searcher(needed=2.0)._pair(nothing, tilt) == ((tilt, second) if is_found else None)
-
-
-@pytest.mark.parametrize(
-    ("least", "lacking", "name"),
-    [(2.0, 200.0, "tilt"), (70.0, 200.0, None), (2.0, 400.0, None)],
-    ids=["enough", "too little", "a trifle of what lacks"],
-)
-def test_the_first_of_two_is_what_brings_most_but_for_kicks_where_all_else_is_noise(
-    least: float, lacking: float, name: str | None, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    nothing, tilt, drag, kicks = (
-        refit_with(*one) for one in (("", 0.0), ("tilt", -1.0), ("drag", 0.5), ("kicks", 0.2))
-    )
-    for one, brought in ((nothing, 0.0), (tilt, 60.0), (drag, 20.0), (kicks, 90.0)):
-        one.brought.return_value = brought
-    nothing.lacking = lacking
-    monkeypatch.setattr(refits, "mends_any_course", lambda cause: cause == "kicks")
-    found = _searcher(needed=least)._provisional(nothing, [drag, kicks, tilt])
-    assert found is (tilt if name else None)
-
-
-@pytest.mark.parametrize(("before", "taken"), [(True, "drag"), (False, "tilt")], ids=["most", "few"])
-def test_a_law_is_none_to_go_on_from_that_loses_most_videos_which_were_explained(
-    before: bool, taken: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    nothing, tilt, drag = (refit_with(*one) for one in (("", 0.0), ("tilt", 1.0), ("drag", 0.5)))
-    for one, brought, explains in ((nothing, 0.0, before), (tilt, 60.0, False), (drag, 20.0, True)):
-        one.brought.return_value, one.fit.fits, one.lacking = brought, explains, 50.0
-    monkeypatch.setattr(refits, "mends_any_course", lambda _cause: False)
-    monkeypatch.setattr(search, "explained", lambda fits: fits)
-    found = _searcher(needed=2.0)._provisional(nothing, [drag, tilt])
-    assert found is not None
-    assert found.causes == (taken,)
 
 
 @pytest.mark.parametrize(
@@ -219,14 +185,45 @@ def test_a_course_found_beside_causes_is_handed_back_and_causes_are_looked_for_o
 def test_a_course_that_gains_nothing_without_the_cause_is_not_handed_back(monkeypatch: pytest.MonkeyPatch) -> None:
     plain, tilt = refit_with("", 0.0), refit_with("tilt", 50.0)
     monkeypatch.setattr(search._Searcher, "_left_out", lambda _self, _trial, *_causes: refit_with("", 1.0))
-    assert _searcher(needed=6.0).handed_back([plain, tilt]) == [plain, tilt]
+    assert _searcher(needed=6.0).handed_back([plain, tilt], [_step(), _step()]) == [plain, tilt]
+
+
+@pytest.mark.parametrize(
+    ("rival", "remains"), [(20.0, True), (45.0, False)], ids=["none can overtake the cause", "another one might"]
+)
+def test_a_cause_that_is_ahead_by_more_than_the_course_brings_is_not_looked_for_again(
+    rival: float, *, remains: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    plain, tilt, better = refit_with("", 0.0), refit_with("tilt", 50.0), refit_with("", 10.0)
+    monkeypatch.setattr(search._Searcher, "_left_out", lambda _self, _trial, *_causes: better)
+    tried = (refit_with("tilt", 49.0), refit_with("drag", rival))
+    found = _searcher(needed=6.0).handed_back([plain, tilt], [_step(*tried), _step()])
+    assert found == ([better, tilt] if remains else [better])
+
+
+def test_what_a_better_course_leaves_is_scored_though_the_cause_remains(monkeypatch: pytest.MonkeyPatch) -> None:
+    plain, tilt, again, better = (refit_with(*one) for one in (("", 0.0), ("tilt", 50.0), ("tilt", 60.0), ("", 10.0)))
+    chosen = {plain: (plain, tilt), tilt: (again, None), again: (again, None)}
+    monkeypatch.setattr(search._Searcher, "tried", search._Searcher.untried)
+    monkeypatch.setattr(search._Searcher, "chosen", lambda _self, trial, _step: chosen[trial])
+    monkeypatch.setattr(search._Searcher, "_left_out", lambda _self, _trial, *_causes: better)
+    left = {
+        one: refits.Left((), (), np.full(3, float(number))) for number, one in enumerate((plain, tilt, again, better))
+    }
+    monkeypatch.setattr(refits.Refits, "left", lambda _self, trial: left[trial])
+    chain, steps = _searcher(needed=6.0).forward(plain)
+    assert chain == [better, again]
+    assert [step.left for step in steps] == [left[better], left[again]]
+
+
+def _step(*tried: Trial) -> search.Step:
+    """A step in which some causes were tried."""
+    return search.Step(refits.Left((), (), np.ones(3)), tried)
 
 
 def test_a_law_that_loses_most_videos_comes_last(monkeypatch: pytest.MonkeyPatch) -> None:
     nothing, wind, drag = refit_with("", 0.0), refit_with("wind", 30.0), refit_with("drag", 10.0)
-    for one in (nothing, wind, drag):
-        one.fit.fits = one is not wind
-    monkeypatch.setattr(search, "explained", lambda fits: fits)
+    wind.loses_most_of.return_value = True
     monkeypatch.setattr(search._Searcher, "doubted", lambda *_given: False)
     assert _searcher()._in_order(nothing, [wind, drag]) == [drag, wind]
 

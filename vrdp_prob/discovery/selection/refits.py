@@ -35,6 +35,8 @@ from vrdp_prob.progress import Advance
 
 ESTABLISHED = 0.8
 """Probability that a cause must have beside the model without it."""
+FIRST_SHARE = 0.2
+"""Share of what a model lacks that a cause must bring to be gone on from before all others are tried."""
 PLAIN_TURNS = 4
 """Turns from which walls and discs that explain them need no comparison with what else may have been there."""
 SHORT, MENDINGS = 0.5, 3
@@ -146,6 +148,8 @@ class Refits:
         close = shortlist(scores, CLOSE)
         found += self.made_of(trial, close, beside=found)
         found.sort(key=merit, reverse=True)
+        if len(close) < len(likely) and not self.settled(trial, found):
+            found = self._with_best_searched(trial, found)
         if not self.settled(trial, found):
             found += self.made_of(trial, [one for one in likely if one not in close], beside=found)
             found.sort(key=merit, reverse=True)
@@ -158,6 +162,24 @@ class Refits:
         if kicks is not None and (not found or found[0].causes[-1].name == kicks.effect.name):
             found += self._hidden(trial, found, kicks)
         return found
+
+    def provisional(self, trial: Trial, found: Sequence[Trial]) -> Trial | None:
+        """The cause that brings most where all else is noise, but for kicks: enough, and a good part of what lacks."""
+        possible = [one for one in explaining(found) if not one.loses_most_of(trial)]
+        first = max(possible, key=lambda one: one.brought(trial) + one.log_prior, default=trial)
+        return None if first.brought(trial) < max(self.needed, FIRST_SHARE * trial.lacking) else first
+
+    def _with_best_searched(self, trial: Trial, found: Sequence[Trial]) -> list[Trial]:
+        """Refits, the best first, with the few lost videos of the one to go on from searched anew.
+
+        A cause may have left videos on courses that they took for want of it; what these leave calls for others.
+        """
+        first = self.provisional(trial, found)
+        lost = [] if first is None else lost_videos(first.fit.fits)
+        if first is not None and 0 < len(lost) <= len(first.fit.fits) // MOST and explained(first.fit.fits):
+            searched = self.searched_anew(first, lost)
+            found = [searched if one is first else one for one in found]
+        return sorted(found, key=merit, reverse=True)
 
     def _asked_by_most(self, trial: Trial) -> list[Trial]:
         """Refits with what most videos ask for, the best first, where few others have lost their course by far.

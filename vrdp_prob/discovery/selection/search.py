@@ -8,12 +8,12 @@ import numpy as np
 from jaxtyping import Float
 
 from vrdp_prob.discovery.candidates.scores import mends_any_course
-from vrdp_prob.discovery.selection.refits import Left, Refits, explaining, merit
+from vrdp_prob.discovery.selection.refits import Left, Refits, merit
 from vrdp_prob.discovery.selection.shortlist import HOPEFUL
 from vrdp_prob.discovery.selection.trials import Trial, gain, with_own_population
 from vrdp_prob.inference.runs.parallel import in_processes
 from vrdp_prob.inference.several_videos.fitting import SharedFit
-from vrdp_prob.inference.several_videos.second_look import doubtful, explained
+from vrdp_prob.inference.several_videos.second_look import doubtful
 from vrdp_prob.models.effects.effect import Effect
 from vrdp_prob.models.effects.external_impulse import ExternalImpulse
 from vrdp_prob.progress import ProgressDisplay, SilentProgress
@@ -21,8 +21,6 @@ from vrdp_prob.progress import ProgressDisplay, SilentProgress
 MOST_RIVALS = 2
 MOST_CAUSES = 5
 MOST_SWAPS, MOST_ROUNDS = 3, 3
-FIRST_SHARE = 0.2
-"""Share of what a model lacks that a cause must bring for a second one to be looked for beside it."""
 PLAIN = 50.0
 """Gain of a cause, in those that are needed, from which it is not put in doubt again."""
 FALSE_ALARM = 0.05
@@ -183,10 +181,14 @@ class _Searcher:
             found_better_course = found is not chain[-1]
             if found_better_course:
                 chain[-1], steps[-1] = found, replace(step, left=self.refits.left(found))
-                back = self.handed_back(chain) if rounds < MOST_ROUNDS else chain
-                if len(back) < len(chain):
-                    chain, rounds = back, rounds + 1
-                    steps[len(chain) - 1 :] = [self.untried(chain[-1])]
+                back = self.handed_back(chain, steps) if rounds < MOST_ROUNDS else chain
+                compared = zip(back, chain, steps, strict=False)
+                steps = [
+                    step if one is other else replace(step, left=self.refits.left(one)) for one, other, step in compared
+                ]
+                is_shorter, chain = len(back) < len(chain), back
+                if is_shorter:
+                    rounds, steps[-1] = rounds + 1, self.untried(chain[-1])
                     continue
             if winner is not None:
                 chain.append(winner)
@@ -202,7 +204,7 @@ class _Searcher:
     def tried(self, trial: Trial) -> Step:
         """The step with the causes tried that may be the best one."""
         found, pair = self.refits.of(trial), None
-        first = None if self.refits.settled(trial, found) else self._provisional(trial, found)
+        first = None if self.refits.settled(trial, found) else self.refits.provisional(trial, found)
         if first is not None:
             first = self.refits.with_lost_found(trial, first)
             found = self.refits.of(trial)
@@ -212,12 +214,6 @@ class _Searcher:
             else:
                 pair = self._pair(trial, first)
         return Step(self.refits.left(trial), tuple(self._in_order(trial, found)), pair)
-
-    def _provisional(self, trial: Trial, found: Sequence[Trial]) -> Trial | None:
-        """The cause that brings most where all else is noise, but for kicks: enough, and a good part of what lacks."""
-        possible = [one for one in explaining(found) if not _loses_most(one, trial)]
-        first = max(possible, key=lambda one: one.brought(trial) + one.log_prior, default=trial)
-        return None if first.brought(trial) < max(self.needed, FIRST_SHARE * trial.lacking) else first
 
     def _pair(self, trial: Trial, first: Trial) -> tuple[Trial, Trial] | None:
         """A cause and a second one beside it, if both together are established.
@@ -249,18 +245,24 @@ class _Searcher:
                 winner = None
         return trial, self.or_first_of(step.pair, winner)
 
-    def handed_back(self, chain: Sequence[Trial]) -> list[Trial]:
+    def handed_back(self, chain: Sequence[Trial], steps: Sequence[Step]) -> list[Trial]:
         """The models up to the first that gains by the course which the last one has found since, with that course.
 
-        What it brings is no merit of the causes beside which it was found: these are looked for once more.
+        What it brings is no merit of the causes beside which it was found: these are looked for once more, unless the
+        last one is ahead of all that was tried in its place by more than the course brings.
         """
         *before, last = chain
         if not before:
             return [last]
         lesser = self._left_out(last, *last.beyond(before[-1]))
-        if gain(lesser, before[-1])[0] <= self.needed:
+        course = gain(lesser, before[-1])[0]
+        if course <= self.needed:
             return list(chain)
-        return self.handed_back([*before[:-1], self._with_both_courses(lesser, before[-1])])
+        better = self._with_both_courses(lesser, before[-1])
+        head = self.handed_back([*before[:-1], better], steps[:-1])
+        others = [one for one in steps[-2].tried if one.causes[-1] not in last.causes]
+        ahead = min(gain(last, one)[0] for one in (better, *others))
+        return [*head, last] if len(head) == len(before) and ahead > course else head
 
     def _with_both_courses(self, better: Trial, before: Trial) -> Trial:
         """A model with a better course of events than before, and with videos that have lost theirs searched anew.
@@ -280,7 +282,7 @@ class _Searcher:
 
     def _in_order(self, trial: Trial, found: Sequence[Trial]) -> list[Trial]:
         """Trials by merit; those that patch or lose several videos last, unless the best other one is in doubt."""
-        patching = [one for one in found if one.patches(one.causes[-1]) or _loses_most(one, trial)]
+        patching = [one for one in found if one.patches(one.causes[-1]) or one.loses_most_of(trial)]
         others = sorted((one for one in found if one not in patching), key=merit, reverse=True)
         if others and not self.doubted(others[0], trial, np.ones(len(trial.fit.videos))):
             return [*others, *sorted(patching, key=merit, reverse=True)]
@@ -389,11 +391,6 @@ def _tried_at(cause: Effect, chain: Sequence[Trial], steps: Sequence[Step]) -> t
             if any(one.name == name for trial in step.tried for one in trial.beyond(base)):
                 return base, step
     return chain[0], steps[0]
-
-
-def _loses_most(trial: Trial, lesser: Trial) -> bool:
-    """Whether most videos are explained no more with the last cause of a model, which they are without it."""
-    return explained(lesser.fit.fits) and not explained(trial.fit.fits)
 
 
 def _sure(trial: Trial, divisor: Float[np.ndarray, "video"]) -> float:

@@ -19,7 +19,7 @@ from vrdp_prob.discovery.selection.forecast import held_out
 from vrdp_prob.inference.several_videos.ascent import Effort, ImpossibleStartError
 from vrdp_prob.inference.several_videos.fitting import SharedFit
 from vrdp_prob.inference.several_videos.population import own_parameters, with_learned_population
-from vrdp_prob.inference.several_videos.second_look import LOST, MOST, lost_videos
+from vrdp_prob.inference.several_videos.second_look import LOST, MOST, explained, lost_videos
 from vrdp_prob.models.effects.effect import Effect
 from vrdp_prob.models.parameters import Parameter, Scope
 from vrdp_prob.models.physics import PhysicsModel
@@ -147,6 +147,10 @@ class Trial:
     def loses_videos_of(self, other: "Trial") -> bool:
         """Whether a video is less probable than in another fit and explained no more."""
         return any(self.fit.fits[index].misfit.ratio > LOST for index in self._fallen_from(other))
+
+    def loses_most_of(self, other: "Trial") -> bool:
+        """Whether most videos are explained no more, which they are in another fit."""
+        return explained(other.fit.fits) and not explained(self.fit.fits)
 
     def _fallen_from(self, base: "Trial") -> list[int]:
         gained = self.fitted_density - base.fitted_density

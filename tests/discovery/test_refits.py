@@ -79,7 +79,8 @@ def test_lost_videos_of_the_best_cause_are_searched_before_lesser_causes_are_tri
     nothing, radius, found, lens = (
         refit_with(*one) for one in (("", 0.0), ("radius", 20.0), ("radius", 90.0), ("lens", 5.0))
     )
-    nothing.causes, nothing.lacking, radius.brought.return_value = (), 100.0, 60.0
+    nothing.causes, nothing.lacking = (), 100.0
+    radius.brought.return_value = found.brought.return_value = 60.0
     radius.fit.fits = [""] * 4
     clear, faint = (
         Mock(spec=CauseScore, effect=effect, size=size, p_value=1e-9, sites=())

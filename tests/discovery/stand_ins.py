@@ -18,6 +18,7 @@ def refit_with(cause: str, gained: float, *, patches: bool = False) -> Mock:
     refit.patches.return_value, refit.may_vanish.return_value = patches, False
     refit.loses_videos_of.return_value = refit.loses_most_of.return_value = False
     refit.fallen_from.return_value = []
+    refit.with_courses_of.side_effect = lambda _other: refit
     return refit
 
 

@@ -217,6 +217,19 @@ def test_videos_with_kicks_keep_the_course_on_which_these_were_found(
     assert (trial.with_other_courses(seed=0) is trial) is keeps
 
 
+def test_a_course_that_another_fit_has_found_is_taken_from_it() -> None:
+    _, fit = fitted("surface_tilt", 3.0, seed=2)
+    joint, lost = fit.joint, fit.fits[1]
+    wrong = replace(lost.modes[0], point=lost.point + 0.2 * (np.array(lost.likelihood.coordinates.names) == "x"))
+    fits = (fit.fits[0], replace(lost, modes=(wrong,)), *fit.fits[2:])
+    strayed = Trial((), replace(fit, fits=fits, joint=replace(joint, log_density=joint.log_density - 50.0)))
+    nowhere = Trial((), replace(fit, joint=replace(joint, log_density=joint.log_density + 50.0)))
+    found = Trial((), strayed.fit.with_courses_of(fit, [1]))
+    assert found.fit.joint.log_density > joint.log_density - 0.1
+    assert nowhere.fit.with_courses_of(fit, [1]) is nowhere.fit
+    assert strayed.with_courses_of(strayed) is strayed
+
+
 def test_a_video_is_searched_beside_others_that_have_followed_what_they_agree_on(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

@@ -144,6 +144,20 @@ def _judge_by_gain(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(search._Searcher, "doubted", doubted)
 
 
+@pytest.mark.parametrize(("gained", "taken"), [(9.5, None), (3.0, "drag")], ids=["it explains the gain", "hardly"])
+def test_a_better_course_of_one_video_is_no_merit_of_the_cause_without_which_others_lose_theirs(
+    gained: float, taken: str | None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    before, winner, without, both = (refit_with(*one) for one in (("", 0.0), ("drag", 10.0), ("", -50.0), ("", gained)))
+    winner.without.return_value = without
+    before.with_courses_of.side_effect = lambda other: {without: both}[other]
+    monkeypatch.setattr(search, "mends_any_course", lambda _cause: False)
+    _judge_by_gain(monkeypatch)
+    base, found = _searcher(needed=2.0).chosen(before, search.Step(Mock(spec=refits.Left), (winner,)))
+    assert base is both
+    assert (found and found.causes[0]) == taken
+
+
 def test_of_several_walls_at_once_none_is_a_merit_of_a_better_course(monkeypatch: pytest.MonkeyPatch) -> None:
     """The model to go on from is that without any of them."""
     tilt, walls = refit_with("tilt", 0.0), refit_with("tilt+wall+second_wall", 50.0)

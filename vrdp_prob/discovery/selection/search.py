@@ -230,14 +230,16 @@ class _Searcher:
     def chosen(self, trial: Trial, step: Step) -> tuple[Trial, Trial | None]:
         """The model to go on from, and the same with the cause that a step has established; None where it has none.
 
-        Where the winner's refit has found a better course of events, which is no merit of the cause, the model with
-        that course is the one to go on from; so it is where a search finds one that the winner's kicks stood for.
+        Where the winner's refit has found a better course of events in some videos, that is no merit of the cause,
+        though others may need the cause for theirs, and the model with that course is the one to go on from; so it is
+        where a search finds one that the winner's kicks stood for.
         """
         winner = next((one for one in step.tried[:1] if gain(one, trial)[0] >= self.needed), None)
         if winner is not None:
             without = winner.without(*winner.beyond(trial))
-            if gain(without, trial)[0] > self.needed:
-                trial = self._with_both_courses(without, trial)
+            is_better = gain(without, trial)[0] > self.needed
+            both = self._with_both_courses(without, trial) if is_better else trial.with_courses_of(without)
+            trial = both if gain(both, trial)[0] > self.needed else trial
             if mends_any_course(winner.causes[-1]):
                 mended = self.refits.searched_anew(trial, winner.acting(winner.causes[-1]))
                 trial = mended if gain(mended, trial)[0] > self.needed else trial
@@ -265,10 +267,12 @@ class _Searcher:
         return [*head, last] if len(head) == len(before) and ahead > course else head
 
     def _with_both_courses(self, better: Trial, before: Trial) -> Trial:
-        """A model with a better course of events than before, and with videos that have lost theirs searched anew.
+        """A model with a better course of events than before, and in videos that have lost theirs with that of before.
 
-        A cause beside which both courses are kept would have the credit for the one that is lost without it.
+        Where that is not found, they are searched anew. A cause beside which both courses are kept would have the
+        credit for the one that is lost without it.
         """
+        better = better.with_courses_of(before)
         return self.refits.searched_anew(better, better.fallen_from(before))
 
     def or_first_of(self, pair: tuple[Trial, Trial] | None, winner: Trial | None) -> Trial | None:

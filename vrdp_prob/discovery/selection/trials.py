@@ -269,6 +269,12 @@ class Trial:
         fit = self.fit.mended(lost, seed=seed, thorough=thorough)
         return self if fit is self.fit else replace(self, fit=fit)
 
+    def with_courses_of(self, other: "Trial") -> "Trial":
+        """The fit with what happens in another one, of the same causes, in videos that are more probable there."""
+        fallen = self._fallen_from(other)
+        fit = self.fit.with_courses_of(other.fit, fallen) if fallen else self.fit
+        return self if fit is self.fit else replace(self, fit=fit)
+
     def with_other_courses(self, *, seed: int) -> "Trial":
         """The fit with all videos searched anew; itself where that finds nothing much better, or with kicks."""
         if any(mends_any_course(cause) for cause in self.causes):

@@ -214,14 +214,32 @@ class SharedFit:
             structures[index] = replace(
                 structure_of(fits[index].likelihood.coordinates), held=self.structures[index].held
             )
+        return self._with_fits(fits, structures, rest)
+
+    def with_courses_of(self, other: "SharedFit", chosen: Sequence[int]) -> "SharedFit":
+        """The fit with what happens in some videos in another fit of them; itself where that is less probable.
+
+        Parameters
+        ----------
+        other
+            A fit of the same videos under a model with the same effects.
+        chosen
+            The videos.
+        """
+        fits = [(other if index in chosen else self).fits[index] for index in range(len(self.fits))]
+        structures = [(other if index in chosen else self).structures[index] for index in range(len(self.fits))]
+        return self._with_fits(fits, structures, self.joint)
+
+    def _with_fits(self, fits: Sequence[MapFit], structures: Sequence[Structure], agreed: JointFit) -> "SharedFit":
+        """The fit that is reached from others of single videos, and shared numbers; itself where that is worse."""
         numbers, videos = link_fits(fits, self.model, self.shared, structures)
-        agreed, _ = first_numbers(rest, numbers, {}, {})
-        locals_ = following_ones(numbers, videos, carried_starts(fits, videos), agreed)
+        shared, _ = first_numbers(agreed, numbers, {}, {})
+        locals_ = following_ones(numbers, videos, carried_starts(fits, videos), shared)
         try:
-            found = climb(numbers, videos, agreed, locals_)
+            found = climb(numbers, videos, shared, locals_)
         except ImpossibleStartError:  # a video has no world where the others agree
             return self
-        if found.log_density < joint.log_density:
+        if found.log_density < self.joint.log_density:
             return self
         return _finished(found, self.model, fits, tuple(structures), self.shared, model_error=False)
 

@@ -10,7 +10,10 @@ import pytest
 from tests.discovery.data_set import draw
 from tests.inference.several_videos.videos import colliding, sliding
 from vrdp_prob.inference.infer import default_model
-from vrdp_prob.inference.map_fit import fit_map
+from vrdp_prob.inference.map_fit import MapFit, fit_map
+from vrdp_prob.inference.runs.parallel import several_processes
+from vrdp_prob.inference.search.plan import IN_DOUBT, TURNING, FitPlan
+from vrdp_prob.inference.several_videos import second_look
 from vrdp_prob.inference.several_videos.fitting import fit_together
 from vrdp_prob.inference.several_videos.following import _too_slow, follow
 from vrdp_prob.inference.several_videos.linking import LinkedVideo
@@ -102,6 +105,28 @@ def test_a_video_that_is_worse_than_the_others_is_fitted_anew() -> None:
     assert (found[0], found[2]) == (fits[0], fits[2])
     assert found[1].misfit.residual_sd == pytest.approx(fits[1].misfit.residual_sd, rel=0.02)
     assert found[1].likelihood.model == default_model()
+
+
+@pytest.mark.parametrize(("lost", "like_noise"), [(True, 0.0), (False, TURNING.like_noise)])
+def test_cubes_of_a_video_that_was_lost_are_turned_on_where_it_is_explained(
+    lost: bool, like_noise: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    fits = [
+        fit_map(one, default_model(), stream(0, one.video), plan=IN_DOUBT, model_error=False)
+        for one in (colliding(0), sliding(1), sliding(2))
+    ]
+    sd = 1.3 if lost else 1.0
+    fits[0] = replace(fits[0], misfit=replace(fits[0].misfit, residual_sd=sd * fits[0].misfit.noise_sd))
+    made: list[FitPlan] = []
+
+    def made_anew(*_given: object, plan: FitPlan, **_how: object) -> MapFit:
+        made.append(plan)
+        return fits[0]
+
+    monkeypatch.setattr(second_look, "fit_map", made_anew)
+    with several_processes(1):
+        look_again(fits, [0], default_model(), None, seed=0, thorough=True)
+    assert [plan.like_noise for plan in made if plan.yaws] == [like_noise]
 
 
 def test_what_is_held_in_a_video_is_held_in_a_new_search_of_it() -> None:

@@ -66,5 +66,3 @@ IN_DOUBT = FitPlan(attempts=1, yaws=False)
 """For one of several videos under a model that may lack something: other videos show what, more attempts do not."""
 TURNING = FitPlan(attempts=1)
 """For one of several videos under a model that explains the others."""
-TURNING_ON = FitPlan(attempts=1, like_noise=0.0)
-"""The same for a video that others call in question although its residuals look like noise."""

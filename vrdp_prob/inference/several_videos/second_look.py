@@ -12,7 +12,7 @@ from jaxtyping import Bool
 
 from vrdp_prob.inference.map_fit import MapFit, fit_map
 from vrdp_prob.inference.runs.parallel import in_processes
-from vrdp_prob.inference.search.plan import IN_DOUBT, TURNING, TURNING_ON, FitPlan, Optimiser
+from vrdp_prob.inference.search.plan import IN_DOUBT, TURNING, FitPlan, Optimiser
 from vrdp_prob.inference.several_videos.agreement import consensus
 from vrdp_prob.inference.several_videos.parts import carried_starts, link_fits, plain_likelihood, stream
 from vrdp_prob.models.parameters import Prior, Scope
@@ -154,8 +154,7 @@ def look_again(
         return list(fits)
     excess = _excess(fits)
     goal = 0.0 if thorough else WORSE * float(np.median([one.misfit.residual_sd for one in fits]))
-    turning = TURNING_ON if thorough else TURNING
-    ways = [(look % 2 == 0, IN_DOUBT) for look in range(looks)] + ([(True, turning)] if explained(fits) else [])
+    ways = [(look % 2 == 0, IN_DOUBT) for look in range(looks)] + ([(True, TURNING)] if explained(fits) else [])
     ways = [(believing, replace(plan, optimiser=optimiser)) for believing, plan in ways]
     among = range(len(fits)) if asked is None else asked
     structures = [
@@ -163,9 +162,39 @@ def look_again(
         for fit, known in zip(fits, held or [{}] * len(fits), strict=True)
     ]
     look = _Look(model, _told(fits, structures, model, shared, among, islands=islands), goal, seed, tuple(ways))
-    doubted = [(fits[index], bool(excess[index] >= FAR_WORSE), structures[index].held) for index in chosen]
+    doubted = [
+        _Doubted(
+            fits[index],
+            far_worse=bool(excess[index] >= FAR_WORSE),
+            turned_on=thorough and fits[index].misfit.ratio > LOST,
+            held=structures[index].held,
+        )
+        for index in chosen
+    ]
     improved = dict(zip(chosen, in_processes(look, doubted), strict=True))
     return [improved.get(index) or fit for index, fit in enumerate(fits)]
+
+
+@dataclass(frozen=True)
+class _Doubted:
+    """A video that is looked at again.
+
+    Parameters
+    ----------
+    fit
+        Its fit.
+    far_worse
+        Whether that is far worse than those of other videos.
+    turned_on
+        Whether its cubes are turned on where it is explained: a video that was lost may be so by a wrong yaw still.
+    held
+        Which of its numbers are held.
+    """
+
+    fit: MapFit
+    far_worse: bool
+    turned_on: bool
+    held: Held
 
 
 @dataclass(frozen=True)
@@ -192,28 +221,27 @@ class _Look:
     seed: int
     ways: tuple[tuple[bool, FitPlan], ...]
 
-    def __call__(self, doubted: tuple[MapFit, bool, Held]) -> MapFit | None:
-        """A better fit, if there is one.
-
-        With a fit comes whether it is far worse than those of other videos, and which of its numbers are held.
-        """
-        (best, far_worse, held), better = doubted, None
+    def __call__(self, doubted: _Doubted) -> MapFit | None:
+        """A better fit, if there is one."""
+        best, better = doubted.fit, None
         settled: set[tuple[bool, FitPlan]] = set()
         for look, way in enumerate(self.ways):
             if way in settled:
                 continue
             believing, plan = way
+            if plan.yaws and doubted.turned_on:
+                plan = replace(plan, like_noise=0.0)
             generator = stream(self.seed, f"{best.clues.tracks.video} {look}")
             model = self.told if believing else self.model
-            found = fit_map(best.clues.tracks, model, generator, plan=plan, model_error=False, held=held)
+            found = fit_map(best.clues.tracks, model, generator, plan=plan, model_error=False, held=doubted.held)
             gained = best.misfit.residual_sd / found.misfit.residual_sd - 1
             if gained > SAME and found.log_density > best.log_density - FELL:
-                structure = replace(structure_of(found.likelihood.coordinates), held=held)
+                structure = replace(structure_of(found.likelihood.coordinates), held=doubted.held)
                 likelihood = plain_likelihood(found.clues, self.model, structure)
                 best = better = replace(found, likelihood=likelihood)
             if best.misfit.residual_sd < self.goal:
                 break
-            if abs(gained) < SAME and not far_worse:
+            if abs(gained) < SAME and not doubted.far_worse:
                 settled.add(way)
         return better
 

@@ -2,6 +2,8 @@
 
 from collections.abc import Sequence
 from dataclasses import astuple, replace
+from typing import Any
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -20,14 +22,16 @@ from vrdp_prob.inference.several_videos import fitting
 from vrdp_prob.inference.several_videos.agreement import following_ones
 from vrdp_prob.inference.several_videos.fitting import SharedFit, fit_together
 from vrdp_prob.inference.several_videos.joint_fit import expand
+from vrdp_prob.inference.several_videos.parts import link_fits
 from vrdp_prob.inference.several_videos.second_look import doubtful
-from vrdp_prob.models.effects.clock_error import ClockError
+from vrdp_prob.models.effects.clock_error import LOST_AT, LOST_TIME, ClockError
 from vrdp_prob.models.effects.effect import Effect
 from vrdp_prob.models.effects.external_impulse import ExternalImpulse
 from vrdp_prob.models.effects.linear_drag import LinearDrag
 from vrdp_prob.models.effects.material_friction import MaterialFriction
 from vrdp_prob.models.effects.surface_tilt import SurfaceTilt
 from vrdp_prob.models.parameters import ANGULAR_DRAG
+from vrdp_prob.models.unknowns import Held
 from vrdp_prob.scene import Tracks
 
 
@@ -217,17 +221,70 @@ def test_videos_with_kicks_keep_the_course_on_which_these_were_found(
     assert (trial.with_other_courses(seed=0) is trial) is keeps
 
 
-def test_a_course_that_another_fit_has_found_is_taken_from_it() -> None:
+def test_a_course_that_another_fit_has_found_is_taken_from_it(monkeypatch: pytest.MonkeyPatch) -> None:
     _, fit = fitted("surface_tilt", 3.0, seed=2)
-    joint, lost = fit.joint, fit.fits[1]
-    wrong = replace(lost.modes[0], point=lost.point + 0.2 * (np.array(lost.likelihood.coordinates.names) == "x"))
-    fits = (fit.fits[0], replace(lost, modes=(wrong,)), *fit.fits[2:])
-    strayed = Trial((), replace(fit, fits=fits, joint=replace(joint, log_density=joint.log_density - 50.0)))
-    nowhere = Trial((), replace(fit, joint=replace(joint, log_density=joint.log_density + 50.0)))
-    found = Trial((), strayed.fit.with_courses_of(fit, [1]))
-    assert found.fit.joint.log_density > joint.log_density - 0.1
-    assert nowhere.fit.with_courses_of(fit, [1]) is nowhere.fit
-    assert strayed.with_courses_of(strayed) is strayed
+    joint = fit.joint
+    lost = replace(fit, joint=replace(joint, log_density=joint.log_density - 50.0), fits=tuple(map(replace, fit.fits)))
+    taken: list[list[bool]] = []
+
+    def linked(fits: Sequence[MapFit], *given: Any) -> Any:
+        taken.append([one is other for one, other in zip(fits, fit.fits, strict=True)])
+        return link_fits(fits, *given)
+
+    monkeypatch.setattr(fitting, "link_fits", linked)
+    found = lost.with_courses_of(fit, [1])
+    assert taken == [[False, True, False]]
+    assert found.joint.log_density > joint.log_density - 0.1
+    better = replace(fit, joint=replace(joint, log_density=joint.log_density + 50.0))
+    assert better.with_courses_of(fit, [1]) is better
+
+
+@pytest.mark.parametrize(
+    ("follow", "asked"),
+    [([[2, 0]], [[2, 0]]), ([[2]], [[2, 0], [2]]), ([], [[2, 0], [2]])],
+    ids=["both", "one of them", "none"],
+)
+def test_videos_that_are_more_probable_in_another_fit_take_its_course(
+    follow: list[list[int]], asked: list[list[int]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    _, fit = fitted("surface_tilt", 3.0, seed=2)
+    better, calls = replace(fit), list[list[int]]()
+
+    def with_courses_of(_fit: SharedFit, _other: SharedFit, chosen: list[int]) -> SharedFit:
+        calls.append(list(chosen))
+        return better if calls[-1] in follow else fit
+
+    monkeypatch.setattr(SharedFit, "with_courses_of", with_courses_of)
+    trial, other = Trial((), fit), Trial((), fit)
+    vars(trial)["unexplained"] = vars(other)["unexplained"] = Mock(gains=np.zeros(3))
+    monkeypatch.setattr(
+        Trial, "fitted_density", property(lambda self: np.array([8.0, 4.0, 90.0]) * (1.0 if self is other else 0.0))
+    )
+    assert (trial.with_courses_of(other).fit is better) is bool(follow)
+    assert calls == asked
+    assert other.with_courses_of(trial) is other
+
+
+def test_what_is_held_in_a_video_is_held_when_it_is_searched_anew(monkeypatch: pytest.MonkeyPatch) -> None:
+    _, fit = fitted("surface_tilt", 3.0, seed=2)
+    at, time = (LOST_AT.name, None), (LOST_TIME.name, None)
+    held: list[Held] = [{at: None, time: None}, {at: 0.41}, {at: None, time: None}]
+    clocked = fit.under(fit.extended(ClockError()), held=held, model_error=False)
+    places = clocked.joint.videos[1].likelihood.coordinates.places
+    assert time in places
+    assert at not in places
+    lost = replace(clocked, joint=replace(clocked.joint, log_density=clocked.joint.log_density - 50.0))
+
+    def searched(fits: Sequence[MapFit], *_given: object, held: Sequence[Held], **_how: object) -> list[MapFit]:
+        assert list(held) == [one.held for one in lost.structures]
+        return [fits[0], replace(fits[1]), fits[2]]
+
+    monkeypatch.setattr(fitting, "look_again", searched)
+    found = lost.mended([1], seed=0)
+    assert found is not lost
+    assert [one.held for one in found.structures] == held
+    assert found.joint.videos[1].likelihood.coordinates.places == places
+    assert found.joint.videos[1].likelihood.coordinates.defaults[LOST_AT.name] == 0.41
 
 
 def test_a_video_is_searched_beside_others_that_have_followed_what_they_agree_on(

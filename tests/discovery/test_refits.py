@@ -412,15 +412,16 @@ def test_kicks_in_several_videos_explain_none_of_them_though_they_leave_nothing(
 
 
 @pytest.mark.parametrize(
-    ("before", "p_value", "is_tried"),
-    [(("tilt",), 0.02, False), (("tilt",), 1e-4, True), ((), 0.02, True)],
-    ids=["chance makes as much", "chance does not", "no cause is there yet"],
+    ("before", "p_value", "lost", "is_tried"),
+    [(("tilt",), 0.02, [], False), (("tilt",), 1e-4, [], True), (("tilt",), 0.02, [1], True), ((), 0.02, [], True)],
+    ids=["chance makes as much", "chance does not", "chance stands for a lost video", "no cause is there yet"],
 )
 def test_beside_a_cause_none_is_tried_where_no_score_stands_out_from_chance(
-    before: tuple[str, ...], p_value: float, *, is_tried: bool, monkeypatch: pytest.MonkeyPatch
+    before: tuple[str, ...], p_value: float, lost: list[int], *, is_tried: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     trial = refit_with("", 0.0)
-    trial.causes, trial.fit.fits = before, _explained(3)
+    trial.causes = before
+    monkeypatch.setattr(refits, "lost_videos", lambda _fits: lost)
     clear, beside = (Mock(spec=CauseScore, effect=Bowl(), size=30.0, p_value=one, sites=()) for one in (1e-9, p_value))
     tried: list[list[CauseScore]] = []
     monkeypatch.setattr(refits.Refits, "left", lambda _self, _trial: refits.Left((clear,), (beside,), np.ones(3)))
@@ -429,11 +430,6 @@ def test_beside_a_cause_none_is_tried_where_no_score_stands_out_from_chance(
     monkeypatch.setattr(refits.Refits, "made_of", lambda _self, _trial, asked, **_beside: tried.append(asked) or [])
     assert refits_with(needed=6.0)._new(trial) == []
     assert ([clear] in tried) is is_tried
-
-
-def _explained(count: int) -> list[Mock]:
-    """Fits of so many videos that leave nothing but noise."""
-    return [Mock(misfit=Mock(ratio=1.0)) for _ in range(count)]
 
 
 @pytest.mark.parametrize(

@@ -6,10 +6,12 @@ import numpy as np
 import pytest
 
 from tests.discovery.stand_ins import refit_with, refits_with, without_tracks
+from vrdp_prob.discovery.candidates.scores import CauseScore
 from vrdp_prob.discovery.selection import refits, search
 from vrdp_prob.discovery.selection.trials import Trial
 from vrdp_prob.models.effects.bowl import Bowl
 from vrdp_prob.models.effects.lens_distortion import LensDistortion
+from vrdp_prob.models.effects.linear_drag import LinearDrag
 from vrdp_prob.models.effects.surface_tilt import SurfaceTilt
 
 
@@ -87,7 +89,7 @@ def test_what_a_better_course_of_events_brings_is_no_merit_of_the_cause(
 
     monkeypatch.setattr(search, "mends_any_course", lambda _cause: False)
     _judge_by_gain(monkeypatch)
-    base, found = _searcher(needed=2.0).chosen(nothing, search.Step(Mock(spec=refits.Left), (winner,)))
+    base, found = _searcher(needed=2.0).chosen(nothing, search.Step(nothing, Mock(spec=refits.Left), (winner,)))
     assert base.causes[0] == goes_on_from
     assert (found and found.causes[0]) == taken
 
@@ -108,7 +110,7 @@ def test_videos_with_kicks_are_searched_anew_without_them(
     monkeypatch.setattr(refits, "may_take_another_course", lambda fit: fit != "of one course only")
     monkeypatch.setattr(search, "mends_any_course", lambda _cause: True)
     _judge_by_gain(monkeypatch)
-    base, winner = _searcher(needed=2.0).chosen(tilt, search.Step(Mock(spec=refits.Left), (kicked,)))
+    base, winner = _searcher(needed=2.0).chosen(tilt, search.Step(tilt, Mock(spec=refits.Left), (kicked,)))
     assert base.causes[0] == goes_on_from
     assert (winner and winner.causes[0]) == taken
     tilt.mended.assert_called_once_with([2], seed=0, thorough=True)
@@ -130,7 +132,7 @@ def test_a_better_course_is_not_gone_on_from_with_a_video_that_has_lost_its_own(
     monkeypatch.setattr(refits, "may_take_another_course", lambda _fit: True)
     monkeypatch.setattr(search, "mends_any_course", lambda _cause: False)
     _judge_by_gain(monkeypatch)
-    found, taken = _searcher(needed=5.0).chosen(before, search.Step(Mock(spec=refits.Left), (winner,)))
+    found, taken = _searcher(needed=5.0).chosen(before, search.Step(before, Mock(spec=refits.Left), (winner,)))
     assert found is mended
     assert taken is None
     without.mended.assert_called_once_with([1], seed=0, thorough=True)
@@ -145,15 +147,19 @@ def _judge_by_gain(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.parametrize(("gained", "taken"), [(9.5, None), (3.0, "drag")], ids=["it explains the gain", "hardly"])
+@pytest.mark.parametrize("given_back", [True, False], ids=["lost ones are given back", "the better one is taken over"])
 def test_a_better_course_of_one_video_is_no_merit_of_the_cause_without_which_others_lose_theirs(
-    gained: float, taken: str | None, monkeypatch: pytest.MonkeyPatch
+    gained: float, taken: str | None, *, given_back: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     before, winner, without, both = (refit_with(*one) for one in (("", 0.0), ("drag", 10.0), ("", -50.0), ("", gained)))
-    winner.without.return_value = without
-    before.with_courses_of.side_effect = lambda other: {without: both}[other]
+    winner.without.return_value, without.fitted_density = without, np.array([20.0, -80.0, -90.0])
+    if given_back:
+        without.with_courses_of.side_effect = lambda other: {before: both}[other]
+    else:
+        before.with_courses_of.side_effect = lambda other: {without: both}[other]
     monkeypatch.setattr(search, "mends_any_course", lambda _cause: False)
     _judge_by_gain(monkeypatch)
-    base, found = _searcher(needed=2.0).chosen(before, search.Step(Mock(spec=refits.Left), (winner,)))
+    base, found = _searcher(needed=2.0).chosen(before, search.Step(before, Mock(spec=refits.Left), (winner,)))
     assert base is both
     assert (found and found.causes[0]) == taken
 
@@ -164,7 +170,7 @@ def test_of_several_walls_at_once_none_is_a_merit_of_a_better_course(monkeypatch
     walls.without.return_value = refit_with("tilt", 0.5)
     monkeypatch.setattr(search, "mends_any_course", lambda _cause: False)
     _judge_by_gain(monkeypatch)
-    step = search.Step(Mock(spec=refits.Left), (walls,))
+    step = search.Step(tilt, Mock(spec=refits.Left), (walls,))
     assert _searcher(needed=2.0).chosen(tilt, step) == (tilt, walls)
     walls.without.assert_called_once_with("wall", "second_wall")
 
@@ -186,6 +192,7 @@ def test_a_course_found_beside_causes_is_handed_back_and_causes_are_looked_for_o
         asked.append(trial)
         return self.untried(trial)
 
+    monkeypatch.setattr(search, "mends_any_course", lambda _cause: False)
     monkeypatch.setattr(search._Searcher, "tried", tried)
     monkeypatch.setattr(search._Searcher, "chosen", lambda _self, trial, _step: chosen[trial])
     monkeypatch.setattr(search._Searcher, "_left_out", lambda _self, trial, *_causes: left_out[trial])
@@ -203,21 +210,41 @@ def test_a_course_that_gains_nothing_without_the_cause_is_not_handed_back(monkey
 
 
 @pytest.mark.parametrize(
-    ("rival", "remains"), [(20.0, True), (45.0, False)], ids=["none can overtake the cause", "another one might"]
+    ("rival", "lost", "kicks", "remains"),
+    [(20.0, [], False, True), (37.0, [], False, False), (20.0, [1], False, False), (20.0, [], True, False)],
+    ids=["none can overtake the cause", "another one might", "it has lost a video", "kicks"],
 )
 def test_a_cause_that_is_ahead_by_more_than_the_course_brings_is_not_looked_for_again(
-    rival: float, *, remains: bool, monkeypatch: pytest.MonkeyPatch
+    rival: float, lost: list[int], *, kicks: bool, remains: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    plain, tilt, better = refit_with("", 0.0), refit_with("tilt", 50.0), refit_with("", 10.0)
-    monkeypatch.setattr(search._Searcher, "_left_out", lambda _self, _trial, *_causes: better)
+    plain, tilt, without, better = (refit_with(*one) for one in (("", 0.0), ("tilt", 50.0), ("", 4.0), ("", 10.0)))
+    without.with_courses_of.side_effect = lambda other: {plain: better}[other]
+    tilt.fallen_from.return_value = lost
+    monkeypatch.setattr(search, "mends_any_course", lambda _cause: kicks)
+    monkeypatch.setattr(search._Searcher, "_left_out", lambda _self, _trial, *_causes: without)
     tried = (refit_with("tilt", 49.0), refit_with("drag", rival))
     found = _searcher(needed=6.0).handed_back([plain, tilt], [_step(*tried), _step()])
     assert found == ([better, tilt] if remains else [better])
 
 
+def test_rivals_are_those_that_came_close_on_the_model_on_which_they_were_tried(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Though that has a better course of events since, and they would bring less beside it."""
+    plain, tilt, drag, better = (refit_with(*one) for one in (("", 0.0), ("tilt", 50.0), ("drag", 15.0), ("", 14.0)))
+    tilt.causes, drag.causes, tilt.names = (SurfaceTilt(),), (LinearDrag(),), (SurfaceTilt.name,)
+    clear = Mock(spec=CauseScore, effect=LinearDrag(), size=30.0)
+    asked: list[list[CauseScore]] = []
+    monkeypatch.setattr(refits.Refits, "made_of", lambda _self, _trial, scores: asked.append(list(scores)) or [])
+    step = search.Step(plain, refits.Left((clear,), (), np.ones(3)), (tilt, drag))
+    assert _searcher()._rivals(tilt, (better,), [_step(), step]) == ((),)
+    assert asked == [[clear]]
+
+
 def test_what_a_better_course_leaves_is_scored_though_the_cause_remains(monkeypatch: pytest.MonkeyPatch) -> None:
     plain, tilt, again, better = (refit_with(*one) for one in (("", 0.0), ("tilt", 50.0), ("tilt", 60.0), ("", 10.0)))
     chosen = {plain: (plain, tilt), tilt: (again, None), again: (again, None)}
+    monkeypatch.setattr(search, "mends_any_course", lambda _cause: False)
     monkeypatch.setattr(search._Searcher, "tried", search._Searcher.untried)
     monkeypatch.setattr(search._Searcher, "chosen", lambda _self, trial, _step: chosen[trial])
     monkeypatch.setattr(search._Searcher, "_left_out", lambda _self, _trial, *_causes: better)
@@ -232,7 +259,7 @@ def test_what_a_better_course_leaves_is_scored_though_the_cause_remains(monkeypa
 
 def _step(*tried: Trial) -> search.Step:
     """A step in which some causes were tried."""
-    return search.Step(refits.Left((), (), np.ones(3)), tried)
+    return search.Step(refit_with("", 0.0), refits.Left((), (), np.ones(3)), tried)
 
 
 def test_a_law_that_loses_most_videos_comes_last(monkeypatch: pytest.MonkeyPatch) -> None:

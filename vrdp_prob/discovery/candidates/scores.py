@@ -128,9 +128,9 @@ def happens_once(effect: Effect) -> bool:
 
 
 def mends_any_course(effect: Effect) -> bool:
-    """Whether an effect happens once and bends paths, so that it mends a wrong course of events as well as a right one.
+    """Whether an effect happens once, and what it does stands as well for a wrong course of events.
 
-    What happens to the clock shifts bodies along their paths and bends none.
+    What happens to the clock does not: it shifts bodies along their paths and bends none.
     """
     return happens_once(effect) and not effect.overrides("measured_times")
 

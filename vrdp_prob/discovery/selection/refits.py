@@ -134,10 +134,12 @@ class Refits:
         """Refits in any order; hidden things are tried only where nothing explains the videos better than kicks do.
 
         Where nothing brings enough, causes are tried, too, for whose own traces a check has been made that fails: what
-        lies in numbers that bodies have of their own anyway is hardly seen in residuals. Beside a cause none is tried
-        where no score stands out from what is left to chance: beside that is counted, too, what refits bring.
+        lies in numbers that bodies have of their own anyway is hardly seen in residuals. Beside a cause that
+        loses no video none is tried where no score stands out from what is left to chance: beside that is counted, too,
+        what refits bring.
         """
-        if trial.causes and all(one.p_value >= SHORTLIST_LEVEL for one in self.left(trial).beside_chance):
+        by_chance = all(one.p_value >= SHORTLIST_LEVEL for one in self.left(trial).beside_chance)
+        if trial.causes and by_chance and not lost_videos(trial.fit.fits):
             return []
         found = self._asked_by_most(trial)
         if found and (self.settled(trial, found) or any(not lost_videos(one.fit.fits) for one in found)):
@@ -262,7 +264,7 @@ class Refits:
     def _lost(self, trial: Trial, found: Sequence[Trial]) -> list[Trial]:
         """Fits from the beginning, with causes that explain videos whose course of events nothing else explains.
 
-        What happens once in each of several videos explains none of them: kicks mend any course.
+        Kicks in several videos explain none of them: they mend any course.
         """
         if trial.choices:
             return []

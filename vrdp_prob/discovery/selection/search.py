@@ -21,6 +21,8 @@ from vrdp_prob.progress import ProgressDisplay, SilentProgress
 MOST_RIVALS = 2
 MOST_CAUSES = 5
 MOST_SWAPS, MOST_ROUNDS = 3, 3
+OUT_OF_REACH = 2.0
+"""Gain, in those that are needed, by which a cause is ahead of others for none of them to be as probable as it is."""
 PLAIN = 50.0
 """Gain of a cause, in those that are needed, from which it is not put in doubt again."""
 FALSE_ALARM = 0.05
@@ -33,6 +35,8 @@ class Step:
 
     Parameters
     ----------
+    base
+        The model on which causes were tried.
     left
         What the model leaves before the step.
     tried
@@ -43,6 +47,7 @@ class Step:
         look for a second cause in, or no two are.
     """
 
+    base: Trial
     left: Left
     tried: tuple[Trial, ...] = ()
     pair: tuple[Trial, Trial] | None = None
@@ -199,7 +204,7 @@ class _Searcher:
 
     def untried(self, trial: Trial) -> Step:
         """A step in which nothing was tried yet."""
-        return Step(self.refits.left(trial))
+        return Step(trial, self.refits.left(trial))
 
     def tried(self, trial: Trial) -> Step:
         """The step with the causes tried that may be the best one."""
@@ -213,7 +218,7 @@ class _Searcher:
                 found = self.refits.with_lost(trial)
             else:
                 pair = self._pair(trial, first)
-        return Step(self.refits.left(trial), tuple(self._in_order(trial, found)), pair)
+        return Step(trial, self.refits.left(trial), tuple(self._in_order(trial, found)), pair)
 
     def _pair(self, trial: Trial, first: Trial) -> tuple[Trial, Trial] | None:
         """A cause and a second one beside it, if both together are established.
@@ -237,9 +242,7 @@ class _Searcher:
         winner = next((one for one in step.tried[:1] if gain(one, trial)[0] >= self.needed), None)
         if winner is not None:
             without = winner.without(*winner.beyond(trial))
-            is_better = gain(without, trial)[0] > self.needed
-            both = self._with_both_courses(without, trial) if is_better else trial.with_courses_of(without)
-            trial = both if gain(both, trial)[0] > self.needed else trial
+            trial = self._with_both_courses(without, trial)
             if mends_any_course(winner.causes[-1]):
                 mended = self.refits.searched_anew(trial, winner.acting(winner.causes[-1]))
                 trial = mended if gain(mended, trial)[0] > self.needed else trial
@@ -250,30 +253,39 @@ class _Searcher:
     def handed_back(self, chain: Sequence[Trial], steps: Sequence[Step]) -> list[Trial]:
         """The models up to the first that gains by the course which the last one has found since, with that course.
 
-        What it brings is no merit of the causes beside which it was found: these are looked for once more, unless the
-        last one is ahead of all that was tried in its place by more than the course brings.
+        What it brings is no merit of the causes beside which it was found: these are looked for once more. The last one
+        stays where it is ahead of the model without it, and of all that was tried in its place, by so much more than
+        the course brings that none of them could overtake it; but not kicks, which mend any course.
         """
         *before, last = chain
         if not before:
             return [last]
         lesser = self._left_out(last, *last.beyond(before[-1]))
-        course = gain(lesser, before[-1])[0]
-        if course <= self.needed:
-            return list(chain)
         better = self._with_both_courses(lesser, before[-1])
+        if better is before[-1]:
+            return list(chain)
+        course = gain(better, before[-1])[0]
         head = self.handed_back([*before[:-1], better], steps[:-1])
+        if len(head) < len(before) or mends_any_course(last.causes[-1]) or last.fallen_from(better):
+            return head
         others = [one for one in steps[-2].tried if one.causes[-1] not in last.causes]
         ahead = min(gain(last, one)[0] for one in (better, *others))
-        return [*head, last] if len(head) == len(before) and ahead > course else head
+        return [*head, last] if ahead > course + OUT_OF_REACH * self.needed else head
 
-    def _with_both_courses(self, better: Trial, before: Trial) -> Trial:
-        """A model with a better course of events than before, and in videos that have lost theirs with that of before.
+    def _with_both_courses(self, found: Trial, before: Trial) -> Trial:
+        """The model of before with the better course of both in each video; itself where that brings too little.
 
-        Where that is not found, they are searched anew. A cause beside which both courses are kept would have the
-        credit for the one that is lost without it.
+        Videos that have lost their course with it are searched anew. A cause beside which both courses are kept would
+        have the credit for the one that is lost without it.
         """
-        better = better.with_courses_of(before)
-        return self.refits.searched_anew(better, better.fallen_from(before))
+        hoped = float(np.maximum(found.fitted_density - before.fitted_density, 0.0).sum())
+        if hoped <= self.needed:
+            return before
+        ways = (found.with_courses_of(before), before.with_courses_of(found))
+        both = max(ways, key=lambda one: float(one.log_density.sum()))
+        if gain(both, before)[0] <= self.needed:
+            return before
+        return self.refits.searched_anew(both, both.fallen_from(before))
 
     def or_first_of(self, pair: tuple[Trial, Trial] | None, winner: Trial | None) -> Trial | None:
         """The best single cause, or the first of an established pair that brings more.
@@ -310,7 +322,7 @@ class _Searcher:
         sure = partial(_sure, divisor=divisor)
         for _ in range(MOST_SWAPS):
             best, lesser = self._pruned(best, lesser, divisor)
-            rivals = self._rivals(best, lesser, chain, steps)
+            rivals = self._rivals(best, lesser, steps)
             others = (one for some in rivals for one in some)
             better = max(others, key=sure, default=best)
             if sure(better) > sure(best) and self.refits.is_nothing(better, best, divisor):
@@ -319,7 +331,7 @@ class _Searcher:
                 break
             best, lesser = better, self._lesser(better, better.causes)
         else:
-            rivals = self._rivals(best, lesser, chain, steps)
+            rivals = self._rivals(best, lesser, steps)
         return best, lesser, rivals
 
     def established(self, best: Trial) -> tuple[Trial, tuple[Trial, ...]]:
@@ -356,9 +368,7 @@ class _Searcher:
             found = found.mended(doubtful(found.fit.fits), seed=self.seed)
         return found.continued() if gain(best, found)[0] < PLAIN * self.needed else found
 
-    def _rivals(
-        self, best: Trial, lesser: Sequence[Trial], chain: Sequence[Trial], steps: Sequence[Step]
-    ) -> tuple[tuple[Trial, ...], ...]:
+    def _rivals(self, best: Trial, lesser: Sequence[Trial], steps: Sequence[Step]) -> tuple[tuple[Trial, ...], ...]:
         """For each cause of a model: models in which another one takes its place.
 
         A rival was tried when that cause was, and came close to it; what happened once may as well have been something
@@ -366,14 +376,14 @@ class _Searcher:
         """
         found = []
         for cause, without in zip(best.causes, lesser, strict=True):
-            base, step = _tried_at(cause, chain, steps)
+            step = _tried_at(cause, steps)
             others = [one for one in step.tried if one.causes[-1].name not in best.names]
             if len(best.causes) > 1 or step is not steps[0]:
-                least = HOPEFUL * max(gain(one, base)[0] for one in step.tried)
+                least = HOPEFUL * max(gain(one, step.base)[0] for one in step.tried)
                 close = {
                     one.causes[-1].name
                     for one in others
-                    if gain(one, base)[0] > least and not one.patches(one.causes[-1])
+                    if gain(one, step.base)[0] > least and not one.patches(one.causes[-1])
                 }
                 again = [one for one in step.left.scores if one.effect.name in close][:MOST_RIVALS]
                 others = self.refits.made_of(without, again)
@@ -388,13 +398,13 @@ class _Searcher:
         return tuple(found)
 
 
-def _tried_at(cause: Effect, chain: Sequence[Trial], steps: Sequence[Step]) -> tuple[Trial, Step]:
-    """The model and the step at which a cause was tried first; a wall or a disc that kicks led to, where these were."""
+def _tried_at(cause: Effect, steps: Sequence[Step]) -> Step:
+    """The step at which a cause was tried first; for a wall or a disc that kicks led to, that of these."""
     for name in (cause.name, ExternalImpulse.name):
-        for base, step in zip(chain, steps, strict=True):
-            if any(one.name == name for trial in step.tried for one in trial.beyond(base)):
-                return base, step
-    return chain[0], steps[0]
+        for step in steps:
+            if any(one.name == name for trial in step.tried for one in trial.beyond(step.base)):
+                return step
+    return steps[0]
 
 
 def _sure(trial: Trial, divisor: Float[np.ndarray, "video"]) -> float:

@@ -270,10 +270,16 @@ class Trial:
         return self if fit is self.fit else replace(self, fit=fit)
 
     def with_courses_of(self, other: "Trial") -> "Trial":
-        """The fit with what happens in another one, of the same causes, in videos that are more probable there."""
+        """The fit with what happens in another one, of the same causes, in videos that are more probable there.
+
+        Where not all of them can follow, with that in the one that is most so.
+        """
         fallen = self._fallen_from(other)
-        fit = self.fit.with_courses_of(other.fit, fallen) if fallen else self.fit
-        return self if fit is self.fit else replace(self, fit=fit)
+        for chosen in (fallen, fallen[:1]):
+            fit = self.fit.with_courses_of(other.fit, chosen) if chosen else self.fit
+            if fit is not self.fit:
+                return replace(self, fit=fit)
+        return self
 
     def with_other_courses(self, *, seed: int) -> "Trial":
         """The fit with all videos searched anew; itself where that finds nothing much better, or with kicks."""

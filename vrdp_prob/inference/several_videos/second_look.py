@@ -148,7 +148,7 @@ def look_again(
     optimiser
         What refines starts.
     held
-        Numbers of each video that are not unknown though the model has them; none where None.
+        Numbers of each video's own that are not unknown though the model has them; none where None.
     """
     if not chosen:
         return list(fits)

@@ -44,8 +44,23 @@ def test_the_first_of_two_is_what_brings_most_but_for_kicks_where_all_else_is_no
         one.brought.return_value = brought
     nothing.lacking = lacking
     monkeypatch.setattr(refits, "mends_any_course", lambda cause: cause == "kicks")
+    monkeypatch.setattr(refits, "happens_once", lambda cause: cause == "kicks")
     found = refits_with(needed=least).provisional(nothing, [drag, kicks, tilt])
     assert found is (tilt if name else None)
+
+
+@pytest.mark.parametrize(("brought", "taken"), [(95.0, "drag"), (60.0, "lost frames")], ids=["nearly as much", "less"])
+def test_a_law_that_brings_nearly_as_much_as_lost_frames_comes_before_these(
+    brought: float, taken: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Frames are held where they seem to be lost for want of a law."""
+    nothing, drag, frames = (refit_with(*one) for one in (("", 0.0), ("drag", 0.5), ("lost frames", 1.0)))
+    nothing.lacking, drag.brought.return_value, frames.brought.return_value = 50.0, brought, 100.0
+    monkeypatch.setattr(refits, "mends_any_course", lambda _cause: False)
+    monkeypatch.setattr(refits, "happens_once", lambda cause: cause == "lost frames")
+    found = refits_with(needed=2.0).provisional(nothing, [drag, frames])
+    assert found is not None
+    assert found.causes == (taken,)
 
 
 @pytest.mark.parametrize(("loses_most", "taken"), [(True, "drag"), (False, "tilt")])
@@ -57,6 +72,7 @@ def test_a_law_is_none_to_go_on_from_that_loses_most_videos_which_were_explained
         one.brought.return_value, one.lacking = brought, 50.0
     tilt.loses_most_of.return_value = loses_most
     monkeypatch.setattr(refits, "mends_any_course", lambda _cause: False)
+    monkeypatch.setattr(refits, "happens_once", lambda _cause: False)
     found = refits_with(needed=2.0).provisional(nothing, [drag, tilt])
     assert found is not None
     assert found.causes == (taken,)
@@ -94,6 +110,7 @@ def test_lost_videos_of_the_best_cause_are_searched_before_lesser_causes_are_tri
         return [radius if one is clear else lens for one in scores]
 
     monkeypatch.setattr(refits, "mends_any_course", lambda _cause: False)
+    monkeypatch.setattr(refits, "happens_once", lambda _cause: False)
     monkeypatch.setattr(refits, "lost_videos", lambda _fits: lost)
     monkeypatch.setattr(refits, "explained", lambda _fits: explains)
     monkeypatch.setattr(refits.Refits, "_asked_by_most", lambda _self, _trial: [])

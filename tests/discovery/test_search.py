@@ -116,6 +116,21 @@ def test_videos_with_kicks_are_searched_anew_without_them(
     tilt.mended.assert_called_once_with([2], seed=0, thorough=True)
 
 
+@pytest.mark.parametrize(("share", "searched"), [(0.6, [[1]]), (0.4, [])], ids=["most of it", "less than half"])
+def test_a_video_in_which_a_cause_brings_most_is_searched_without_it(
+    share: float, searched: list[list[int]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    base, winner = refit_with("", 0.0), refit_with("drag", 10.0)
+    winner.log_density = 30.0 * np.array([0.3, share, 0.7 - share])
+    winner.without.return_value = base
+    asked: list[list[int]] = []
+    monkeypatch.setattr(search, "mends_any_course", lambda _cause: False)
+    monkeypatch.setattr(refits.Refits, "searched_anew", lambda _self, one, videos: asked.append(videos) or one)
+    _judge_by_gain(monkeypatch)
+    assert _searcher(needed=2.0).chosen(base, search.Step(base, Mock(spec=refits.Left), (winner,))) == (base, winner)
+    assert asked == searched
+
+
 def test_a_better_course_is_not_gone_on_from_with_a_video_that_has_lost_its_own(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

@@ -97,10 +97,13 @@ def test_no_video_of_a_null_is_lost() -> None:
     assert fit.with_lost_courses(seed=0) is fit
 
 
-@pytest.mark.parametrize(("better", "searches"), [(0, 1), (1, 2), (5, 3)])
-def test_lost_videos_are_searched_as_long_as_that_finds_more(
-    better: int, searches: int, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize(
+    ("better", "single", "searches"), [(0, False, 1), (1, False, 2), (5, False, 3), (0, True, 3), (1, True, 3)]
+)
+def test_lost_videos_are_searched_as_long_as_that_finds_more_and_single_ones_several_times(
+    better: int, searches: int, *, single: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    monkeypatch.setattr(fitting, "loses_single_videos", lambda _fits: single)
     monkeypatch.setattr(fitting, "lost_together", lambda _fits: [[2]])
     monkeypatch.setattr(fitting, "lost_videos", lambda _fits: [2])
     chain = [_fit(float(number)) for number in range(better + 1)]
@@ -119,6 +122,7 @@ def test_where_the_worst_are_not_found_the_other_lost_ones_are_searched_and_none
     second.fits = ["found"]
     first.mended.side_effect = lambda videos, **_how: second if videos == [3] else first
     second.mended.return_value = second
+    monkeypatch.setattr(fitting, "loses_single_videos", lambda _fits: False)
     monkeypatch.setattr(fitting, "lost_together", lambda _fits: [[1], [3]])
     monkeypatch.setattr(
         fitting, "lost_videos", lambda fits: ([1, 0] if loses else [1]) if fits == ["found"] else [1, 3]

@@ -37,6 +37,8 @@ ESTABLISHED = 0.8
 """Probability that a cause must have beside the model without it."""
 FIRST_SHARE = 0.2
 """Share of what a model lacks that a cause must bring to be gone on from before all others are tried."""
+NEARLY = 0.8
+"""Share of what a jump of the clock brings from which a law comes first."""
 PLAIN_TURNS = 4
 """Turns from which walls and discs that explain them need no comparison with what else may have been there."""
 SHORT, MENDINGS = 0.5, 3
@@ -166,9 +168,16 @@ class Refits:
         return found
 
     def provisional(self, trial: Trial, found: Sequence[Trial]) -> Trial | None:
-        """The cause that brings most where all else is noise, but for kicks: enough, and a good part of what lacks."""
+        """The cause that brings most where all else is noise, but for kicks: enough, and a good part of what lacks.
+
+        What happens once is found where it seems to have happened for want of a law, and is held there: a law that
+        brings nearly as much comes first.
+        """
         possible = [one for one in explaining(found) if not one.loses_most_of(trial)]
-        first = max(possible, key=lambda one: one.brought(trial) + one.log_prior, default=trial)
+        first = max(possible, key=partial(_brings, trial=trial), default=trial)
+        laws = [one for one in possible if not happens_once(one.causes[-1])]
+        law = max(laws, key=partial(_brings, trial=trial), default=first)
+        first = law if law.brought(trial) > NEARLY * first.brought(trial) else first
         return None if first.brought(trial) < max(self.needed, FIRST_SHARE * trial.lacking) else first
 
     def _with_best_searched(self, trial: Trial, found: Sequence[Trial]) -> list[Trial]:
@@ -409,6 +418,11 @@ class Refits:
 def merit(trial: Trial) -> float:
     """By which models are ordered: what they predict of left-out videos, less what their causes are believed less."""
     return float(trial.log_density.sum()) + trial.log_prior
+
+
+def _brings(one: Trial, trial: Trial) -> float:
+    """Gain of a model over one with less where all else is noise, less what its causes are believed less."""
+    return one.brought(trial) + one.log_prior
 
 
 def explaining(trials: Sequence[Trial]) -> list[Trial]:

@@ -23,6 +23,8 @@ MOST_CAUSES = 5
 MOST_SWAPS, MOST_ROUNDS = 3, 3
 OUT_OF_REACH = 2.0
 """Gain, in those that are needed, by which a cause is ahead of others for none of them to be as probable as it is."""
+MOSTLY = 0.5
+"""Share of what a cause brings that is brought in one video if it may be a course of events there."""
 PLAIN = 50.0
 """Gain of a cause, in those that are needed, from which it is not put in doubt again."""
 FALSE_ALARM = 0.05
@@ -237,14 +239,15 @@ class _Searcher:
 
         Where the winner's refit has found a better course of events in some videos, that is no merit of the cause,
         though others may need the cause for theirs, and the model with that course is the one to go on from; so it is
-        where a search finds one that the winner's kicks stood for.
+        where a search finds one that the winner's kicks stood for, or what it brings in a single video.
         """
         winner = next((one for one in step.tried[:1] if gain(one, trial)[0] >= self.needed), None)
         if winner is not None:
             without = winner.without(*winner.beyond(trial))
             trial = self._with_both_courses(without, trial)
-            if mends_any_course(winner.causes[-1]):
-                mended = self.refits.searched_anew(trial, winner.acting(winner.causes[-1]))
+            kicked = winner.acting(winner.causes[-1]) if mends_any_course(winner.causes[-1]) else []
+            if mendable := kicked or _in_one_video(winner, trial):
+                mended = self.refits.searched_anew(trial, mendable)
                 trial = mended if gain(mended, trial)[0] > self.needed else trial
             if self.doubted(winner, trial, self.refits.left(winner).overdispersion):
                 winner = None
@@ -278,9 +281,6 @@ class _Searcher:
         Videos that have lost their course with it are searched anew. A cause beside which both courses are kept would
         have the credit for the one that is lost without it.
         """
-        hoped = float(np.maximum(found.fitted_density - before.fitted_density, 0.0).sum())
-        if hoped <= self.needed:
-            return before
         ways = (found.with_courses_of(before), before.with_courses_of(found))
         both = max(ways, key=lambda one: float(one.log_density.sum()))
         if gain(both, before)[0] <= self.needed:
@@ -405,6 +405,13 @@ def _tried_at(cause: Effect, steps: Sequence[Step]) -> Step:
             if any(one.name == name for trial in step.tried for one in trial.beyond(step.base)):
                 return step
     return steps[0]
+
+
+def _in_one_video(trial: Trial, base: Trial) -> list[int]:
+    """The video in which a model gains most of what it gains, if there is one."""
+    gained = trial.log_density - base.log_density
+    most = int(np.argmax(gained))
+    return [most] if gained[most] > MOSTLY * gained.sum() else []
 
 
 def _sure(trial: Trial, divisor: Float[np.ndarray, "video"]) -> float:

@@ -25,6 +25,7 @@ from vrdp_prob.inference.several_videos.linking import check_names, link
 from vrdp_prob.inference.several_videos.parts import carried_starts, fit_alone, link_fits
 from vrdp_prob.inference.several_videos.second_look import (
     look_again,
+    loses_single_videos,
     lost_together,
     lost_videos,
     may_take_another_course,
@@ -244,7 +245,11 @@ class SharedFit:
         return _finished(found, self.model, fits, tuple(structures), self.shared, model_error=False)
 
     def with_lost_courses(self, *, seed: int) -> "SharedFit":
-        """The fit with its lost videos searched anew, as long as that finds more and loses no other one."""
+        """The fit with its lost videos searched anew, as long as that finds more and loses no other one.
+
+        Single lost videos of a model that explains the others are searched several times: it is their course that they
+        lack.
+        """
         found = self
         for search in range(SEARCHES):
             before = found
@@ -253,7 +258,7 @@ class SharedFit:
                 if better is not found and set(lost_videos(better.fits)) <= set(lost_videos(found.fits)):
                     found = better
                     break
-            if found is before:
+            if found is before and not loses_single_videos(found.fits):
                 break
         return found
 

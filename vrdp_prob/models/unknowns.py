@@ -120,8 +120,8 @@ def unknowns(
     return Coordinates(tuple(one for one in entries if (one.field, one.owner) not in structure.held), defaults)
 
 
-def structure_of(coordinates: Coordinates) -> Structure:
-    """Which bodies have which unknowns in a fit."""
+def structure_of(coordinates: Coordinates, held: Held | None = None) -> Structure:
+    """Which bodies have which unknowns in a fit; what is `held` in it, its coordinates do not tell."""
     owners = {
         field: frozenset(e.owner for e in coordinates.entries if e.field == field and e.owner is not None)
         for field in ("velocity_x", MASS.name, RESTITUTION.name, "angle")
@@ -133,6 +133,7 @@ def structure_of(coordinates: Coordinates) -> Structure:
         colliding=owners[MASS.name] & owners[RESTITUTION.name],
         bouncing=owners[RESTITUTION.name],
         passing=owners["angle"] - owners[RESTITUTION.name],
+        held=held or {},
     )
 
 

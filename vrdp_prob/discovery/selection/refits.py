@@ -174,9 +174,10 @@ class Refits:
         brings nearly as much comes first.
         """
         possible = [one for one in explaining(found) if not one.loses_most_of(trial)]
-        first = max(possible, key=partial(_brings, trial=trial), default=trial)
-        laws = [one for one in possible if not happens_once(one.causes[-1])]
-        law = max(laws, key=partial(_brings, trial=trial), default=first)
+        brings = partial(_brings, trial=trial)
+        first = max(possible, key=brings, default=trial)
+        laws = (one for one in possible if not happens_once(one.causes[-1]))
+        law = max(laws, key=brings, default=first)
         first = law if law.brought(trial) > NEARLY * first.brought(trial) else first
         return None if first.brought(trial) < max(self.needed, FIRST_SHARE * trial.lacking) else first
 

@@ -212,9 +212,7 @@ class SharedFit:
             return self
         structures = list(self.structures)
         for index in changed:
-            structures[index] = replace(
-                structure_of(fits[index].likelihood.coordinates), held=self.structures[index].held
-            )
+            structures[index] = structure_of(fits[index].likelihood.coordinates, self.structures[index].held)
         return self._with_fits(fits, structures, rest)
 
     def with_courses_of(self, other: "SharedFit", chosen: Sequence[int]) -> "SharedFit":
@@ -227,8 +225,9 @@ class SharedFit:
         chosen
             The videos.
         """
-        fits = [(other if index in chosen else self).fits[index] for index in range(len(self.fits))]
-        structures = [(other if index in chosen else self).structures[index] for index in range(len(self.fits))]
+        fits, structures = list(self.fits), list(self.structures)
+        for index in chosen:
+            fits[index], structures[index] = other.fits[index], other.structures[index]
         return self._with_fits(fits, structures, self.joint)
 
     def _with_fits(self, fits: Sequence[MapFit], structures: Sequence[Structure], agreed: JointFit) -> "SharedFit":

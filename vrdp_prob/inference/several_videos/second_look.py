@@ -158,7 +158,7 @@ def look_again(
     ways = [(believing, replace(plan, optimiser=optimiser)) for believing, plan in ways]
     among = range(len(fits)) if asked is None else asked
     structures = [
-        replace(structure_of(fit.likelihood.coordinates), held=known)
+        structure_of(fit.likelihood.coordinates, known)
         for fit, known in zip(fits, held or [{}] * len(fits), strict=True)
     ]
     look = _Look(model, _told(fits, structures, model, shared, among, islands=islands), goal, seed, tuple(ways))
@@ -236,7 +236,7 @@ class _Look:
             found = fit_map(best.clues.tracks, model, generator, plan=plan, model_error=False, held=doubted.held)
             gained = best.misfit.residual_sd / found.misfit.residual_sd - 1
             if gained > SAME and found.log_density > best.log_density - FELL:
-                structure = replace(structure_of(found.likelihood.coordinates), held=doubted.held)
+                structure = structure_of(found.likelihood.coordinates, doubted.held)
                 likelihood = plain_likelihood(found.clues, self.model, structure)
                 best = better = replace(found, likelihood=likelihood)
             if best.misfit.residual_sd < self.goal:

@@ -68,14 +68,14 @@ def test_a_second_wall_is_guessed_with_numbers_of_its_own(kicked: Trial) -> None
 def test_a_second_wall_is_looked_for_beside_the_first_alone(kicked: Trial) -> None:
     catalogue = (Wall(), SecondWall(), ThirdWall(), SurfaceTilt())
     refits = Refits(catalogue, seed=0, needed=6.0, advance=lambda _count: None)
-    assert [one.name for one in refits.further(kicked)] == ["wall", "surface_tilt"]
+    assert [one.name for one in refits.leavings.further(kicked)] == ["wall", "surface_tilt"]
     model = kicked.fit.model
     for there, further in ((catalogue[:1], "second_wall"), (catalogue[:2], "third_wall")):
         extended = model
         for effect in there:
             extended = extended.with_effect(effect)
         trial = replace(kicked, fit=replace(kicked.fit, model=extended))
-        assert [one.name for one in refits.further(trial)] == [further, "surface_tilt"]
+        assert [one.name for one in refits.leavings.further(trial)] == [further, "surface_tilt"]
 
 
 def test_further_things_are_ways_of_their_cause_and_change_no_threshold() -> None:

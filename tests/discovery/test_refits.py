@@ -1,15 +1,17 @@
 """Which causes are tried on a model, and which videos are searched anew for it."""
 
-from unittest.mock import Mock, create_autospec
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
 
 from tests.discovery.stand_ins import refit_with, refits_with, without_tracks
 from vrdp_prob.discovery.candidates.scores import CauseScore
-from vrdp_prob.discovery.candidates.surfaces import Placed
 from vrdp_prob.discovery.finding import Check
-from vrdp_prob.discovery.selection import refits
+from vrdp_prob.discovery.selection import courses, extensions, leavings, refits
+from vrdp_prob.discovery.selection.courses import Courses
+from vrdp_prob.discovery.selection.extensions import Extensions
+from vrdp_prob.discovery.selection.leavings import Leavings, Left
 from vrdp_prob.discovery.selection.trials import Trial
 from vrdp_prob.inference.several_videos.ascent import ImpossibleStartError
 from vrdp_prob.models.effects.bowl import Bowl
@@ -43,7 +45,7 @@ def test_the_first_of_two_is_what_brings_most_but_for_kicks_where_all_else_is_no
     for one, brought in ((nothing, 0.0), (tilt, 60.0), (drag, 20.0), (kicks, 90.0)):
         one.brought.return_value = brought
     nothing.lacking = lacking
-    monkeypatch.setattr(refits, "mends_any_course", lambda cause: cause == "kicks")
+    monkeypatch.setattr(extensions, "mends_any_course", lambda cause: cause == "kicks")
     monkeypatch.setattr(refits, "happens_once", lambda cause: cause == "kicks")
     found = refits_with(needed=least).provisional(nothing, [drag, kicks, tilt])
     assert found is (tilt if name else None)
@@ -56,7 +58,7 @@ def test_a_law_that_brings_nearly_as_much_as_lost_frames_comes_before_these(
     """Frames are held where they seem to be lost for want of a law."""
     nothing, drag, frames = (refit_with(*one) for one in (("", 0.0), ("drag", 0.5), ("lost frames", 1.0)))
     nothing.lacking, drag.brought.return_value, frames.brought.return_value = 50.0, brought, 100.0
-    monkeypatch.setattr(refits, "mends_any_course", lambda _cause: False)
+    monkeypatch.setattr(extensions, "mends_any_course", lambda _cause: False)
     monkeypatch.setattr(refits, "happens_once", lambda cause: cause == "lost frames")
     found = refits_with(needed=2.0).provisional(nothing, [drag, frames])
     assert found is not None
@@ -71,7 +73,7 @@ def test_a_law_is_none_to_go_on_from_that_loses_most_videos_which_were_explained
     for one, brought in ((nothing, 0.0), (tilt, 60.0), (drag, 20.0)):
         one.brought.return_value, one.lacking = brought, 50.0
     tilt.loses_most_of.return_value = loses_most
-    monkeypatch.setattr(refits, "mends_any_course", lambda _cause: False)
+    monkeypatch.setattr(extensions, "mends_any_course", lambda _cause: False)
     monkeypatch.setattr(refits, "happens_once", lambda _cause: False)
     found = refits_with(needed=2.0).provisional(nothing, [drag, tilt])
     assert found is not None
@@ -109,15 +111,15 @@ def test_lost_videos_of_the_best_cause_are_searched_before_lesser_causes_are_tri
             asked.append([one.effect.name for one in scores])
         return [radius if one is clear else lens for one in scores]
 
-    monkeypatch.setattr(refits, "mends_any_course", lambda _cause: False)
+    monkeypatch.setattr(extensions, "mends_any_course", lambda _cause: False)
     monkeypatch.setattr(refits, "happens_once", lambda _cause: False)
     monkeypatch.setattr(refits, "lost_videos", lambda _fits: lost)
     monkeypatch.setattr(refits, "explained", lambda _fits: explains)
     monkeypatch.setattr(refits.Refits, "_asked_by_most", lambda _self, _trial: [])
-    monkeypatch.setattr(refits.Refits, "left", lambda _self, _trial: refits.Left((clear, faint), (), np.ones(3)))
+    monkeypatch.setattr(Leavings, "of", lambda _self, _trial: Left((clear, faint), (), np.ones(3)))
     monkeypatch.setattr(refits.Refits, "settled", lambda _self, _trial, made: found in made)
-    monkeypatch.setattr(refits.Refits, "made_of", made_of)
-    monkeypatch.setattr(refits.Refits, "searched_anew", lambda _self, one, videos: found if mends else one)
+    monkeypatch.setattr(Extensions, "made_of", made_of)
+    monkeypatch.setattr(Courses, "searched_anew", lambda _self, one, videos: found if mends else one)
     made = refits_with(needed=2.0)._new(nothing)
     assert asked == tried
     assert made[0] is (found if tried == [[RADIUS]] else radius)
@@ -133,49 +135,11 @@ def test_where_walls_that_tracks_show_are_plain_nothing_else_is_tried(
 ) -> None:
     plain, walls, drag = refit_with("", 0.0), refit_with("wall+second_wall", 20.0), refit_with("drag", 5.0)
     monkeypatch.setattr(refits.Refits, "_placed", lambda _self, _trial: [Mock(seen=Mock(turns=turns))])
-    monkeypatch.setattr(refits.Refits, "_met", lambda _self, _trial, _placed: walls)
+    monkeypatch.setattr(Extensions, "with_surfaces", lambda _self, _trial, _placed: walls)
     monkeypatch.setattr(refits.Refits, "_new", lambda _self, _trial: [drag])
-    monkeypatch.setattr(refits.Refits, "left", Mock())
+    monkeypatch.setattr(Leavings, "of", Mock())
     monkeypatch.setattr(refits.Refits, "doubted", lambda *_given: doubted)
     assert refits_with(needed=6.0).of(plain) == ([walls] if alone else [walls, drag])
-
-
-@pytest.mark.parametrize(
-    ("stated", "explains", "leaves", "near", "taken"),
-    [
-        (20.0, True, False, 30.0, "stated"),
-        (20.0, True, True, 30.0, "near"),
-        (20.0, True, True, 10.0, "stated"),
-        (20.0, False, True, 30.0, "stated"),
-        (None, True, True, 30.0, "near"),
-        (None, True, True, None, None),
-    ],
-    ids=["nothing left", "a little off", "not off", "lost anyway", "overlaps what is seen", "no world"],
-)
-def test_walls_that_may_be_a_little_off_are_unknown_from_the_beginning(
-    stated: float | None,
-    near: float | None,
-    taken: str | None,
-    *,
-    explains: bool,
-    leaves: bool,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    """Where those that count as stated explain the videos and leave something, or have no world."""
-
-    def fitted(_trial: Trial, _placed: object, walls: list[object], *, seed: int) -> tuple[str, float]:
-        gained = stated if walls else near
-        if gained is None:
-            raise ImpossibleStartError
-        return ("stated" if walls else "near"), gained
-
-    monkeypatch.setattr(refits, "fit_with_surfaces", fitted)
-    monkeypatch.setattr(refits, "explained", lambda _fits: explains)
-    monkeypatch.setattr(refits.Refits, "_leaves_something", lambda _self, _trial: leaves)
-    trial = refit_with("", 0.0)
-    trial.and_causes.side_effect = lambda _causes, fit: refit_with(*fit)
-    found = refits_with()._met(trial, [create_autospec(Placed, instance=True, effect=SurfaceTilt(), wall=Mock())])
-    assert (None if found is None else found.causes[0]) == taken
 
 
 @pytest.mark.parametrize("enough", [True, False], ids=["enough", "too little"])
@@ -237,8 +201,8 @@ def test_a_cause_has_its_few_lost_videos_searched_anew(
     tilt.fallen_from.return_value = anew.fallen_from.return_value = []
     kicks = Mock(spec=CauseScore, effect=ExternalImpulse(), sites=[Mock(video=video) for video in kicked])
     monkeypatch.setattr(refits, "lost_videos", lambda _fit: lost)
-    monkeypatch.setattr(refits, "may_take_another_course", lambda _fit: True)
-    monkeypatch.setattr(refits.Refits, "left", lambda _self, _trial: Mock(scores=[kicks], beside_chance=[]))
+    monkeypatch.setattr(courses, "may_take_another_course", lambda _fit: True)
+    monkeypatch.setattr(Leavings, "of", lambda _self, _trial: Mock(scores=[kicks], beside_chance=[]))
     monkeypatch.setattr(refits.Refits, "_new", lambda _self, _trial: [drag, tilt])
     found = refits_with()
     first = found.with_lost_found(nothing, tilt)
@@ -269,90 +233,11 @@ def test_where_a_cause_leaves_something_all_videos_are_searched_anew(
     left = Mock(scores=[], beside_chance=[Mock(p_value=p_value)])
     monkeypatch.setattr(refits, "lost_videos", lambda _fit: [])
     monkeypatch.setattr(refits, "explained", lambda _fits: explains)
-    monkeypatch.setattr(refits.Refits, "left", lambda _self, _trial: left)
+    monkeypatch.setattr(Leavings, "of", lambda _self, _trial: left)
     monkeypatch.setattr(refits.Refits, "_new", lambda _self, _trial: [tilt])
     found = refits_with()
     assert found.with_lost_found(nothing, tilt).causes == (taken,)
     assert [one.causes[0] for one in found.of(nothing)] == [taken]
-
-
-def test_a_video_is_searched_again_only_where_the_last_search_has_found_something_or_it_has_fallen_since(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    tilt, followed, better = refit_with("tilt", 5.0), refit_with("two videos followed", 7.0), refit_with("all did", 9.0)
-    tilt.fit = better.fit = Mock(fits=[""] * 4)
-    tilt.mended.return_value, followed.mended.return_value, better.mended.return_value = followed, better, better
-    tilt.fallen_from.return_value = [2]
-    followed.fallen_from.side_effect = lambda other: [3] if other is tilt else []
-    better.fallen_from.return_value = []
-    monkeypatch.setattr(refits, "may_take_another_course", lambda _fit: True)
-    found = refits_with()
-    assert found.searched_anew(tilt, [1, 2]) is better
-    for _ in range(2):
-        assert found.searched_anew(better, [1, 2]) is better
-    tilt.mended.assert_called_once_with([1, 2], seed=0, thorough=True)
-    followed.mended.assert_called_once_with([3], seed=0)
-    better.mended.assert_called_once_with([2], seed=1, thorough=True)
-
-
-@pytest.mark.parametrize("is_wrong", [True, False], ids=["lost", "explained still"])
-def test_a_course_for_which_another_video_loses_its_own_is_a_wrong_one(
-    *, is_wrong: bool, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    tilt, other = refit_with("tilt", 5.0), refit_with("another course", 9.0)
-    tilt.fit = other.fit = Mock(fits=[""] * 4)
-    tilt.mended.return_value = other.mended.return_value = other
-    tilt.fallen_from.return_value, other.fallen_from.return_value = [], [3]
-    other.loses_videos_of.return_value = is_wrong
-    monkeypatch.setattr(refits, "may_take_another_course", lambda _fit: True)
-    found = refits_with()
-    for _ in range(2 if is_wrong else 1):
-        assert found.searched_anew(tilt, [2]) is (tilt if is_wrong else other)
-    tilt.mended.assert_called_once_with([2], seed=0, thorough=True)
-
-
-@pytest.mark.parametrize(("brought", "followed"), [(200.0, True), (500.0, False)], ids=["less", "as promised"])
-def test_the_most_promising_cause_is_followed_whatever_others_have_brought(
-    brought: float, *, followed: bool, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(refits, "mends_any_course", lambda _cause: False)
-    effects = {name: Mock() for name in ("wind", "patch")}
-    names = ("wind", "wind", "wind", "patch")
-    wind, further, found, patch = all_ = [
-        refit_with(name, gained) for name, gained in zip(names, (1, 2, 9, 3), strict=True)
-    ]
-    for one, name, gained in zip(all_, names, (brought, 400.0, 2000.0, 1000.0), strict=True):
-        effects[name].name = name
-        one.causes, one.brought.return_value = (effects[name],), gained
-        one.fallen_from.return_value = [1] if one is further else []
-        one.fit.joint.converged = one is not wind
-    wind.continued.return_value, further.mended.return_value = further, found
-    nothing = refit_with("", 0.0)
-    nothing.with_cause = lambda score: wind if score.effect is effects["wind"] else patch
-    sizes = {"wind": 900.0, "patch": 600.0}
-    scores = [Mock(spec=CauseScore, effect=effects[name], size=size) for name, size in sizes.items()]
-    assert refits_with().made_of(nothing, scores)[0] is (found if followed else patch)
-
-
-def _broken_off(promised: float) -> tuple[Mock, Mock, Mock]:
-    """A model, its refit with a cause, which has lost a video and brings nothing, and what the score had promised."""
-    refit, effect = refit_with("cause", -1.0), Mock()
-    effect.name, refit.causes, refit.fit.joint.converged = "cause", (effect,), False
-    refit.brought.return_value, refit.fallen_from.return_value = -3.0, [1]
-    refit.continued.return_value = refit.mended.return_value = refit
-    nothing = refit_with("", 0.0)
-    nothing.with_cause = lambda _score: refit
-    return nothing, refit, Mock(spec=CauseScore, effect=effect, size=promised)
-
-
-@pytest.mark.parametrize(("promised", "followed"), [(20.0, True), (10.0, False)], ids=["enough", "too little"])
-def test_a_cause_is_not_followed_that_promises_less_than_it_needs(
-    promised: float, *, followed: bool, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(refits, "mends_any_course", lambda _cause: False)
-    nothing, refit, score = _broken_off(promised)
-    assert refits_with(needed=6.0).made_of(nothing, [score]) == [refit]
-    assert refit.continued.called is followed
 
 
 @pytest.mark.parametrize(
@@ -381,7 +266,7 @@ def test_what_most_videos_ask_for_comes_first_where_few_have_gone_astray(
             (SurfaceTilt(), 50.0),
         )
     )
-    left = refits.Left((kicks,), (kicks, wide, clear, faint), np.ones(4))
+    left = Left((kicks,), (kicks, wide, clear, faint), np.ones(4))
     made: list[list[CauseScore]] = []
 
     def made_of(_self: object, _trial: Trial, asked: list[CauseScore], **_beside: object) -> list[Trial]:
@@ -395,9 +280,9 @@ def test_what_most_videos_ask_for_comes_first_where_few_have_gone_astray(
     monkeypatch.setattr(refits, "trusted", lambda _fits: usual)
     monkeypatch.setattr(refits, "outweigh", lambda fits, some: outweighing and (fits, some) == (trial.fit.fits, astray))
     monkeypatch.setattr(refits, "lost_videos", lambda fits: [] if fits == ["explained"] else [2])
-    monkeypatch.setattr(refits.Refits, "left", lambda _self, _trial: left)
-    monkeypatch.setattr(refits.Refits, "made_of", made_of)
-    monkeypatch.setattr(refits.Refits, "searched_anew", searched_anew)
+    monkeypatch.setattr(Leavings, "of", lambda _self, _trial: left)
+    monkeypatch.setattr(Extensions, "made_of", made_of)
+    monkeypatch.setattr(Courses, "searched_anew", searched_anew)
     monkeypatch.setattr(refits.Refits, "settled", lambda _self, _trial, _found: False)
     found = refits_with()
     if is_asked:
@@ -405,14 +290,6 @@ def test_what_most_videos_ask_for_comes_first_where_few_have_gone_astray(
         assert made == [[wide, clear]]
     else:
         assert found._asked_by_most(trial) == made == []
-
-
-@pytest.mark.parametrize("once", [True, False], ids=["kicks", "a law"])
-def test_a_refit_that_brings_nothing_is_followed_once_at_most(*, once: bool, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(refits, "mends_any_course", lambda _cause: once)
-    nothing, refit, score = _broken_off(20.0)
-    assert refits_with(needed=6.0).made_of(nothing, [score]) == [refit]
-    assert refit.mended.call_count == (0 if once else 1)
 
 
 @pytest.mark.parametrize(
@@ -424,7 +301,7 @@ def test_kicks_in_several_videos_explain_none_of_them_though_they_leave_nothing(
     nothing, found = refit_with("", 0.0), refit_with("", 90.0)
     found.causes, found.acting.return_value = (cause,), [0, 2]
     monkeypatch.setattr(refits, "gain", lambda trial, _base: (90.0 if trial is found else 0.0, 1.0))
-    monkeypatch.setattr(refits.Refits, "left", lambda _self, _trial: refits.Left((), (), np.ones(3)))
+    monkeypatch.setattr(Leavings, "of", lambda _self, _trial: Left((), (), np.ones(3)))
     assert refits_with(needed=6.0).settled(nothing, [found]) is explain
 
 
@@ -441,10 +318,10 @@ def test_beside_a_cause_none_is_tried_where_no_score_stands_out_from_chance(
     monkeypatch.setattr(refits, "lost_videos", lambda _fits: lost)
     clear, beside = (Mock(spec=CauseScore, effect=Bowl(), size=30.0, p_value=one, sites=()) for one in (1e-9, p_value))
     tried: list[list[CauseScore]] = []
-    monkeypatch.setattr(refits.Refits, "left", lambda _self, _trial: refits.Left((clear,), (beside,), np.ones(3)))
+    monkeypatch.setattr(Leavings, "of", lambda _self, _trial: Left((clear,), (beside,), np.ones(3)))
     monkeypatch.setattr(refits, "causes_with_own_check_failing", lambda _checks: set())
-    monkeypatch.setattr(refits.Refits, "checks", lambda _self, _trial: ())
-    monkeypatch.setattr(refits.Refits, "made_of", lambda _self, _trial, asked, **_beside: tried.append(asked) or [])
+    monkeypatch.setattr(Leavings, "checks", lambda _self, _trial: ())
+    monkeypatch.setattr(Extensions, "made_of", lambda _self, _trial, asked, **_beside: tried.append(asked) or [])
     assert refits_with(needed=6.0)._new(trial) == []
     assert ([clear] in tried) is is_tried
 
@@ -472,10 +349,10 @@ def test_a_cause_whose_own_check_fails_is_tried_where_nothing_brings_enough(
         return [other] if made[-1] == ["bowl"] else []
 
     failing = Check("friction of the bodies against mass", 0.07, 1e-9, True, "")
-    monkeypatch.setattr(refits, "run_checks", lambda _fit, *, seed: (failing,))
-    monkeypatch.setattr(refits.Refits, "made_of", made_of)
+    monkeypatch.setattr(leavings, "run_checks", lambda _fit, *, seed: (failing,))
+    monkeypatch.setattr(Extensions, "made_of", made_of)
     monkeypatch.setattr(refits.Refits, "settled", lambda _self, _trial, _found: True)
-    monkeypatch.setattr(refits.Refits, "left", lambda _self, _trial: refits.Left(scores, scores, np.ones(3)))
+    monkeypatch.setattr(Leavings, "of", lambda _self, _trial: Left(scores, scores, np.ones(3)))
     assert refits_with(needed=6.0).of(trial) == [other]
     assert (["mass_dependent_friction"] in made) is is_tried
 
@@ -484,10 +361,10 @@ def test_a_cause_with_which_no_joint_world_can_begin_is_left_out(monkeypatch: py
     def impossible(*_given: object, **_named: object) -> None:
         raise ImpossibleStartError
 
-    monkeypatch.setattr(refits, "fit_together", impossible)
+    monkeypatch.setattr(extensions, "fit_together", impossible)
     monkeypatch.setattr(refits, "lost_videos", lambda _fit: [0])
     monkeypatch.setattr(refits, "causes_of_lost_videos", lambda *_given, **_named: [((SurfaceTilt(),), 50.0)])
-    monkeypatch.setattr(refits.Refits, "left", lambda _self, _trial: Mock(scores=()))
+    monkeypatch.setattr(Leavings, "of", lambda _self, _trial: Mock(scores=()))
     trial = refit_with("", 0.0)
     trial.choices, trial.names, trial.fit = {}, (), Mock(fits=[], model=Mock(effects=()))
     assert refits_with()._lost(trial, []) == []

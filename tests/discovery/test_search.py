@@ -7,7 +7,10 @@ import pytest
 
 from tests.discovery.stand_ins import refit_with, refits_with, without_tracks
 from vrdp_prob.discovery.candidates.scores import CauseScore
-from vrdp_prob.discovery.selection import refits, search
+from vrdp_prob.discovery.selection import courses, refits, search
+from vrdp_prob.discovery.selection.courses import Courses
+from vrdp_prob.discovery.selection.extensions import Extensions
+from vrdp_prob.discovery.selection.leavings import Leavings, Left
 from vrdp_prob.discovery.selection.trials import Trial
 from vrdp_prob.models.effects.bowl import Bowl
 from vrdp_prob.models.effects.lens_distortion import LensDistortion
@@ -57,7 +60,7 @@ def test_two_causes_are_found_of_which_neither_stands_out_beside_chance(
     nothing, tilt, second = refit_with("", 0.0), refit_with("tilt", -1.0), refit_with("tilt+drag", both)
     monkeypatch.setattr(refits.Refits, "with_lost", lambda _self, trial: [second] if trial is tilt else [])
     monkeypatch.setattr(search._Searcher, "_in_order", lambda _self, _trial, found: found)
-    monkeypatch.setattr(refits.Refits, "left", Mock())
+    monkeypatch.setattr(Leavings, "of", Mock())
     monkeypatch.setattr(search._Searcher, "doubted", lambda *_given: in_doubt)
     assert _searcher(needed=2.0)._pair(nothing, tilt) == ((tilt, second) if is_found else None)
 
@@ -89,7 +92,7 @@ def test_what_a_better_course_of_events_brings_is_no_merit_of_the_cause(
 
     monkeypatch.setattr(search, "mends_any_course", lambda _cause: False)
     _judge_by_gain(monkeypatch)
-    base, found = _searcher(needed=2.0).chosen(nothing, search.Step(nothing, Mock(spec=refits.Left), (winner,)))
+    base, found = _searcher(needed=2.0).chosen(nothing, search.Step(nothing, Mock(spec=Left), (winner,)))
     assert base.causes[0] == goes_on_from
     assert (found and found.causes[0]) == taken
 
@@ -107,10 +110,10 @@ def test_videos_with_kicks_are_searched_anew_without_them(
     tilt.fallen_from.return_value = anew.fallen_from.return_value = []
     kicked.acting.return_value = [0, 2]
     tilt.fit = Mock(fits=["of one course only", "", ""])
-    monkeypatch.setattr(refits, "may_take_another_course", lambda fit: fit != "of one course only")
+    monkeypatch.setattr(courses, "may_take_another_course", lambda fit: fit != "of one course only")
     monkeypatch.setattr(search, "mends_any_course", lambda _cause: True)
     _judge_by_gain(monkeypatch)
-    base, winner = _searcher(needed=2.0).chosen(tilt, search.Step(tilt, Mock(spec=refits.Left), (kicked,)))
+    base, winner = _searcher(needed=2.0).chosen(tilt, search.Step(tilt, Mock(spec=Left), (kicked,)))
     assert base.causes[0] == goes_on_from
     assert (winner and winner.causes[0]) == taken
     tilt.mended.assert_called_once_with([2], seed=0, thorough=True)
@@ -125,9 +128,9 @@ def test_a_video_in_which_a_cause_brings_most_is_searched_without_it(
     winner.without.return_value = base
     asked: list[list[int]] = []
     monkeypatch.setattr(search, "mends_any_course", lambda _cause: False)
-    monkeypatch.setattr(refits.Refits, "searched_anew", lambda _self, one, videos: asked.append(videos) or one)
+    monkeypatch.setattr(Courses, "searched_anew", lambda _self, one, videos: asked.append(videos) or one)
     _judge_by_gain(monkeypatch)
-    assert _searcher(needed=2.0).chosen(base, search.Step(base, Mock(spec=refits.Left), (winner,))) == (base, winner)
+    assert _searcher(needed=2.0).chosen(base, search.Step(base, Mock(spec=Left), (winner,))) == (base, winner)
     assert asked == searched
 
 
@@ -144,10 +147,10 @@ def test_a_better_course_is_not_gone_on_from_with_a_video_that_has_lost_its_own(
     winner.without.return_value = without
     without.fallen_from.side_effect = lambda base: [1] if base is before else []
     without.mended.return_value, without.fit.fits = mended, ["explained", "lost", "explained"]
-    monkeypatch.setattr(refits, "may_take_another_course", lambda _fit: True)
+    monkeypatch.setattr(courses, "may_take_another_course", lambda _fit: True)
     monkeypatch.setattr(search, "mends_any_course", lambda _cause: False)
     _judge_by_gain(monkeypatch)
-    found, taken = _searcher(needed=5.0).chosen(before, search.Step(before, Mock(spec=refits.Left), (winner,)))
+    found, taken = _searcher(needed=5.0).chosen(before, search.Step(before, Mock(spec=Left), (winner,)))
     assert found is mended
     assert taken is None
     without.mended.assert_called_once_with([1], seed=0, thorough=True)
@@ -157,7 +160,7 @@ def _judge_by_gain(monkeypatch: pytest.MonkeyPatch) -> None:
     def doubted(_self: object, trial: Trial, lesser: Trial, _divisor: object) -> bool:
         return bool((trial.log_density - lesser.log_density).sum() < 2.0)
 
-    monkeypatch.setattr(refits.Refits, "left", Mock())
+    monkeypatch.setattr(Leavings, "of", Mock())
     monkeypatch.setattr(search._Searcher, "doubted", doubted)
 
 
@@ -174,7 +177,7 @@ def test_a_better_course_of_one_video_is_no_merit_of_the_cause_without_which_oth
         before.with_courses_of.side_effect = lambda other: {without: both}[other]
     monkeypatch.setattr(search, "mends_any_course", lambda _cause: False)
     _judge_by_gain(monkeypatch)
-    base, found = _searcher(needed=2.0).chosen(before, search.Step(before, Mock(spec=refits.Left), (winner,)))
+    base, found = _searcher(needed=2.0).chosen(before, search.Step(before, Mock(spec=Left), (winner,)))
     assert base is both
     assert (found and found.causes[0]) == taken
 
@@ -185,7 +188,7 @@ def test_of_several_walls_at_once_none_is_a_merit_of_a_better_course(monkeypatch
     walls.without.return_value = refit_with("tilt", 0.5)
     monkeypatch.setattr(search, "mends_any_course", lambda _cause: False)
     _judge_by_gain(monkeypatch)
-    step = search.Step(tilt, Mock(spec=refits.Left), (walls,))
+    step = search.Step(tilt, Mock(spec=Left), (walls,))
     assert _searcher(needed=2.0).chosen(tilt, step) == (tilt, walls)
     walls.without.assert_called_once_with("wall", "second_wall")
 
@@ -211,7 +214,7 @@ def test_a_course_found_beside_causes_is_handed_back_and_causes_are_looked_for_o
     monkeypatch.setattr(search._Searcher, "tried", tried)
     monkeypatch.setattr(search._Searcher, "chosen", lambda _self, trial, _step: chosen[trial])
     monkeypatch.setattr(search._Searcher, "_left_out", lambda _self, trial, *_causes: left_out[trial])
-    monkeypatch.setattr(refits.Refits, "left", lambda _self, _trial: refits.Left((), (), np.ones(3)))
+    monkeypatch.setattr(Leavings, "of", lambda _self, _trial: Left((), (), np.ones(3)))
     chain, steps = _searcher(needed=6.0).forward(plain)
     assert chain == ([mended] if needs_it else [mended, again])
     assert asked == [plain, friction, both, *chain]
@@ -250,8 +253,8 @@ def test_rivals_are_those_that_came_close_on_the_model_on_which_they_were_tried(
     tilt.causes, drag.causes, tilt.names = (SurfaceTilt(),), (LinearDrag(),), (SurfaceTilt.name,)
     clear = Mock(spec=CauseScore, effect=LinearDrag(), size=30.0)
     asked: list[list[CauseScore]] = []
-    monkeypatch.setattr(refits.Refits, "made_of", lambda _self, _trial, scores: asked.append(list(scores)) or [])
-    step = search.Step(plain, refits.Left((clear,), (), np.ones(3)), (tilt, drag))
+    monkeypatch.setattr(Extensions, "made_of", lambda _self, _trial, scores: asked.append(list(scores)) or [])
+    step = search.Step(plain, Left((clear,), (), np.ones(3)), (tilt, drag))
     assert _searcher()._rivals(tilt, (better,), [_step(), step]) == ((),)
     assert asked == [[clear]]
 
@@ -263,10 +266,8 @@ def test_what_a_better_course_leaves_is_scored_though_the_cause_remains(monkeypa
     monkeypatch.setattr(search._Searcher, "tried", search._Searcher.untried)
     monkeypatch.setattr(search._Searcher, "chosen", lambda _self, trial, _step: chosen[trial])
     monkeypatch.setattr(search._Searcher, "_left_out", lambda _self, _trial, *_causes: better)
-    left = {
-        one: refits.Left((), (), np.full(3, float(number))) for number, one in enumerate((plain, tilt, again, better))
-    }
-    monkeypatch.setattr(refits.Refits, "left", lambda _self, trial: left[trial])
+    left = {one: Left((), (), np.full(3, float(number))) for number, one in enumerate((plain, tilt, again, better))}
+    monkeypatch.setattr(Leavings, "of", lambda _self, trial: left[trial])
     chain, steps = _searcher(needed=6.0).forward(plain)
     assert chain == [better, again]
     assert [step.left for step in steps] == [left[better], left[again]]
@@ -274,7 +275,7 @@ def test_what_a_better_course_leaves_is_scored_though_the_cause_remains(monkeypa
 
 def _step(*tried: Trial) -> search.Step:
     """A step in which some causes were tried."""
-    return search.Step(refit_with("", 0.0), refits.Left((), (), np.ones(3)), tried)
+    return search.Step(refit_with("", 0.0), Left((), (), np.ones(3)), tried)
 
 
 def test_a_law_that_loses_most_videos_comes_last(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -304,7 +305,7 @@ def test_a_rival_takes_the_place_of_a_doubted_cause_where_it_explains_as_much(
     tilt.continued.return_value = tilt
     monkeypatch.setattr(search._Searcher, "_left_out", lambda _self, _best, _cause: nothing)
     _judge_by_gain(monkeypatch)
-    monkeypatch.setattr(refits.Refits, "left", lambda _self, _trial: Mock(spec=refits.Left, overdispersion=np.ones(3)))
+    monkeypatch.setattr(Leavings, "of", lambda _self, _trial: Mock(spec=Left, overdispersion=np.ones(3)))
     before = search.Search(nothing, bowl, (), (nothing,), ((tilt,),), refits_with(needed=2.0))
     found = before.with_rival(bowl.causes[0], lambda _trial: is_believed)
     assert (found.best if found else None) is (tilt if taken else None)
@@ -317,7 +318,7 @@ def test_what_brings_too_little_without_a_doubted_cause_goes_too(monkeypatch: py
     both.without.return_value, lens.continued.return_value = lens, lens
     monkeypatch.setattr(search._Searcher, "_left_out", lambda _self, _best, _cause: nothing)
     _judge_by_gain(monkeypatch)
-    monkeypatch.setattr(refits.Refits, "left", lambda _self, _trial: Mock(spec=refits.Left, overdispersion=np.ones(3)))
+    monkeypatch.setattr(Leavings, "of", lambda _self, _trial: Mock(spec=Left, overdispersion=np.ones(3)))
     base = refit_with("", 0.0)
     found = search.Search(base, both, (), (lens, nothing), ((), ()), refits_with(needed=5.0)).without([bowl])
     assert found.best is base

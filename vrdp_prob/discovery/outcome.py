@@ -61,7 +61,7 @@ class Outcome:
 def outcome_of(fit: SharedFit, catalogue: Sequence[Effect], *, seed: int, progress: ProgressDisplay | None) -> Outcome:
     """Search for causes, and put those that are found in doubt."""
     found = search(fit, catalogue, seed=seed, progress=progress)
-    checks = found.refits.checks(found.base)
+    checks = found.refits.leavings.checks(found.base)
     found, after, unlisted = _without_mimics(found, seed=seed, progress=progress)
     not_named: list[FoundCause] = []
     reasons: list[Doubt] = []
@@ -84,7 +84,7 @@ def outcome_of(fit: SharedFit, catalogue: Sequence[Effect], *, seed: int, progre
 
 def _checks_after(found: Search) -> tuple[Check, ...]:
     """The checks of the best model; those of the base model where it has no causes."""
-    return found.refits.checks(found.best if found.best.causes else found.base)
+    return found.refits.leavings.checks(found.best if found.best.causes else found.base)
 
 
 def _without_mimics(

@@ -1,34 +1,22 @@
-"""Refits with one more cause: which causes are tried on a model, and with what lost or hidden things beside them."""
+"""Which causes are tried on a model, in which order, and with what lost or hidden things beside them."""
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
-from functools import partial
+from functools import cached_property, partial
 
 import numpy as np
 from jaxtyping import Float
 
-from vrdp_prob.discovery.candidates.proposals import hidden_things
-from vrdp_prob.discovery.candidates.scores import CauseScore, happens_once, mends_any_course, score_causes
+from vrdp_prob.discovery.candidates.scores import CauseScore, happens_once, mends_any_course
 from vrdp_prob.discovery.candidates.single_videos import causes_of_lost_videos
 from vrdp_prob.discovery.candidates.surfaces import Placed, placed_surfaces
-from vrdp_prob.discovery.checks.battery import run_checks
-from vrdp_prob.discovery.finding import Check
-from vrdp_prob.discovery.residuals.overdispersion import overdispersion
+from vrdp_prob.discovery.selection.courses import Courses
 from vrdp_prob.discovery.selection.doubts import causes_with_own_check_failing
-from vrdp_prob.discovery.selection.met_surfaces import fit_with_surfaces
+from vrdp_prob.discovery.selection.extensions import Extensions, explaining
+from vrdp_prob.discovery.selection.leavings import Leavings
 from vrdp_prob.discovery.selection.shortlist import CLOSE, SHORTLIST_LEVEL, shortlist
-from vrdp_prob.discovery.selection.trials import Trial, gain, weights
-from vrdp_prob.inference.runs.parallel import in_processes
-from vrdp_prob.inference.several_videos.ascent import ImpossibleStartError
-from vrdp_prob.inference.several_videos.fitting import SharedFit, fit_together
-from vrdp_prob.inference.several_videos.second_look import (
-    MOST,
-    explained,
-    lost_videos,
-    may_take_another_course,
-    outweigh,
-    trusted,
-)
+from vrdp_prob.discovery.selection.trials import Trial, gain, merit, weights
+from vrdp_prob.inference.several_videos.second_look import MOST, explained, lost_videos, outweigh, trusted
 from vrdp_prob.models.effects.effect import Effect
 from vrdp_prob.models.effects.external_impulse import ExternalImpulse
 from vrdp_prob.progress import Advance
@@ -41,27 +29,8 @@ NEARLY = 0.8
 """Share of what a jump of the clock brings from which a law comes first."""
 PLAIN_TURNS = 4
 """Turns from which walls and discs that explain them need no comparison with what else may have been there."""
-SHORT, MENDINGS = 0.5, 3
-"""Share of what was promised or brought by another that a cause must bring, and number of refits searched anew."""
-
-
-@dataclass(frozen=True)
-class Left:
-    """What a model leaves, by the causes that may be behind it.
-
-    Parameters
-    ----------
-    scores
-        Scores of all further causes, the least probable by chance first, where all that is left is noise.
-    beside_chance
-        The same beside what the model leaves to chance.
-    overdispersion
-        Of each video, by what the model leaves unexplained.
-    """
-
-    scores: tuple[CauseScore, ...]
-    beside_chance: tuple[CauseScore, ...]
-    overdispersion: Float[np.ndarray, "video"]
+SEARCHES = 3
+"""How often the lost videos of a cause are searched anew, as long as that finds something."""
 
 
 @dataclass(frozen=True)
@@ -84,42 +53,32 @@ class Refits:
     seed: int
     needed: float
     advance: Advance
-    _left: dict[Trial, Left] = field(default_factory=dict)
-    _checks: dict[Trial, tuple[Check, ...]] = field(default_factory=dict)
     _made: dict[Trial, list[Trial]] = field(default_factory=dict)
     _searched: set[Trial] = field(default_factory=set)
-    _anew: dict[Trial, tuple[frozenset[int], int]] = field(default_factory=dict)
 
-    def left(self, trial: Trial) -> Left:
-        """What a model leaves."""
-        if trial not in self._left:
-            further = self.further(trial)
-            found = trial.unexplained
-            scores = beside = score_causes(trial.fit, found.plain, further, seed=self.seed)
-            if found.accelerated:
-                beside = score_causes(trial.fit, found.model, further, seed=self.seed)
-            self._left[trial] = Left(tuple(scores), tuple(beside), overdispersion(found.model, seed=self.seed))
-        return self._left[trial]
+    @cached_property
+    def leavings(self) -> Leavings:
+        """What models leave."""
+        return Leavings(self.catalogue, self.seed)
 
-    def further(self, trial: Trial) -> list[Effect]:
-        """Causes that may be added to a model: those that it lacks, a second thing of a kind only beside the first."""
-        there = {effect.name for effect in trial.fit.model.effects}
-        return [one for one in self.catalogue if one.name not in there and one.follows in {None, *there}]
+    @cached_property
+    def extensions(self) -> Extensions:
+        """What makes the refits."""
+        return Extensions(self.leavings, self.needed, self.advance)
 
-    def checks(self, trial: Trial) -> tuple[Check, ...]:
-        """Checks of what a model leaves."""
-        if trial not in self._checks:
-            self._checks[trial] = run_checks(trial.fit, seed=self.seed)
-        return self._checks[trial]
+    @cached_property
+    def courses(self) -> Courses:
+        """What searches videos anew."""
+        return Courses(self.seed)
 
     def of(self, trial: Trial) -> list[Trial]:
         """Refits of a model, the best first."""
         if trial not in self._made:
             placed = self._placed(trial)
-            met = self._met(trial, placed) if placed else None
+            met = self.extensions.with_surfaces(trial, placed) if placed else None
             found = [] if met is None else [met]
             plain = sum(one.seen.turns for one in placed) >= PLAIN_TURNS
-            alone = plain and met is not None and not self.doubted(met, trial, self.left(met).overdispersion)
+            alone = plain and met is not None and not self.doubted(met, trial, self.leavings.of(met).overdispersion)
             self._keep(trial, found if alone else [*found, *self._new(trial)])
         return self._made[trial]
 
@@ -140,27 +99,27 @@ class Refits:
         loses no video none is tried where no score stands out from what is left to chance: beside that is counted, too,
         what refits bring.
         """
-        by_chance = all(one.p_value >= SHORTLIST_LEVEL for one in self.left(trial).beside_chance)
+        by_chance = all(one.p_value >= SHORTLIST_LEVEL for one in self.leavings.of(trial).beside_chance)
         if trial.causes and by_chance and not lost_videos(trial.fit.fits):
             return []
         found = self._asked_by_most(trial)
         if found and (self.settled(trial, found) or any(not lost_videos(one.fit.fits) for one in found)):
             return found
         known = {one.causes[-1].name for one in found}
-        scores = [one for one in self.left(trial).scores if one.effect.name not in known]
+        scores = [one for one in self.leavings.of(trial).scores if one.effect.name not in known]
         likely = shortlist(scores)
         close = shortlist(scores, CLOSE)
-        found += self.made_of(trial, close, beside=found)
+        found += self.extensions.made_of(trial, close, beside=found)
         found.sort(key=merit, reverse=True)
         if len(close) < len(likely) and not self.settled(trial, found):
             found = self._with_best_searched(trial, found)
         if not self.settled(trial, found):
-            found += self.made_of(trial, [one for one in likely if one not in close], beside=found)
+            found += self.extensions.made_of(trial, [one for one in likely if one not in close], beside=found)
             found.sort(key=merit, reverse=True)
         if not trial.causes and (not found or found[0].brought(trial) < self.needed):
             tried = {one.causes[-1].name for one in found}
-            seen = causes_with_own_check_failing(self.checks(trial)) - tried
-            found += self.made_of(trial, [one for one in scores if one.effect.name in seen], beside=found)
+            seen = causes_with_own_check_failing(self.leavings.checks(trial)) - tried
+            found += self.extensions.made_of(trial, [one for one in scores if one.effect.name in seen], beside=found)
             found.sort(key=merit, reverse=True)
         kicks = next((one for one in scores if _kicks(one) and one.sites), None)
         if kicks is not None and (not found or found[0].causes[-1].name == kicks.effect.name):
@@ -189,7 +148,7 @@ class Refits:
         first = self.provisional(trial, found)
         lost = [] if first is None else lost_videos(first.fit.fits)
         if first is not None and 0 < len(lost) <= len(first.fit.fits) // MOST and explained(first.fit.fits):
-            searched = self.searched_anew(first, lost)
+            searched = self.courses.searched_anew(first, lost)
             found = [searched if one is first else one for one in found]
         return sorted(found, key=merit, reverse=True)
 
@@ -203,9 +162,9 @@ class Refits:
         astray = np.flatnonzero(~trusted(fits)).tolist()
         if not 0 < len(astray) <= len(fits) // MOST or not outweigh(fits, astray):
             return []
-        asked = [one for one in shortlist(self.left(trial).beside_chance, CLOSE) if not happens_once(one.effect)]
-        found = self.made_of(trial, asked)
-        searched = [self.searched_anew(one, astray) for one in found[:1]]
+        asked = [one for one in shortlist(self.leavings.of(trial).beside_chance, CLOSE) if not happens_once(one.effect)]
+        found = self.extensions.made_of(trial, asked)
+        searched = [self.courses.searched_anew(one, astray) for one in found[:1]]
         return sorted([*searched, *found[1:]], key=merit, reverse=True)
 
     def with_lost(self, trial: Trial) -> list[Trial]:
@@ -229,47 +188,25 @@ class Refits:
         videos are explained and something is left still, all of them are searched.
         """
         found = one
-        for _ in range(MENDINGS):
-            kicked = [site.video for score in self.left(found).scores for site in score.sites if _kicks(score)]
+        for _ in range(SEARCHES):
+            kicked = [site.video for score in self.leavings.of(found).scores for site in score.sites if _kicks(score)]
             videos = list(dict.fromkeys([*lost_videos(found.fit.fits), *kicked]))
             before, few = found, len(videos) <= len(one.fit.fits) // MOST
-            found = self.searched_anew(found, videos) if few else found
+            found = self.courses.searched_anew(found, videos) if few else found
             if found is before:
                 break
-        if self._leaves_something(found) and explained(found.fit.fits):
+        if self.leavings.something(found) and explained(found.fit.fits):
             other = found.with_other_courses(seed=self.seed)
             found = found if other.loses_videos_of(found) else other
         if found is not one:
             self._keep(trial, [found if old is one else old for old in self.of(trial)])
         return found
 
-    def searched_anew(self, trial: Trial, videos: Sequence[int]) -> Trial:
-        """A model with some videos searched anew, as far as they may take another course.
-
-        A course for which other videos lose theirs, and do not find it again, is a wrong one; one with which others
-        are a little less probable and explained still is none. A video of which a search has found nothing better is
-        not searched again; where it has, a further search takes another seed.
-        """
-        settled, passed = self._anew.get(trial, (frozenset(), 0))
-        now = [one for one in videos if one not in settled and may_take_another_course(trial.fit.fits[one])]
-        found = trial.mended(now, seed=self.seed + passed, thorough=True) if now else trial
-        if found is not trial and (fallen := found.fallen_from(trial)):
-            found = found.mended(fallen, seed=self.seed + passed)
-            found = trial if found.loses_videos_of(trial) else found
-        settled |= frozenset(now).difference([] if found is trial else trial.fallen_from(found))
-        self._anew[trial] = self._anew[found] = (settled, passed + 1)
-        return found
-
     def settled(self, trial: Trial, found: Sequence[Trial]) -> bool:
         """Whether the best cause leaves nothing to explain, and is not a kick in each of several videos."""
         if not found or gain(found[0], trial)[0] < self.needed:
             return False
-        return not _mends_several(found[0]) and not self._leaves_something(found[0])
-
-    def _leaves_something(self, trial: Trial) -> bool:
-        """Whether a model leaves what chance explains less well than some cause may."""
-        left = self.left(trial).beside_chance
-        return any(one.p_value * len(left) <= SHORTLIST_LEVEL for one in left)
+        return not _mends_several(found[0]) and not self.leavings.something(found[0])
 
     def _lost(self, trial: Trial, found: Sequence[Trial]) -> list[Trial]:
         """Fits from the beginning, with causes that explain videos whose course of events nothing else explains.
@@ -278,26 +215,15 @@ class Refits:
         """
         if trial.choices:
             return []
-        left = self.further(trial)
-        likely = {one.effect.name for one in shortlist(self.left(trial).scores)}
+        left = self.leavings.further(trial)
+        likely = {one.effect.name for one in shortlist(self.leavings.of(trial).scores)}
         reached = {one.causes[-1].name: one.brought(trial) for one in reversed(found)}
         best = next((one.fit.fits for one in found if not _mends_several(one)), trial.fit.fits)
         still_lost = lost_videos(best)
         lost = [one for one in lost_videos(trial.fit.fits) if one in still_lost]
         told = causes_of_lost_videos(trial.fit, lost, left, likely, self.needed, seed=self.seed)
         again = [causes for causes, promised in told if len(causes) > 1 or reached.get(causes[0].name, 0.0) < promised]
-        return [one for causes in again if (one := self._searched_with(trial, causes)) is not None]
-
-    def _searched_with(self, trial: Trial, causes: Sequence[Effect]) -> Trial | None:
-        """The fit from the beginning with further causes; None where videos have no world in common."""
-
-        def fitted() -> SharedFit:
-            tracks = [part.clues.tracks for part in trial.fit.fits]
-            return fit_together(
-                tracks, model=trial.fit.extended(*causes), shared=trial.fit.shared, seed=self.seed, model_error=False
-            )
-
-        return self._began_anew(trial, causes, fitted)
+        return [one for causes in again if (one := self.extensions.from_the_beginning(trial, causes)) is not None]
 
     def doubted(self, trial: Trial, lesser: Trial, divisor: Float[np.ndarray, "video"]) -> bool:
         """Whether a cause brings too little, or in too few of the videos that could have been drawn, or may be nothing.
@@ -322,113 +248,16 @@ class Refits:
             return []
         return placed_surfaces([part.clues.tracks for part in trial.fit.fits], self.catalogue)
 
-    def _met(self, trial: Trial, placed: Sequence[Placed]) -> Trial | None:
-        """The fit from the beginning with walls and discs that tracks show, all of them at once.
-
-        A fit without them has lost its way at the first that a body met, so that scores call for what mends its course.
-        Where walls that count as stated explain the videos and leave something, or overlap what is seen, they may be a
-        little off, and hold all videos there: then they are unknown from the beginning. None where videos have no world
-        in common.
-        """
-        effects = [one.effect for one in placed]
-        walls = [one for one in placed if one.wall is not None]
-        found = self._began_anew(trial, effects, partial(fit_with_surfaces, trial, placed, walls, seed=self.seed))
-        if not walls or (found is not None and not (explained(found.fit.fits) and self._leaves_something(found))):
-            return found
-        near = self._began_anew(trial, effects, partial(fit_with_surfaces, trial, placed, [], seed=self.seed))
-        return max((one for one in (found, near) if one is not None), key=merit, default=None)
-
-    def _began_anew(self, trial: Trial, causes: Sequence[Effect], fitted: Callable[[], SharedFit]) -> Trial | None:
-        """A trial with further causes by a fit from the beginning; None where videos have no world in common."""
-        try:
-            return trial.and_causes(causes, fitted())
-        except ImpossibleStartError:  # what single videos say of the causes fits no world of all of them
-            return None
-        finally:
-            self.advance(1)
-
     def _hidden(self, trial: Trial, found: Sequence[Trial], kicks: CauseScore) -> list[Trial]:
         """Fits with something unseen in the place of kicks."""
         kicked = next((one for one in found if one.causes[-1].name == kicks.effect.name), None)
-        kicked = kicked or next(iter(self.made_of(trial, [kicks])), None)
-        return [] if kicked is None else self.hidden_instead(kicked, trial, kicks.p_value)
-
-    def hidden_instead(
-        self, kicked: Trial, trial: Trial, p_value: float = 0.0, *, known: Collection[str] = ()
-    ) -> list[Trial]:
-        """Fits with something unseen in the place of the kicks that a model ends with.
-
-        Parameters
-        ----------
-        kicked, trial
-            The model with kicks, and without.
-        p_value
-            Of the kicks.
-        known
-            Names of causes whose fits are there already.
-        """
-        left = [effect for effect in self.further(kicked) if effect.name not in known]
-        starts = hidden_things(kicked.fit, left, p_value)
-        return self._all(partial(kicked.with_cause_in_place, least=trial.fit.joint.log_density), starts)
-
-    def made_of(self, trial: Trial, scores: Sequence[CauseScore], *, beside: Sequence[Trial] = ()) -> list[Trial]:
-        """Fits with one cause more, the best first; those that were made before stand `beside`.
-
-        Where the score of a cause promises more than any refit has brought, and its own brought far less, that goes on
-        if it broke off on a long way; and where videos have lost their course of events on it, they are searched anew.
-        So it is with the cause whose score promises most of all, whatever others have brought, if that is as much as a
-        cause needs at all. What mends any course is no measure of other causes.
-        """
-        found = self._all(trial.with_cause, scores)
-        promised = {one.effect.name: one.size / 2 for one in scores if not mends_any_course(one.effect)}
-        promised = {name: size for name, size in promised.items() if size > self.needed}
-        leader = "" if explaining(beside) else max(promised, key=lambda name: promised[name], default="")
-
-        def brought_most() -> float:
-            return max((one.brought(trial) for one in explaining([*beside, *found])), default=0.0)
-
-        for _ in range(MENDINGS):
-            most = brought_most()
-            short = [
-                one
-                for one in found
-                if (told := promised.get(name := one.causes[-1].name, 0.0)) > max(one.brought(trial), 0.0)
-                and (name == leader or told > max(most, one.brought(trial) / SHORT))
-                and (not one.fit.joint.converged or one.fallen_from(trial))
-            ]
-            if not short:
-                break
-            hopeful = max(short, key=lambda one: promised[one.causes[-1].name])
-            further = hopeful.continued()
-            if fallen := further.fallen_from(trial):
-                further = further.mended(fallen, seed=self.seed)
-            gained = further.brought(trial) - hopeful.brought(trial)
-            if gained < self.needed:
-                promised.pop(hopeful.causes[-1].name)
-            if gained > 0:
-                found = [further if one is hopeful else one for one in found]
-        most = brought_most()
-        close = [one for one in found if one.brought(trial) > SHORT * most > 0]
-        rest = [one for one in found if one not in close]
-        return sorted([*in_processes(Trial.continued, close), *rest], key=merit, reverse=True)
-
-    def _all(self, refit: Callable[[CauseScore], Trial | None], scores: Sequence[CauseScore]) -> list[Trial]:
-        return [one for one in in_processes(refit, scores, advance=self.advance) if one is not None]
-
-
-def merit(trial: Trial) -> float:
-    """By which models are ordered: what they predict of left-out videos, less what their causes are believed less."""
-    return float(trial.log_density.sum()) + trial.log_prior
+        kicked = kicked or next(iter(self.extensions.made_of(trial, [kicks])), None)
+        return [] if kicked is None else self.extensions.hidden_instead(kicked, trial, kicks.p_value)
 
 
 def _brings(one: Trial, trial: Trial) -> float:
     """Gain of a model over one with less where all else is noise, less what its causes are believed less."""
     return one.brought(trial) + one.log_prior
-
-
-def explaining(trials: Sequence[Trial]) -> list[Trial]:
-    """Those whose last cause does not just mend any course."""
-    return [one for one in trials if not mends_any_course(one.causes[-1])]
 
 
 def _mends_several(trial: Trial) -> bool:

@@ -8,9 +8,10 @@ import numpy as np
 from jaxtyping import Float
 
 from vrdp_prob.discovery.candidates.scores import mends_any_course
-from vrdp_prob.discovery.selection.refits import Left, Refits, merit
+from vrdp_prob.discovery.selection.leavings import Leavings, Left
+from vrdp_prob.discovery.selection.refits import Refits
 from vrdp_prob.discovery.selection.shortlist import HOPEFUL
-from vrdp_prob.discovery.selection.trials import Trial, gain, with_own_population
+from vrdp_prob.discovery.selection.trials import Trial, gain, merit, with_own_population
 from vrdp_prob.inference.runs.parallel import in_processes
 from vrdp_prob.inference.several_videos.fitting import SharedFit
 from vrdp_prob.inference.several_videos.second_look import doubtful
@@ -90,7 +91,7 @@ class Search:
     @property
     def left(self) -> Left:
         """What the best model leaves."""
-        return self.refits.left(self.best)
+        return self.refits.leavings.of(self.best)
 
     @property
     def overdispersion(self) -> Float[np.ndarray, "video"]:
@@ -179,6 +180,10 @@ class _Searcher:
     def needed(self) -> float:
         return self.refits.needed
 
+    @property
+    def leavings(self) -> Leavings:
+        return self.refits.leavings
+
     def forward(self, base: Trial) -> tuple[list[Trial], list[Step]]:
         """The models that follow one another, each with a cause more, and the step from each; the last adds nothing."""
         chain, steps, rounds = [base], [self.untried(base)], 0
@@ -187,11 +192,11 @@ class _Searcher:
             found, winner = self.chosen(chain[-1], step)
             found_better_course = found is not chain[-1]
             if found_better_course:
-                chain[-1], steps[-1] = found, replace(step, left=self.refits.left(found))
+                chain[-1], steps[-1] = found, replace(step, left=self.leavings.of(found))
                 back = self.handed_back(chain, steps) if rounds < MOST_ROUNDS else chain
                 compared = zip(back, chain, steps, strict=False)
                 steps = [
-                    step if one is other else replace(step, left=self.refits.left(one)) for one, other, step in compared
+                    step if one is other else replace(step, left=self.leavings.of(one)) for one, other, step in compared
                 ]
                 is_shorter, chain = len(back) < len(chain), back
                 if is_shorter:
@@ -206,7 +211,7 @@ class _Searcher:
 
     def untried(self, trial: Trial) -> Step:
         """A step in which nothing was tried yet."""
-        return Step(trial, self.refits.left(trial))
+        return Step(trial, self.leavings.of(trial))
 
     def tried(self, trial: Trial) -> Step:
         """The step with the causes tried that may be the best one."""
@@ -220,7 +225,7 @@ class _Searcher:
                 found = self.refits.with_lost(trial)
             else:
                 pair = self._pair(trial, first)
-        return Step(trial, self.refits.left(trial), tuple(self._in_order(trial, found)), pair)
+        return Step(trial, self.leavings.of(trial), tuple(self._in_order(trial, found)), pair)
 
     def _pair(self, trial: Trial, first: Trial) -> tuple[Trial, Trial] | None:
         """A cause and a second one beside it, if both together are established.
@@ -231,7 +236,7 @@ class _Searcher:
         second = next(iter(self._in_order(first, self.refits.with_lost(first))), first)
         if second is first or gain(second, trial)[0] < 2 * self.needed or gain(second, first)[0] < self.needed:
             return None
-        divisor = self.refits.left(second).overdispersion
+        divisor = self.leavings.of(second).overdispersion
         return None if self.doubted(second, trial, divisor) or self.doubted(second, first, divisor) else (first, second)
 
     def chosen(self, trial: Trial, step: Step) -> tuple[Trial, Trial | None]:
@@ -247,9 +252,9 @@ class _Searcher:
             trial = self._with_both_courses(without, trial)
             kicked = winner.acting(winner.causes[-1]) if mends_any_course(winner.causes[-1]) else []
             if mendable := kicked or _in_one_video(winner, trial):
-                mended = self.refits.searched_anew(trial, mendable)
+                mended = self.refits.courses.searched_anew(trial, mendable)
                 trial = mended if gain(mended, trial)[0] > self.needed else trial
-            if self.doubted(winner, trial, self.refits.left(winner).overdispersion):
+            if self.doubted(winner, trial, self.leavings.of(winner).overdispersion):
                 winner = None
         return trial, self.or_first_of(step.pair, winner)
 
@@ -285,7 +290,7 @@ class _Searcher:
         both = max(ways, key=lambda one: float(one.log_density.sum()))
         if gain(both, before)[0] <= self.needed:
             return before
-        return self.refits.searched_anew(both, both.fallen_from(before))
+        return self.refits.courses.searched_anew(both, both.fallen_from(before))
 
     def or_first_of(self, pair: tuple[Trial, Trial] | None, winner: Trial | None) -> Trial | None:
         """The best single cause, or the first of an established pair that brings more.
@@ -336,7 +341,7 @@ class _Searcher:
 
     def established(self, best: Trial) -> tuple[Trial, tuple[Trial, ...]]:
         """A model without those of its causes that bring too little, and the same without each of the others."""
-        return self._pruned(best, self._lesser(best, best.causes), self.refits.left(best).overdispersion)
+        return self._pruned(best, self._lesser(best, best.causes), self.leavings.of(best).overdispersion)
 
     def _pruned(
         self, best: Trial, lesser: tuple[Trial, ...], divisor: Float[np.ndarray, "video"]
@@ -386,13 +391,13 @@ class _Searcher:
                     if gain(one, step.base)[0] > least and not one.patches(one.causes[-1])
                 }
                 again = [one for one in step.left.scores if one.effect.name in close][:MOST_RIVALS]
-                others = self.refits.made_of(without, again)
+                others = self.refits.extensions.made_of(without, again)
                 if len(best.causes) == 1:
                     made = {*best.names, *(one.causes[-1].name for one in others)}
                     others += [one for one in steps[0].tried if one.causes[-1].name not in made]
             if cause is best.causes[-1] and isinstance(cause, ExternalImpulse):
                 made = {one.causes[-1].name for one in others}
-                hidden = in_processes(Trial.continued, self.refits.hidden_instead(best, without, known=made))
+                hidden = in_processes(Trial.continued, self.refits.extensions.hidden_instead(best, without, known=made))
                 others += sorted(hidden, key=merit, reverse=True)
             found.append(tuple(one for one in others if not one.patches(one.causes[-1])))
         return tuple(found)

@@ -338,6 +338,11 @@ def _believes_otherwise(model: PhysicsModel, before: PhysicsModel) -> bool:
     )
 
 
+def merit(trial: Trial) -> float:
+    """By which models are ordered: what they predict of left-out videos, less what their causes are believed less."""
+    return float(trial.log_density.sum()) + trial.log_prior
+
+
 def gains(
     trial: Trial, base: Trial, overdispersion: Float[np.ndarray, "video"] | None = None
 ) -> Float[np.ndarray, "video"]:

@@ -1,0 +1,148 @@
+"""Fits of a model with further causes: from their scores, from the beginning, or in the place of kicks."""
+
+from collections.abc import Callable, Collection, Sequence
+from dataclasses import dataclass
+from functools import partial
+
+from vrdp_prob.discovery.candidates.proposals import hidden_things
+from vrdp_prob.discovery.candidates.scores import CauseScore, mends_any_course
+from vrdp_prob.discovery.candidates.surfaces import Placed
+from vrdp_prob.discovery.selection.leavings import Leavings
+from vrdp_prob.discovery.selection.met_surfaces import fit_with_surfaces
+from vrdp_prob.discovery.selection.trials import Trial, merit
+from vrdp_prob.inference.runs.parallel import in_processes
+from vrdp_prob.inference.several_videos.ascent import ImpossibleStartError
+from vrdp_prob.inference.several_videos.fitting import SharedFit, fit_together
+from vrdp_prob.inference.several_videos.second_look import explained
+from vrdp_prob.models.effects.effect import Effect
+from vrdp_prob.progress import Advance
+
+SHORT, MENDINGS = 0.5, 3
+"""Share of what was promised or brought by another that a cause must bring, and number of refits searched anew."""
+
+
+@dataclass(frozen=True)
+class Extensions:
+    """Makes models with further causes.
+
+    Parameters
+    ----------
+    leavings
+        What models leave.
+    needed
+        Gain (nats) in the predictive density that a cause must bring.
+    advance
+        Told of each fit.
+    """
+
+    leavings: Leavings
+    needed: float
+    advance: Advance
+
+    @property
+    def seed(self) -> int:
+        """Of searches."""
+        return self.leavings.seed
+
+    def made_of(self, trial: Trial, scores: Sequence[CauseScore], *, beside: Sequence[Trial] = ()) -> list[Trial]:
+        """Fits with one cause more, the best first; those that were made before stand `beside`.
+
+        Where the score of a cause promises more than any refit has brought, and its own brought far less, that goes on
+        if it broke off on a long way; and where videos have lost their course of events on it, they are searched anew.
+        So it is with the cause whose score promises most of all, whatever others have brought, if that is as much as a
+        cause needs at all. What mends any course is no measure of other causes.
+        """
+        found = self._all(trial.with_cause, scores)
+        promised = {one.effect.name: one.size / 2 for one in scores if not mends_any_course(one.effect)}
+        promised = {name: size for name, size in promised.items() if size > self.needed}
+        leader = "" if explaining(beside) else max(promised, key=lambda name: promised[name], default="")
+
+        def brought_most() -> float:
+            return max((one.brought(trial) for one in explaining([*beside, *found])), default=0.0)
+
+        for _ in range(MENDINGS):
+            most = brought_most()
+            short = [
+                one
+                for one in found
+                if (told := promised.get(name := one.causes[-1].name, 0.0)) > max(one.brought(trial), 0.0)
+                and (name == leader or told > max(most, one.brought(trial) / SHORT))
+                and (not one.fit.joint.converged or one.fallen_from(trial))
+            ]
+            if not short:
+                break
+            hopeful = max(short, key=lambda one: promised[one.causes[-1].name])
+            further = hopeful.continued()
+            if fallen := further.fallen_from(trial):
+                further = further.mended(fallen, seed=self.seed)
+            gained = further.brought(trial) - hopeful.brought(trial)
+            if gained < self.needed:
+                promised.pop(hopeful.causes[-1].name)
+            if gained > 0:
+                found = [further if one is hopeful else one for one in found]
+        most = brought_most()
+        close = [one for one in found if one.brought(trial) > SHORT * most > 0]
+        rest = [one for one in found if one not in close]
+        return sorted([*in_processes(Trial.continued, close), *rest], key=merit, reverse=True)
+
+    def _all(self, refit: Callable[[CauseScore], Trial | None], scores: Sequence[CauseScore]) -> list[Trial]:
+        return [one for one in in_processes(refit, scores, advance=self.advance) if one is not None]
+
+    def from_the_beginning(self, trial: Trial, causes: Sequence[Effect]) -> Trial | None:
+        """The fit from the beginning with further causes; None where videos have no world in common."""
+
+        def fitted() -> SharedFit:
+            tracks = [part.clues.tracks for part in trial.fit.fits]
+            return fit_together(
+                tracks, model=trial.fit.extended(*causes), shared=trial.fit.shared, seed=self.seed, model_error=False
+            )
+
+        return self._began_anew(trial, causes, fitted)
+
+    def with_surfaces(self, trial: Trial, placed: Sequence[Placed]) -> Trial | None:
+        """The fit from the beginning with walls and discs that tracks show, all of them at once.
+
+        A fit without them has lost its way at the first that a body met, so that scores call for what mends its course.
+        Where walls that count as stated explain the videos and leave something, or overlap what is seen, they may be a
+        little off, and hold all videos there: then they are unknown from the beginning. None where videos have no world
+        in common.
+        """
+        effects = [one.effect for one in placed]
+        walls = [one for one in placed if one.wall is not None]
+        found = self._began_anew(trial, effects, partial(fit_with_surfaces, trial, placed, walls, seed=self.seed))
+        if not walls or (found is not None and not (explained(found.fit.fits) and self.leavings.something(found))):
+            return found
+        near = self._began_anew(trial, effects, partial(fit_with_surfaces, trial, placed, [], seed=self.seed))
+        return max((one for one in (found, near) if one is not None), key=merit, default=None)
+
+    def hidden_instead(
+        self, kicked: Trial, trial: Trial, p_value: float = 0.0, *, known: Collection[str] = ()
+    ) -> list[Trial]:
+        """Fits with something unseen in the place of the kicks that a model ends with.
+
+        Parameters
+        ----------
+        kicked, trial
+            The model with kicks, and without.
+        p_value
+            Of the kicks.
+        known
+            Names of causes whose fits are there already.
+        """
+        left = [effect for effect in self.leavings.further(kicked) if effect.name not in known]
+        starts = hidden_things(kicked.fit, left, p_value)
+        return self._all(partial(kicked.with_cause_in_place, least=trial.fit.joint.log_density), starts)
+
+    def _began_anew(self, trial: Trial, causes: Sequence[Effect], fitted: Callable[[], SharedFit]) -> Trial | None:
+        """A trial with further causes by a fit from the beginning; None where videos have no world in common."""
+        try:
+            return trial.and_causes(causes, fitted())
+        except ImpossibleStartError:  # what single videos say of the causes fits no world of all of them
+            return None
+        finally:
+            self.advance(1)
+
+
+def explaining(trials: Sequence[Trial]) -> list[Trial]:
+    """Those whose last cause does not just mend any course."""
+    return [one for one in trials if not mends_any_course(one.causes[-1])]

@@ -1,0 +1,78 @@
+"""What models leave, and which further causes may be behind it."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from jaxtyping import Float
+
+from vrdp_prob.discovery.candidates.scores import CauseScore, score_causes
+from vrdp_prob.discovery.checks.battery import run_checks
+from vrdp_prob.discovery.finding import Check
+from vrdp_prob.discovery.residuals.overdispersion import overdispersion
+from vrdp_prob.discovery.selection.shortlist import SHORTLIST_LEVEL
+from vrdp_prob.discovery.selection.trials import Trial
+from vrdp_prob.models.effects.effect import Effect
+
+
+@dataclass(frozen=True)
+class Left:
+    """What a model leaves, by the causes that may be behind it.
+
+    Parameters
+    ----------
+    scores
+        Scores of all further causes, the least probable by chance first, where all that is left is noise.
+    beside_chance
+        The same beside what the model leaves to chance.
+    overdispersion
+        Of each video, by what the model leaves unexplained.
+    """
+
+    scores: tuple[CauseScore, ...]
+    beside_chance: tuple[CauseScore, ...]
+    overdispersion: Float[np.ndarray, "video"]
+
+
+@dataclass(frozen=True)
+class Leavings:
+    """What each model leaves, worked out the first time that it is asked for.
+
+    Parameters
+    ----------
+    catalogue
+        Causes that are looked for.
+    seed
+        Of the null distributions.
+    """
+
+    catalogue: tuple[Effect, ...]
+    seed: int
+    _left: dict[Trial, Left] = field(default_factory=dict)
+    _checks: dict[Trial, tuple[Check, ...]] = field(default_factory=dict)
+
+    def of(self, trial: Trial) -> Left:
+        """What a model leaves."""
+        if trial not in self._left:
+            further = self.further(trial)
+            found = trial.unexplained
+            scores = beside = score_causes(trial.fit, found.plain, further, seed=self.seed)
+            if found.accelerated:
+                beside = score_causes(trial.fit, found.model, further, seed=self.seed)
+            self._left[trial] = Left(tuple(scores), tuple(beside), overdispersion(found.model, seed=self.seed))
+        return self._left[trial]
+
+    def further(self, trial: Trial) -> list[Effect]:
+        """Causes that may be added to a model: those that it lacks, a second thing of a kind only beside the first."""
+        there = {effect.name for effect in trial.fit.model.effects}
+        return [one for one in self.catalogue if one.name not in there and one.follows in {None, *there}]
+
+    def checks(self, trial: Trial) -> tuple[Check, ...]:
+        """Checks of what a model leaves."""
+        if trial not in self._checks:
+            self._checks[trial] = run_checks(trial.fit, seed=self.seed)
+        return self._checks[trial]
+
+    def something(self, trial: Trial) -> bool:
+        """Whether a model leaves what chance explains less well than some cause may."""
+        left = self.of(trial).beside_chance
+        return any(one.p_value * len(left) <= SHORTLIST_LEVEL for one in left)

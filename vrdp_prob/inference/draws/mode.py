@@ -26,6 +26,11 @@ class Mode:
 
     @property
     def log_evidence(self) -> float:
-        """Logarithm of the probability mass that the Gaussian of this curvature puts under the mode (Laplace)."""
+        """Logarithm of the probability mass that the Gaussian of this curvature puts under the mode (Laplace).
+
+        -inf where no world is possible.
+        """
+        if not np.isfinite(self.log_density):
+            return -np.inf
         _, log_determinant = np.linalg.slogdet(self.precision)
         return self.log_density + (len(self.point) * np.log(2 * np.pi) - float(log_determinant)) / 2

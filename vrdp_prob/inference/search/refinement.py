@@ -110,10 +110,11 @@ def refine(descent: Descent, starts: Sequence[Float[np.ndarray, "dimension"]], *
             [one.point if np.isfinite(one.cost) else point for one, point in zip(minima, quiet, strict=True)]
         )
         values = evaluate(likelihood.log_density, lowered)
-        gains = values - np.array([found[index].log_density for index in running])
+        before = np.array([found[index].log_density for index in running])
+        gains = np.subtract(values, before, out=np.zeros(len(running)), where=np.isfinite(values))
         for index, point, value, minimum in zip(running, lowered, values, minima, strict=True):
-            before = found[index].evaluations
-            found[index] = Refined(point, float(value), minimum.converged, before + minimum.evaluations)
+            worlds = found[index].evaluations + minimum.evaluations
+            found[index] = Refined(point, float(value), minimum.converged, worlds)
         best = max(one.log_density for one in found)
         apart = _apart(minima, values)
         running = [

@@ -10,7 +10,7 @@ from vrdp_prob.discovery import discover as module
 from vrdp_prob.discovery import outcome
 from vrdp_prob.discovery.checks.battery import run_checks
 from vrdp_prob.discovery.checks.bodies import REBOUND
-from vrdp_prob.discovery.checks.contacts import REBOUND_AT_WALLS
+from vrdp_prob.discovery.checks.contacts import REBOUND_AT_WALLS, RUBBING, RUBBING_AT_WALLS
 from vrdp_prob.discovery.checks.kicks import KICK
 from vrdp_prob.discovery.describe import describe
 from vrdp_prob.discovery.finding import Check, Verdict
@@ -18,6 +18,7 @@ from vrdp_prob.discovery.residuals.contact_patterns import AT_WALLS
 from vrdp_prob.discovery.selection.doubts import OWN_CHECKS, Doubt, causes_with_own_check_failing, doubts, with_doubts
 from vrdp_prob.discovery.selection.trials import Trial
 from vrdp_prob.inference.several_videos.fitting import SharedFit
+from vrdp_prob.models.effects.contact_friction import ContactFriction
 from vrdp_prob.models.effects.effect import Effect
 from vrdp_prob.models.effects.external_impulse import ExternalImpulse
 from vrdp_prob.models.effects.linear_drag import LinearDrag
@@ -69,6 +70,32 @@ def test_a_kick_that_leaves_sudden_changes_is_not_the_only_one_or_none(trial: Tr
     assert "or it happened more often than was found" in doubt.sentence
 
 
+@pytest.mark.parametrize(
+    ("cause", "before", "after", "is_doubted"),
+    [
+        (ContactFriction(), {RUBBING: 1e-97}, {RUBBING: 2e-4}, False),
+        (ContactFriction(), {RUBBING: 1e-20}, {RUBBING: 2e-4}, True),
+        (ContactFriction(), {}, {RUBBING: 2e-4}, True),
+        (ContactFriction(), {RUBBING: 0.0}, {RUBBING: 0.0}, True),
+        (
+            ContactFriction(),
+            {RUBBING: 1e-97, RUBBING_AT_WALLS: 1e-6},
+            {RUBBING: 2e-4, RUBBING_AT_WALLS: 1e-6},
+            True,
+        ),
+        (ContactFriction(), {RUBBING: 1e-97, RUBBING_AT_WALLS: 0.3}, {RUBBING: 2e-4, RUBBING_AT_WALLS: 0.3}, False),
+        (ExternalImpulse(), {KICK: 1e-97}, {KICK: 2e-4}, True),
+    ],
+    ids=["nearly all", "a good part", "nothing before", "as before", "not at walls", "none at walls", "another kick"],
+)
+def test_what_is_left_of_what_a_cause_nearly_explains_is_details_of_its_law(
+    trial: Trial, cause: Effect, before: dict[str, float], after: dict[str, float], *, is_doubted: bool
+) -> None:
+    """A strength that differs from body to body, say; but what happens once may have happened again."""
+    found, without = ([one for pair in some.items() for one in left(*pair)] for some in (after, before))
+    assert bool(list(doubts(trial, cause, found, without=lambda: without))) is is_doubted
+
+
 def test_checks_and_causes_go_by_their_names(trial: Trial) -> None:
     names = {one.name for one in run_checks(trial.fit, seed=0)}
     assert known_effects().keys() >= OWN_CHECKS.keys()
@@ -81,7 +108,7 @@ def test_a_doubted_cause_is_told_of_and_not_part_of_the_extended_model(monkeypat
     data, _ = fitted("surface_tilt", 5.0, seed=2, setting=SMALL)
     described: list[SharedFit] = []
     monkeypatch.setattr(module, "describe", lambda fit, checks: described.append(fit) or describe(fit, checks))
-    monkeypatch.setattr(outcome, "doubts", lambda *_given: [Doubt(0.1, "It is something else.")])
+    monkeypatch.setattr(outcome, "doubts", lambda *_given, **_without: [Doubt(0.1, "It is something else.")])
     finding = module.discover(data.tracks, catalogue=[SurfaceTilt()], processes=1)
     assert finding.verdict is Verdict.UNKNOWN
     assert finding.named == ()
@@ -98,7 +125,7 @@ def test_a_doubted_cause_is_told_of_and_not_part_of_the_extended_model(monkeypat
 def test_of_two_causes_only_the_doubted_one_is_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
     data = hide(["surface_tilt", "linear_drag"], seed=1, effect_size=6.0, setting=Setting(videos=4, bodies=2))
 
-    def only_the_tilt(_trial: Trial, cause: Effect, _left: object = ()) -> list[Doubt]:
+    def only_the_tilt(_trial: Trial, cause: Effect, _left: object = (), **_without: object) -> list[Doubt]:
         return [Doubt(0.1, "It is something else.")] if cause.name == SurfaceTilt.name else []
 
     monkeypatch.setattr(outcome, "doubts", only_the_tilt)

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from jaxtyping import Float
@@ -102,7 +103,11 @@ def _without_mimics(
 
 def _doubted(found: Search, after: Sequence[Check]) -> dict[Effect, tuple[Doubt, ...]]:
     """The causes of the best model that are doubted, and why."""
-    reasons = {cause: tuple(doubts(found.best, cause, after)) for cause in found.best.causes}
+    checks = found.refits.leavings.checks
+    reasons = {
+        cause: tuple(doubts(found.best, cause, after, without=partial(checks, lesser)))
+        for cause, lesser in zip(found.best.causes, found.lesser, strict=True)
+    }
     return {cause: some for cause, some in reasons.items() if some}
 
 

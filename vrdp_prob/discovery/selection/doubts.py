@@ -1,7 +1,7 @@
 """Reasons to doubt that what was found is the cause that it is called."""
 
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -30,6 +30,9 @@ from vrdp_prob.models.effects.speed_dependent_restitution import SpeedDependentR
 
 SURPRISING = 0.01
 """Probability below which parameters of a cause, or what is left of what it acts on, say that it is something else."""
+MOSTLY, LEAST = 0.9, 1e-300
+"""Share of what an own check tells against the model without a cause (nats, by its p-value; of none less than the least
+one) that the cause must take away for what is left to be details of its law: strengths that differ between bodies."""
 OWN_CHECKS: Mapping[str, tuple[str, ...]] = {
     SpeedDependentRestitution.name: (REBOUND, REBOUND_AT_WALLS),
     ContactFriction.name: (RUBBING, RUBBING_AT_WALLS),
@@ -60,7 +63,13 @@ class Doubt:
     sentence: str
 
 
-def doubts(trial: Trial, cause: Effect, left: Sequence[Check] = ()) -> Iterator[Doubt]:
+def doubts(
+    trial: Trial,
+    cause: Effect,
+    left: Sequence[Check] = (),
+    *,
+    without: Callable[[], Sequence[Check]] = tuple,
+) -> Iterator[Doubt]:
     """Reasons to doubt a cause of a model.
 
     Parameters
@@ -71,6 +80,8 @@ def doubts(trial: Trial, cause: Effect, left: Sequence[Check] = ()) -> Iterator[
         One of its causes.
     left
         Checks of what the model leaves.
+    without
+        Makes the checks of what it leaves without the cause, which are asked for where one of its own fails.
     """
     of_parameters = surprise(trial.fit, cause)
     if of_parameters < SURPRISING:
@@ -81,13 +92,24 @@ def doubts(trial: Trial, cause: Effect, left: Sequence[Check] = ()) -> Iterator[
         )
     own = sorted((one for one in left if one.name in OWN_CHECKS.get(cause.name, ())), key=lambda one: one.p_value)
     by_chance = len(own) * own[0].p_value if own else 1.0
-    if by_chance < SURPRISING:
+    if by_chance < SURPRISING and (happens_once(cause) or not _mostly_mended(own, without())):
         otherwise = ", or it happened more often than was found" if happens_once(cause) else ""
         yield Doubt(
             by_chance / SURPRISING,
             f"With '{title(cause.name)}' the check of {own[0].name} fails still, which asks for just what this cause "
             f"does: its law is another one{otherwise}, and its probability counts that.",
         )
+
+
+def _mostly_mended(own: Sequence[Check], without: Sequence[Check]) -> bool:
+    """Whether a cause takes away nearly all that each of its checks which fail still tells without it."""
+    before = {one.name: one.p_value for one in without}
+    failing = [one for one in own if len(own) * one.p_value < SURPRISING]
+    return all(_nats(one.p_value) <= (1 - MOSTLY) * _nats(before.get(one.name, 1.0)) for one in failing)
+
+
+def _nats(p_value: float) -> float:
+    return -math.log(max(p_value, LEAST))
 
 
 def causes_with_own_check_failing(checks: Sequence[Check]) -> set[str]:

@@ -103,9 +103,12 @@ def _without_mimics(
 
 def _doubted(found: Search, after: Sequence[Check]) -> dict[Effect, tuple[Doubt, ...]]:
     """The causes of the best model that are doubted, and why."""
-    checks = found.refits.leavings.checks
+
+    def at_its_best(lesser: Trial) -> tuple[Check, ...]:
+        return found.refits.leavings.checks(lesser.continued())
+
     reasons = {
-        cause: tuple(doubts(found.best, cause, after, without=partial(checks, lesser)))
+        cause: tuple(doubts(found.best, cause, after, without=partial(at_its_best, lesser)))
         for cause, lesser in zip(found.best.causes, found.lesser, strict=True)
     }
     return {cause: some for cause, some in reasons.items() if some}

@@ -323,3 +323,23 @@ def test_what_brings_too_little_without_a_doubted_cause_goes_too(monkeypatch: py
     found = search.Search(base, both, (), (lens, nothing), ((), ()), refits_with(needed=5.0)).without([bowl])
     assert found.best is base
     assert found.lesser == ()
+
+
+@pytest.mark.parametrize(
+    ("brought", "may_vanish", "is_searched"),
+    [(900.0, False, False), (900.0, True, True), (5.0, False, True)],
+    ids=["plainly", "by courses of events", "little"],
+)
+def test_a_model_without_a_cause_is_searched_where_it_may_do_as_well(
+    brought: float, *, may_vanish: bool, is_searched: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What a cause brings that may as well vanish, the model without it has for want of a course of events."""
+    best, without, found = refit_with("tilt+drag", brought), refit_with("drag", 0.0), refit_with("drag", brought)
+    best.may_vanish.return_value = may_vanish
+    best.without.return_value, without.mended.return_value = without, found
+    without.continued.return_value, found.continued.return_value = without, found
+    without.fit.fits = ["a", "b", "c"]
+    monkeypatch.setattr(search, "doubtful", lambda _fits: [1])
+    monkeypatch.setattr(Leavings, "of", lambda _self, _trial: Left((), (), np.ones(3)))
+    assert _searcher(needed=2.0)._left_out(best, SurfaceTilt()) is (found if is_searched else without)
+    assert [call.args for call in without.mended.call_args_list] == ([([1],)] if is_searched else [])

@@ -367,11 +367,19 @@ class _Searcher:
         return tuple(self._left_out(best, cause) for cause in causes)
 
     def _left_out(self, best: Trial, *causes: Effect) -> Trial:
-        """A model without some of its causes, searched the longer the less these seem to bring."""
+        """A model without some of its causes, searched the longer the less these seem to bring.
+
+        What a cause brings that may as well vanish is courses of events, which the model has without it.
+        """
         found = best.without(*causes)
-        if gain(best, found)[0] < PLAIN * self.needed:
+        if self._brings_little(best, found):
             found = found.mended(doubtful(found.fit.fits), seed=self.seed)
-        return found.continued() if gain(best, found)[0] < PLAIN * self.needed else found
+        return found.continued() if self._brings_little(best, found) else found
+
+    def _brings_little(self, best: Trial, lesser: Trial) -> bool:
+        """Whether it takes a search to tell what a model brings over one with less."""
+        little = gain(best, lesser)[0] < PLAIN * self.needed
+        return little or self.refits.is_nothing(best, lesser, self.leavings.of(best).overdispersion)
 
     def _rivals(self, best: Trial, lesser: Sequence[Trial], steps: Sequence[Step]) -> tuple[tuple[Trial, ...], ...]:
         """For each cause of a model: models in which another one takes its place.

@@ -1,5 +1,7 @@
 """What speaks against a cause that was found."""
 
+from unittest.mock import Mock, create_autospec
+
 import numpy as np
 import pytest
 
@@ -15,7 +17,16 @@ from vrdp_prob.discovery.checks.kicks import KICK
 from vrdp_prob.discovery.describe import describe
 from vrdp_prob.discovery.finding import Check, Verdict
 from vrdp_prob.discovery.residuals.contact_patterns import AT_WALLS
-from vrdp_prob.discovery.selection.doubts import OWN_CHECKS, Doubt, causes_with_own_check_failing, doubts, with_doubts
+from vrdp_prob.discovery.selection import doubts as doubts_module
+from vrdp_prob.discovery.selection.doubts import (
+    OWN_CHECKS,
+    Doubt,
+    causes_with_own_check_failing,
+    details_left,
+    doubts,
+    with_doubts,
+)
+from vrdp_prob.discovery.selection.search import Search
 from vrdp_prob.discovery.selection.trials import Trial
 from vrdp_prob.inference.several_videos.fitting import SharedFit
 from vrdp_prob.models.effects.contact_friction import ContactFriction
@@ -94,6 +105,36 @@ def test_what_is_left_of_what_a_cause_nearly_explains_is_details_of_its_law(
     """A strength that differs from body to body, say; but what happens once may have happened again."""
     found, without = ([one for pair in some.items() for one in left(*pair)] for some in (after, before))
     assert bool(list(doubts(trial, cause, found, without=lambda: without))) is is_doubted
+    assert len(list(details_left([cause], found))) == 1
+
+
+def test_a_cause_whose_own_checks_are_mended_leaves_no_details() -> None:
+    assert not list(details_left([ContactFriction(), SurfaceTilt()], [*left(RUBBING, 0.2), *left("push", 1e-9)]))
+
+
+def test_own_checks_are_asked_of_the_model_without_the_very_cause_fitted_to_its_end(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    asked: list[Mock] = []
+    checks = {RUBBING: left(RUBBING, 1e-97), KICK: left(KICK, 1e-97)}
+
+    def lesser(name: str) -> Mock:
+        one = create_autospec(Trial, instance=True)
+        one.continued.return_value = Mock(left=checks[name])
+        return one
+
+    def made(ended: Mock) -> tuple[Check, ...]:
+        asked.append(ended)
+        return tuple(ended.left)
+
+    friction, kick = ContactFriction(), ExternalImpulse()
+    best = create_autospec(Trial, instance=True, causes=(friction, kick), fit=Mock())
+    found = create_autospec(Search, instance=True, best=best, lesser=(lesser(RUBBING), lesser(KICK)))
+    found.refits = Mock(leavings=Mock(checks=made))
+    monkeypatch.setattr(doubts_module, "surprise", lambda _fit, _cause: 1.0)
+    doubted = outcome._doubted(found, [*left(RUBBING, 2e-4), *left(KICK, 2e-4)])
+    assert list(doubted) == [kick]
+    assert asked == [found.lesser[0].continued.return_value]
 
 
 def test_checks_and_causes_go_by_their_names(trial: Trial) -> None:

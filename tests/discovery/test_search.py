@@ -303,7 +303,7 @@ def test_a_rival_takes_the_place_of_a_doubted_cause_where_it_explains_as_much(
     nothing, bowl, tilt = refit_with("", 0.0), refit_with("bowl", 10.0), refit_with("tilt", explains)
     nothing.causes, bowl.causes, tilt.causes = (), (Bowl(),), (SurfaceTilt(),)
     tilt.continued.return_value = tilt
-    monkeypatch.setattr(search._Searcher, "_left_out", lambda _self, _best, _cause: nothing)
+    monkeypatch.setattr(search._Searcher, "_left_out", lambda _self, _best, _divisor, _cause: nothing)
     _judge_by_gain(monkeypatch)
     monkeypatch.setattr(Leavings, "of", lambda _self, _trial: Mock(spec=Left, overdispersion=np.ones(3)))
     before = search.Search(nothing, bowl, (), (nothing,), ((tilt,),), refits_with(needed=2.0))
@@ -316,7 +316,7 @@ def test_what_brings_too_little_without_a_doubted_cause_goes_too(monkeypatch: py
     bowl = Bowl()
     nothing.causes, lens.causes, both.causes = (), (LensDistortion(),), (LensDistortion(), bowl)
     both.without.return_value, lens.continued.return_value = lens, lens
-    monkeypatch.setattr(search._Searcher, "_left_out", lambda _self, _best, _cause: nothing)
+    monkeypatch.setattr(search._Searcher, "_left_out", lambda _self, _best, _divisor, _cause: nothing)
     _judge_by_gain(monkeypatch)
     monkeypatch.setattr(Leavings, "of", lambda _self, _trial: Mock(spec=Left, overdispersion=np.ones(3)))
     base = refit_with("", 0.0)
@@ -333,13 +333,12 @@ def test_what_brings_too_little_without_a_doubted_cause_goes_too(monkeypatch: py
 def test_a_model_without_a_cause_is_searched_where_it_may_do_as_well(
     brought: float, *, may_vanish: bool, is_searched: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """What a cause brings that may as well vanish, the model without it has for want of a course of events."""
+    """What a cause brings that may as well vanish are courses of events, which the model without it may find, too."""
     best, without, found = refit_with("tilt+drag", brought), refit_with("drag", 0.0), refit_with("drag", brought)
     best.may_vanish.return_value = may_vanish
     best.without.return_value, without.mended.return_value = without, found
     without.continued.return_value, found.continued.return_value = without, found
     without.fit.fits = ["a", "b", "c"]
     monkeypatch.setattr(search, "doubtful", lambda _fits: [1])
-    monkeypatch.setattr(Leavings, "of", lambda _self, _trial: Left((), (), np.ones(3)))
-    assert _searcher(needed=2.0)._left_out(best, SurfaceTilt()) is (found if is_searched else without)
+    assert _searcher(needed=2.0)._left_out(best, np.ones(3), SurfaceTilt()) is (found if is_searched else without)
     assert [call.args for call in without.mended.call_args_list] == ([([1],)] if is_searched else [])

@@ -14,7 +14,7 @@ from vrdp_prob.discovery.outcome import Outcome, outcome_of
 from vrdp_prob.discovery.page.figures import residual_figures
 from vrdp_prob.discovery.residuals.free_flight import NORMAL_95
 from vrdp_prob.discovery.selection.believed import extended_model, models_of_the_others
-from vrdp_prob.discovery.selection.doubts import Doubt, rivals_outside
+from vrdp_prob.discovery.selection.doubts import Doubt, details_left, rivals_outside
 from vrdp_prob.discovery.selection.estimates import mass_scale_notes, upper_bounds
 from vrdp_prob.discovery.selection.mimics import Unlisted
 from vrdp_prob.discovery.selection.search import Search
@@ -111,6 +111,7 @@ def discover(
         description=describe(found.best.fit, outcome.after) if doubtful else None,
         notes=(
             *_notes(found, causes, outcome.reasons, outcome.unlisted, doubtful=doubtful),
+            *details_left(found.best.causes, outcome.after),
             *rivals_outside((cause.effect for cause in causes if cause.named), outcome.checks),
             *mass_scale_notes(_told(found, causes), videos),
             *_limits(videos),

@@ -30,9 +30,11 @@ from vrdp_prob.models.effects.speed_dependent_restitution import SpeedDependentR
 
 SURPRISING = 0.01
 """Probability below which parameters of a cause, or what is left of what it acts on, say that it is something else."""
-MOSTLY, LEAST = 0.9, 1e-300
-"""Share of what an own check tells against the model without a cause (nats, by its p-value; of none less than the least
-one) that the cause must take away for what is left to be details of its law: strengths that differ between bodies."""
+NEARLY_ALL = 0.9
+"""Share of what each of its own checks that fail tells without a cause (nats, by the p-value) that the cause must take
+away for what is left to be details of its law: a strength that differs between bodies, say."""
+LEAST_P_VALUE = 1e-300
+"""P-values below count as this one."""
 OWN_CHECKS: Mapping[str, tuple[str, ...]] = {
     SpeedDependentRestitution.name: (REBOUND, REBOUND_AT_WALLS),
     ContactFriction.name: (RUBBING, RUBBING_AT_WALLS),
@@ -81,7 +83,8 @@ def doubts(
     left
         Checks of what the model leaves.
     without
-        Makes the checks of what it leaves without the cause, which are asked for where one of its own fails.
+        Makes the checks of what it leaves without the cause, which are asked for where one fails of a cause that lasts.
+        Without any of them what fails still is no detail.
     """
     of_parameters = surprise(trial.fit, cause)
     if of_parameters < SURPRISING:
@@ -90,9 +93,8 @@ def doubts(
             f"The parameters of '{title(cause.name)}' are far from what was expected of this cause: it may stand for "
             "something that it has as its limit, and its probability counts that.",
         )
-    own = sorted((one for one in left if one.name in OWN_CHECKS.get(cause.name, ())), key=lambda one: one.p_value)
-    by_chance = len(own) * own[0].p_value if own else 1.0
-    if by_chance < SURPRISING and (happens_once(cause) or not _mostly_mended(own, without())):
+    own, by_chance = _own(cause, left)
+    if by_chance < SURPRISING and (happens_once(cause) or not _nearly_explained(own, without())):
         otherwise = ", or it happened more often than was found" if happens_once(cause) else ""
         yield Doubt(
             by_chance / SURPRISING,
@@ -101,15 +103,33 @@ def doubts(
         )
 
 
-def _mostly_mended(own: Sequence[Check], without: Sequence[Check]) -> bool:
+def details_left(causes: Iterable[Effect], left: Sequence[Check]) -> Iterator[str]:
+    """What the own checks still tell of causes that are not doubted, in sentences."""
+    for cause in causes:
+        own, by_chance = _own(cause, left)
+        if by_chance < SURPRISING:
+            yield (
+                f"'{title(cause.name)}' explains nearly all that the check of {own[0].name} tells without it, and not "
+                "all: its law may differ in details, as by a strength that differs between bodies, or be another one "
+                "that is much like it."
+            )
+
+
+def _own(cause: Effect, left: Sequence[Check]) -> tuple[list[Check], float]:
+    """The own checks of a cause, the worst first, and how probable the worst of so many is by chance."""
+    own = sorted((one for one in left if one.name in OWN_CHECKS.get(cause.name, ())), key=lambda one: one.p_value)
+    return own, len(own) * own[0].p_value if own else 1.0
+
+
+def _nearly_explained(own: Sequence[Check], without: Sequence[Check]) -> bool:
     """Whether a cause takes away nearly all that each of its checks which fail still tells without it."""
     before = {one.name: one.p_value for one in without}
     failing = [one for one in own if len(own) * one.p_value < SURPRISING]
-    return all(_nats(one.p_value) <= (1 - MOSTLY) * _nats(before.get(one.name, 1.0)) for one in failing)
+    return all(_nats(one.p_value) <= (1 - NEARLY_ALL) * _nats(before.get(one.name, 1.0)) for one in failing)
 
 
 def _nats(p_value: float) -> float:
-    return -math.log(max(p_value, LEAST))
+    return -math.log(max(p_value, LEAST_P_VALUE))
 
 
 def causes_with_own_check_failing(checks: Sequence[Check]) -> set[str]:

@@ -268,7 +268,7 @@ class _Searcher:
         *before, last = chain
         if not before:
             return [last]
-        lesser = self._left_out(last, *last.beyond(before[-1]))
+        lesser = self._left_out(last, steps[-1].left.overdispersion, *last.beyond(before[-1]))
         better = self._with_both_courses(lesser, before[-1])
         if better is before[-1]:
             return list(chain)
@@ -322,8 +322,8 @@ class _Searcher:
         """
         best = chain[-1]
         known = [one for one in chain[-2:-1] if one.causes == best.causes[:-1]]
-        lesser = (*self._lesser(best, best.causes[: len(best.causes) - len(known)]), *known)
         divisor = steps[-1].left.overdispersion
+        lesser = (*self._lesser(best, best.causes[: len(best.causes) - len(known)], divisor), *known)
         sure = partial(_sure, divisor=divisor)
         for _ in range(MOST_SWAPS):
             best, lesser = self._pruned(best, lesser, divisor)
@@ -334,20 +334,21 @@ class _Searcher:
                 better = best
             if sure(better) <= sure(best):
                 break
-            best, lesser = better, self._lesser(better, better.causes)
+            best, lesser = better, self._lesser(better, better.causes, divisor)
         else:
             rivals = self._rivals(best, lesser, steps)
         return best, lesser, rivals
 
     def established(self, best: Trial) -> tuple[Trial, tuple[Trial, ...]]:
         """A model without those of its causes that bring too little, and the same without each of the others."""
-        return self._pruned(best, self._lesser(best, best.causes), self.leavings.of(best).overdispersion)
+        divisor = self.leavings.of(best).overdispersion
+        return self._pruned(best, self._lesser(best, best.causes, divisor), divisor)
 
     def _pruned(
         self, best: Trial, lesser: tuple[Trial, ...], divisor: Float[np.ndarray, "video"]
     ) -> tuple[Trial, tuple[Trial, ...]]:
         while (left := self._without_doubted(best, lesser, divisor)) is not None:
-            best, lesser = left, self._lesser(left, left.causes)
+            best, lesser = left, self._lesser(left, left.causes, divisor)
         return best, lesser
 
     def _without_doubted(
@@ -360,26 +361,30 @@ class _Searcher:
     def unpatched(self, best: Trial) -> Trial:
         """A model without those of its causes that patch several videos and explain few of them."""
         patching = next((cause for cause in best.causes if best.patches(cause)), None)
-        return best if patching is None else self.unpatched(self._left_out(best, patching))
+        return (
+            best
+            if patching is None
+            else self.unpatched(self._left_out(best, self.leavings.of(best).overdispersion, patching))
+        )
 
-    def _lesser(self, best: Trial, causes: Sequence[Effect]) -> tuple[Trial, ...]:
+    def _lesser(self, best: Trial, causes: Sequence[Effect], divisor: Float[np.ndarray, "video"]) -> tuple[Trial, ...]:
         """A model without each of some causes."""
-        return tuple(self._left_out(best, cause) for cause in causes)
+        return tuple(self._left_out(best, divisor, cause) for cause in causes)
 
-    def _left_out(self, best: Trial, *causes: Effect) -> Trial:
+    def _left_out(self, best: Trial, divisor: Float[np.ndarray, "video"], *causes: Effect) -> Trial:
         """A model without some of its causes, searched the longer the less these seem to bring.
 
-        What a cause brings that may as well vanish is courses of events, which the model has without it.
+        What a cause brings that may as well vanish are courses of events, which the model without it may find, too.
         """
-        found = best.without(*causes)
-        if self._brings_little(best, found):
-            found = found.mended(doubtful(found.fit.fits), seed=self.seed)
-        return found.continued() if self._brings_little(best, found) else found
 
-    def _brings_little(self, best: Trial, lesser: Trial) -> bool:
-        """Whether it takes a search to tell what a model brings over one with less."""
-        little = gain(best, lesser)[0] < PLAIN * self.needed
-        return little or self.refits.is_nothing(best, lesser, self.leavings.of(best).overdispersion)
+        def takes_a_search(lesser: Trial) -> bool:
+            little = gain(best, lesser)[0] < PLAIN * self.needed
+            return little or self.refits.is_nothing(best, lesser, divisor)
+
+        found = best.without(*causes)
+        if takes_a_search(found):
+            found = found.mended(doubtful(found.fit.fits), seed=self.seed)
+        return found.continued() if takes_a_search(found) else found
 
     def _rivals(self, best: Trial, lesser: Sequence[Trial], steps: Sequence[Step]) -> tuple[tuple[Trial, ...], ...]:
         """For each cause of a model: models in which another one takes its place.

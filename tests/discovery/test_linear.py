@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from vrdp_prob.discovery.residuals.linear import LinearFit, LinearVideo
+from vrdp_prob.discovery.residuals.linear import LinearFit, LinearVideo, Score
 
 
 def _video(seed: int) -> LinearVideo:
@@ -53,3 +53,15 @@ def test_slopes_of_all_videos_and_the_prior_balance() -> None:
     np.testing.assert_allclose(total + fit.prior_gradient - fit.prior @ step, 0.0, atol=1e-9)
     for video, left, slope in zip(fit.videos, fit.left, fit.slopes, strict=True):
         np.testing.assert_allclose(video.reduced_shared.T @ left, slope, atol=1e-9)
+
+
+def test_what_strengths_have_in_common_is_no_difference() -> None:
+    """Where a fit is at an edge, another parameter that has it leaves next to no information on it, and a slope."""
+    score = Score(np.array([3.7, 16.1, 2.0]), np.array([[292.4, -291.3, 0.0], [-291.3, 292.2, 0.0], [0.0, 0.0, 4.0]]))
+    assert score.chi_square > 190.0
+    apart = score.of_differences([0, 1])
+    half = (16.1 - 3.7) ** 2 / (292.4 + 292.2 + 2 * 291.3)
+    assert (apart.degrees, apart.chi_square) == (2, pytest.approx(half + 1.0))
+    np.testing.assert_allclose(apart.estimate[0], -apart.estimate[1])
+    assert score.of_differences([0]).degrees == 2
+    np.testing.assert_array_equal(score.of_differences([]).gradient, score.gradient)

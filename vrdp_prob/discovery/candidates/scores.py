@@ -177,8 +177,10 @@ def _scan_shared(
         for probe in found:
             block[:, :, columns[_name(probe, index)]] = probe.directions.T
         directions.append(block)
+    compared = [place for place, name in enumerate(names) if name in effect.told_by_differences]
     scores = [
-        _one_sided(model.linear.score([one[:, p] for one in directions]), names, effect) for p in range(len(points))
+        _one_sided(model.linear.score([one[:, p] for one in directions]).of_differences(compared), names, effect)
+        for p in range(len(points))
     ]
     statistics = np.array([score.chi_square for score in scores])
     best = int(np.argmax(statistics))

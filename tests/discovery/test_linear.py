@@ -59,9 +59,9 @@ def test_what_strengths_have_in_common_is_no_difference() -> None:
     """Where a fit is at an edge, another parameter that has it leaves next to no information on it, and a slope."""
     score = Score(np.array([3.7, 16.1, 2.0]), np.array([[292.4, -291.3, 0.0], [-291.3, 292.2, 0.0], [0.0, 0.0, 4.0]]))
     assert score.chi_square > 190.0
-    apart = score.of_differences([0, 1])
+    apart = score.within(np.array([[-1.0, 1.0, 0.0], [0.0, 0.0, 1.0]]))
     half = (16.1 - 3.7) ** 2 / (292.4 + 292.2 + 2 * 291.3)
     assert (apart.degrees, apart.chi_square) == (2, pytest.approx(half + 1.0))
     np.testing.assert_allclose(apart.estimate[0], -apart.estimate[1])
-    assert score.of_differences([0]).degrees == 2
-    np.testing.assert_array_equal(score.of_differences([]).gradient, score.gradient)
+    assert score.within(np.eye(3)[1:]).degrees == 2
+    np.testing.assert_array_equal(score.within(np.eye(3)).gradient, score.gradient)

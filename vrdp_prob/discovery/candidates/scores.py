@@ -142,6 +142,15 @@ def score_causes(fit: SharedFit, model: ResidualModel, effects: Iterable[Effect]
     return sorted(present, key=lambda one: (one.p_value, -one.chi_square))
 
 
+def telling_rows(names: Sequence[str], effect: Effect) -> Float[np.ndarray, "telling strength"]:
+    """What tells of an effect: each of its strengths, or how far those of one name are from the first of them."""
+    rows = np.eye(len(names))
+    for place, name in enumerate(names):
+        if name in effect.told_by_differences:
+            rows[place, names.index(name)] -= 1.0
+    return rows[np.abs(rows).sum(axis=1) > 0]
+
+
 def _scanned(fit: SharedFit, model: ResidualModel, seed: int, effect: Effect) -> CauseScore | None:
     if effect.overrides("frame_jitter"):
         return _scan_frames(model, effect)
@@ -177,9 +186,9 @@ def _scan_shared(
         for probe in found:
             block[:, :, columns[_name(probe, index)]] = probe.directions.T
         directions.append(block)
-    compared = [place for place, name in enumerate(names) if name in effect.told_by_differences]
+    rows = telling_rows(names, effect)
     scores = [
-        _one_sided(model.linear.score([one[:, p] for one in directions]).of_differences(compared), names, effect)
+        _one_sided(model.linear.score([one[:, p] for one in directions]).within(rows), names, effect)
         for p in range(len(points))
     ]
     statistics = np.array([score.chi_square for score in scores])

@@ -241,11 +241,10 @@ class Score:
         """Probability of as large a statistic if there is nothing; 1 where nothing is known."""
         return float(chi2.sf(self.chi_square, self.degrees)) if self.degrees else 1.0
 
-    def of_differences(self, chosen: Sequence[int]) -> "Score":
-        """The score where some of the strengths differ from their mean, which stays zero."""
-        apart = np.eye(len(self.gradient))
-        apart[np.ix_(chosen, chosen)] -= 1.0 / max(len(chosen), 1)
-        return Score(apart @ self.gradient, apart @ self.information @ apart)
+    def within(self, rows: Float[np.ndarray, "row strength"]) -> "Score":
+        """The score where the strengths lie in the span of some rows, and what is across these stays zero."""
+        onto = np.linalg.pinv(rows) @ rows
+        return Score(onto @ self.gradient, onto @ self.information @ onto)
 
     def of(self, chosen: Sequence[int], given: Sequence[int] = ()) -> "Score":
         """The score of some of the strengths, where some others may differ from zero, and no more."""

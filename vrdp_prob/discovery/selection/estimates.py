@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Float
 from scipy.stats import chi2
 
-from vrdp_prob.discovery.candidates.scores import CauseScore, Largest
+from vrdp_prob.discovery.candidates.scores import CauseScore, Largest, telling_rows
 from vrdp_prob.discovery.finding import Estimate, UpperBound
 from vrdp_prob.discovery.residuals.unexplained import Unexplained
 from vrdp_prob.discovery.selection.reach import Reach, reaches
@@ -111,7 +111,7 @@ def may_vanish(
         return False
     sd = widened(joint.gaussian.sd, overdispersion, unexplained)
     places = [place for place, *_ in strengths]
-    telling = _telling([joint.numbers.keys[place][0] for place in places], effect)
+    telling = telling_rows([joint.numbers.keys[place][0] for place in places], effect)
     if not len(telling):
         return True
     away = telling @ (
@@ -120,15 +120,6 @@ def may_vanish(
     root = telling @ ((sd / joint.gaussian.sd)[places, None] * joint.gaussian.root[places])
     is_near = away @ np.linalg.solve(root @ root.T, away) < chi2.ppf(CERTAIN, len(away))
     return bool(is_near) and not reaches(fit, vanishing, sd)
-
-
-def _telling(names: Sequence[str], effect: Effect) -> Float[np.ndarray, "telling strength"]:
-    """What tells of an effect: each of its strengths, or how far those of one name are from the first of them."""
-    rows = np.eye(len(names))
-    for place, name in enumerate(names):
-        if name in effect.told_by_differences:
-            rows[place, names.index(name)] -= 1.0
-    return rows[np.abs(rows).sum(axis=1) > 0]
 
 
 def mass_scale_notes(effects: Iterable[Effect], videos: Iterable[Tracks]) -> Iterator[str]:

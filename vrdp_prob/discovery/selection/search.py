@@ -360,12 +360,9 @@ class _Searcher:
 
     def unpatched(self, best: Trial) -> Trial:
         """A model without those of its causes that patch several videos and explain few of them."""
-        patching = next((cause for cause in best.causes if best.patches(cause)), None)
-        return (
-            best
-            if patching is None
-            else self.unpatched(self._left_out(best, self.leavings.of(best).overdispersion, patching))
-        )
+        while (patching := next((cause for cause in best.causes if best.patches(cause)), None)) is not None:
+            best = self._left_out(best, self.leavings.of(best).overdispersion, patching)
+        return best
 
     def _lesser(self, best: Trial, causes: Sequence[Effect], divisor: Float[np.ndarray, "video"]) -> tuple[Trial, ...]:
         """A model without each of some causes."""

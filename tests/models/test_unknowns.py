@@ -14,7 +14,14 @@ from vrdp_prob.models.effects.pair_force import PairForce
 from vrdp_prob.models.effects.wall import Wall as HiddenWall
 from vrdp_prob.models.physics import PhysicsModel
 from vrdp_prob.models.simulator.formula import Scalar
-from vrdp_prob.models.unknowns import SPIN_SD, SURFACE_SPEED_SD, Structure, structure_of, unknowns
+from vrdp_prob.models.unknowns import (
+    CUBE_SURFACE_SPEED_SD,
+    SPIN_SD,
+    SURFACE_SPEED_SD,
+    Structure,
+    structure_of,
+    unknowns,
+)
 from vrdp_prob.scene import Body, Shape, Tracks, Wall
 
 RUBBING = PhysicsModel.base().with_effect(ContactFriction())
@@ -35,10 +42,11 @@ def seen(shape: Shape, radius: float, walls: tuple[Wall, ...] = ()) -> Tracks:
         (Shape.SPHERE, 0.03, SURFACE_SPEED_SD / 0.03),
         (Shape.CYLINDER, 0.2, SURFACE_SPEED_SD / 0.2),
         (Shape.CYLINDER, 0.8, SPIN_SD),
-        (Shape.CUBE, 0.03, SPIN_SD),
+        (Shape.CUBE, 0.03, CUBE_SURFACE_SPEED_SD / 0.03),
+        (Shape.CUBE, 0.2, SPIN_SD),
     ],
 )
-def test_small_round_bodies_may_spin_fast(shape: Shape, radius: float, sd: float) -> None:
+def test_small_bodies_may_spin_fast(shape: Shape, radius: float, sd: float) -> None:
     coordinates = unknowns(seen(shape, radius), RUBBING, EVERYTHING)
     assert coordinates.entries[coordinates.places["spin", 0]].prior.sd == pytest.approx(sd)
 

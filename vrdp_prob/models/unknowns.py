@@ -39,7 +39,9 @@ SPEED_SD = 3.0
 SPIN_SD = 2.0
 """Prior standard deviation in rad/s of a release spin..."""
 SURFACE_SPEED_SD = 1.0
-"""...or that of the speed in m/s at which the side of a round body turns, if that is more."""
+"""...or that of the speed in m/s at which the side of a round body turns, if that is more..."""
+CUBE_SURFACE_SPEED_SD = 0.3
+"""...and of a cube, which is pushed rather than rolled or spun."""
 YAW_SD = 1.5
 """Prior standard deviation in rad of a cube's yaw: flat over the quarter turn after which a square looks the same."""
 ANGLE_ZERO_SD = 3.0
@@ -171,10 +173,11 @@ def _turning(tracks: Tracks, model: PhysicsModel, structure: Structure) -> Itera
 
 
 def _spin_sd(body: Body) -> float:
-    """Prior standard deviation in rad/s of the spin of a body: small round ones turn fast."""
-    if body.radius is None or not body.shape.is_disc:
+    """Prior standard deviation in rad/s of the spin of a body: small ones turn fast, round ones above all."""
+    if body.radius is None:
         return SPIN_SD
-    return max(SPIN_SD, SURFACE_SPEED_SD / body.radius)
+    surface_speed = SURFACE_SPEED_SD if body.shape.is_disc else CUBE_SURFACE_SPEED_SD
+    return max(SPIN_SD, surface_speed / body.radius)
 
 
 def _matter(tracks: Tracks, model: PhysicsModel, structure: Structure) -> Iterator[Coordinate]:

@@ -214,28 +214,36 @@ def test_a_cause_has_its_few_lost_videos_searched_anew(
 
 
 @pytest.mark.parametrize(
-    ("p_value", "explains", "loses", "taken"),
+    ("p_value", "promised", "explains", "loses", "taken"),
     [
-        (1e-5, True, False, "all searched anew"),
-        (1e-5, True, True, "tilt"),
-        (1e-5, False, False, "tilt"),
-        (0.2, True, False, "tilt"),
+        (1e-5, 30.0, True, False, "all searched anew"),
+        (1e-50, 300.0, True, False, "tilt"),
+        (1e-5, 30.0, True, True, "tilt"),
+        (1e-5, 30.0, False, False, "tilt"),
+        (0.2, 5.0, True, False, "tilt"),
     ],
-    ids=["something is left", "a video is lost with it", "most videos are not explained", "nothing is left"],
+    ids=[
+        "something is left",
+        "a law is called for",
+        "a video is lost with it",
+        "most videos are not explained",
+        "nothing is left",
+    ],
 )
 def test_where_a_cause_leaves_something_all_videos_are_searched_anew(
-    p_value: float, taken: str, *, explains: bool, loses: bool, monkeypatch: pytest.MonkeyPatch
+    p_value: float, promised: float, taken: str, *, explains: bool, loses: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     nothing, tilt, anew = refit_with("", 0.0), refit_with("tilt", 5.0), refit_with("all searched anew", 9.0)
     anew.loses_videos_of.return_value = loses
     tilt.fit = Mock(fits=[""] * 4)
     tilt.with_other_courses.return_value = anew
-    left = Mock(scores=[], beside_chance=[Mock(p_value=p_value)])
+    left = Mock(scores=[], beside_chance=[Mock(p_value=p_value, size=2 * promised)])
+    monkeypatch.setattr(refits, "happens_once", lambda _cause: False)
     monkeypatch.setattr(refits, "lost_videos", lambda _fit: [])
     monkeypatch.setattr(refits, "explained", lambda _fits: explains)
     monkeypatch.setattr(Leavings, "of", lambda _self, _trial: left)
     monkeypatch.setattr(refits.Refits, "_new", lambda _self, _trial: [tilt])
-    found = refits_with()
+    found = refits_with(needed=2.0)
     assert found.with_lost_found(nothing, tilt).causes == (taken,)
     assert [one.causes[0] for one in found.of(nothing)] == [taken]
 

@@ -31,6 +31,8 @@ PLAIN_TURNS = 4
 """Turns from which walls and discs that explain them need no comparison with what else may have been there."""
 SEARCHES = 3
 """How often the lost videos of a cause are searched anew, as long as that finds something."""
+LOUD = 20.0
+"""Gain, in those that are needed, that no video promises to a law whose residuals look like noise."""
 
 
 @dataclass(frozen=True)
@@ -185,7 +187,8 @@ class Refits:
         """One of the refits with its few lost videos searched anew, in the place of which it counts from then on.
 
         What one lost video leaves calls for many causes, of which each costs more to try than the search. Where most
-        videos are explained and something is left still, all of them are searched.
+        videos are explained and something is left still, all of them are searched, unless it calls for a law louder
+        than single videos can.
         """
         found = one
         for _ in range(SEARCHES):
@@ -195,12 +198,17 @@ class Refits:
             found = self.courses.searched_anew(found, videos) if few else found
             if found is before:
                 break
-        if self.leavings.something(found) and explained(found.fit.fits):
+        if self.leavings.something(found) and explained(found.fit.fits) and not self._calls_for_a_law(found):
             other = found.with_other_courses(seed=self.seed)
             found = found if other.loses_videos_of(found) else other
         if found is not one:
             self._keep(trial, [found if old is one else old for old in self.of(trial)])
         return found
+
+    def _calls_for_a_law(self, trial: Trial) -> bool:
+        """Whether what a model leaves beside chance calls for a law so loud that no few wrong courses are behind it."""
+        laws = (one for one in self.leavings.of(trial).beside_chance if not happens_once(one.effect))
+        return any(one.size > 2 * LOUD * self.needed for one in laws)
 
     def settled(self, trial: Trial, found: Sequence[Trial]) -> bool:
         """Whether the best cause leaves nothing to explain, and is not a kick in each of several videos."""

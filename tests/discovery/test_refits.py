@@ -143,9 +143,13 @@ def test_where_walls_that_tracks_show_are_plain_nothing_else_is_tried(
 
 
 @pytest.mark.parametrize("enough", [True, False], ids=["enough", "too little"])
-@pytest.mark.parametrize("refitted", [True, False], ids=["refitted before", "not refitted"])
+@pytest.mark.parametrize(
+    ("refitted", "calls", "refits_first"),
+    [(True, False, True), (False, True, True), (False, False, False)],
+    ids=["refitted before", "a law is called for", "not refitted"],
+)
 def test_lost_videos_are_searched_once_and_refits_made_only_where_that_leaves_something(
-    *, refitted: bool, enough: bool, monkeypatch: pytest.MonkeyPatch
+    *, refitted: bool, calls: bool, refits_first: bool, enough: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     tilt, drag, lost = refit_with("tilt", 1.0), refit_with("drag", 5.0), refit_with("tilt+friction", 50.0)
     asked: list[Trial] = []
@@ -157,11 +161,12 @@ def test_lost_videos_are_searched_once_and_refits_made_only_where_that_leaves_so
     monkeypatch.setattr(refits.Refits, "_new", lambda _self, _trial: [drag])
     monkeypatch.setattr(refits.Refits, "settled", lambda _self, _trial, found: enough and found[:1] == [lost])
     monkeypatch.setattr(refits.Refits, "_lost", searched)
+    monkeypatch.setattr(refits.Refits, "_calls_for_a_law", lambda _self, _trial: calls)
     found = refits_with()
     if refitted:
         found.of(tilt)
     for _ in range(2):
-        assert found.with_lost(tilt) == ([lost] if enough and not refitted else [lost, drag])
+        assert found.with_lost(tilt) == ([lost, drag] if refits_first or not enough else [lost])
     assert found.of(tilt) == found.with_lost(tilt)
     assert asked == [tilt]
 

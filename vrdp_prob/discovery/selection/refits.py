@@ -173,8 +173,11 @@ class Refits:
         """The refits, and where these leave something fits from the beginning, which count among them from then on.
 
         Where nothing was refitted yet, fits from the beginning come first: scores of a fit that has lost videos call
-        for many causes, each of which costs more than the search for the one that explains such a video.
+        for many causes, each of which costs more than the search for the one that explains such a video; unless one law
+        is called for beside these.
         """
+        if trial not in self._made and self._calls_for_a_law(trial):
+            self.of(trial)
         refitted, found = trial in self._made, self.made(trial)
         if trial not in self._searched and not self.settled(trial, found):
             self._searched.add(trial)

@@ -103,6 +103,20 @@ def test_a_cause_is_not_followed_that_promises_less_than_it_needs(
     assert refit.continued.called is followed
 
 
+@pytest.mark.parametrize(("brought", "is_freed"), [(-3.0, True), (12.0, False)], ids=["less", "as promised"])
+def test_a_law_that_falls_short_is_freed_of_videos_that_hold_it_back(
+    brought: float, *, is_freed: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(extensions, "mends_any_course", lambda _cause: False)
+    nothing, refit, score = _broken_off(20.0)
+    mended, freed = refit_with("cause", 0.0), refit_with("cause", 30.0)
+    for one, gained in ((mended, brought), (freed, 90.0)):
+        one.causes, one.brought.return_value, one.fit.joint.converged = refit.causes, gained, True
+    refit.mended.return_value = mended
+    mended.freed.side_effect = lambda base, *, seed: freed if (base, seed) == (nothing, 0) else refit
+    assert extensions_with(needed=6.0).made_of(nothing, [score]) == [freed if is_freed else mended]
+
+
 @pytest.mark.parametrize("once", [True, False], ids=["kicks", "a law"])
 def test_a_refit_that_brings_nothing_is_followed_once_at_most(*, once: bool, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(extensions, "mends_any_course", lambda _cause: once)

@@ -221,6 +221,38 @@ def test_videos_with_kicks_keep_the_course_on_which_these_were_found(
     assert (trial.with_other_courses(seed=0) is trial) is keeps
 
 
+@pytest.mark.parametrize(
+    ("cause", "converged", "gained", "asked"),
+    [
+        (ClockError(), False, [3.0, -9.0, 0.5, -1.5, 2.0, 1.0], [1, 3]),
+        (ClockError(), False, [-9.0, -8.0, -7.0, -6.0, 50.0, 60.0], [0, 1, 2]),
+        (ClockError(), False, [3.0, -0.5, 0.5, 0.0, 2.0, 1.0], []),
+        (ClockError(), True, [3.0, -9.0, 0.5, -1.5, 2.0, 1.0], None),
+        (ExternalImpulse(), False, [3.0, -9.0, 0.5, -1.5, 2.0, 1.0], None),
+    ],
+    ids=["two", "half at most", "none", "at the top", "kicks"],
+)
+def test_videos_that_may_hold_a_cause_back_yield_where_the_climb_broke_off(
+    cause: Effect, gained: list[float], asked: list[int] | None, *, converged: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    _, fit = fitted("surface_tilt", 3.0, seed=2)
+    searches: list[list[int]] = []
+
+    def mended(fit: SharedFit, videos: list[int], *, seed: int, yielding: bool) -> SharedFit:
+        assert yielding
+        assert seed == 4
+        searches.append(videos)
+        return fit
+
+    monkeypatch.setattr(SharedFit, "mended", mended)
+    base = Trial((), fit)
+    trial = Trial((cause,), replace(fit, fits=((*fit.fits,) * 6)[:6], joint=replace(fit.joint, converged=converged)))
+    density = property(lambda one: np.array(gained) if one is trial else np.zeros(6))
+    monkeypatch.setattr(Trial, "fitted_density", density)
+    assert trial.freed(base, seed=4) is trial
+    assert searches == ([] if asked is None else [asked])
+
+
 def test_a_course_that_another_fit_has_found_is_taken_from_it(monkeypatch: pytest.MonkeyPatch) -> None:
     _, fit = fitted("surface_tilt", 3.0, seed=2)
     joint = fit.joint

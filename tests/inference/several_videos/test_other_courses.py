@@ -1,5 +1,6 @@
 """Videos of a joint fit are searched anew."""
 
+from dataclasses import replace
 from unittest.mock import Mock, create_autospec
 
 import numpy as np
@@ -140,3 +141,20 @@ def _fits(ratios: list[float], *, bodies: int = 2) -> list[Mock]:
         Mock(spec=MapFit, misfit=Mock(ratio=ratio), clues=Mock(tracks=tracks()), rollout=Mock(events=()))
         for ratio in ratios
     ]
+
+
+@pytest.mark.parametrize(
+    ("yielding", "less_probable", "is_taken"),
+    [(True, 3.0, True), (True, 9.0, False), (False, 3.0, False)],
+    ids=["about as probable", "less probable", "not to yield"],
+)
+def test_a_video_that_is_to_yield_takes_what_goes_with_the_others_where_it_is_about_as_probable(
+    less_probable: float, *, yielding: bool, is_taken: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    fit = fit_together([sliding(1), sliding(2), sliding(3)], model=PhysicsModel.base(), model_error=False)
+    single = fit.fits[1]
+    mode = replace(single.modes[0], log_density=single.log_density - less_probable)
+    monkeypatch.setattr(second_look, "fit_map", lambda *_given, **_how: replace(single, modes=(mode,)))
+    found = second_look.look_again(fit.fits, [1], fit.model, None, seed=0, looks=1, yielding=yielding)
+    assert (found[1].log_density < single.log_density) is is_taken
+    assert found[0] is fit.fits[0]

@@ -48,7 +48,8 @@ class Extensions:
         """Fits with one cause more, the best first; those that were made before stand `beside`.
 
         Where the score of a cause promises more than any refit has brought, and its own brought far less, that goes on
-        if it broke off on a long way; and where videos have lost their course of events on it, they are searched anew.
+        if it broke off on a long way; and videos are searched anew that have lost their course of events on it, or hold
+        it back.
         So it is with the cause whose score promises most of all, whatever others have brought, if that is as much as a
         cause needs at all. What mends any course is no measure of other causes.
         """
@@ -75,6 +76,8 @@ class Extensions:
             further = hopeful.continued()
             if fallen := further.fallen_from(trial):
                 further = further.mended(fallen, seed=self.seed)
+            if further.brought(trial) < promised[hopeful.causes[-1].name]:
+                further = further.freed(trial, seed=self.seed)
             gained = further.brought(trial) - hopeful.brought(trial)
             if gained < self.needed:
                 promised.pop(hopeful.causes[-1].name)

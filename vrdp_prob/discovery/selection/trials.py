@@ -45,6 +45,8 @@ MOVED = 1e-3
 """Probability that lateness of neighbouring frames is so much alike by chance, below which it is none."""
 FELL = 5.0
 """Nats by which a video may be less probable with one more cause; beyond that it has lost its course of events."""
+HELD_BACK = 1.0
+"""The same for a video that may hold a cause back whose common climb ended before it was at the top."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -152,9 +154,21 @@ class Trial:
         """Whether most videos are explained no more, which they are in another fit."""
         return explained(other.fit.fits) and not explained(self.fit.fits)
 
-    def _fallen_from(self, base: "Trial") -> list[int]:
+    def _fallen_from(self, base: "Trial", by: float = FELL) -> list[int]:
         gained = self.fitted_density - base.fitted_density
-        return [int(k) for k in np.argsort(gained) if gained[k] < -FELL]
+        return [int(k) for k in np.argsort(gained) if gained[k] < -by]
+
+    def freed(self, base: "Trial", *, seed: int) -> "Trial":
+        """The fit with videos searched anew that may hold back what it has beyond a model with less; the better one.
+
+        On a wrong course of events a video may be explained as well, and have no world where a cause grows to what the
+        others ask for: then the common climb ends there.
+        """
+        if self.fit.joint.converged or any(mends_any_course(cause) for cause in self.causes):
+            return self
+        holding = self._fallen_from(base, HELD_BACK)
+        found = self.fit.mended(holding[: max(len(self.fit.fits) // MOST, 1)], seed=seed, yielding=True)
+        return self if found is self.fit else replace(self, fit=with_own_population(found)).continued()
 
     def with_cause_in_place(self, score: CauseScore, least: float) -> "Trial | None":
         """The fit with a cause in the place of the last one, from where that has brought the videos.

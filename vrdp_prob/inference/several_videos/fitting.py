@@ -167,7 +167,7 @@ class SharedFit:
         found = climb(numbers, videos, shared, locals_, towards=towards, least=least, effort=effort)
         return _finished(found, model, self.fits, structures, self.shared, model_error=model_error)
 
-    def mended(self, lost: Sequence[int], *, seed: int, thorough: bool = False) -> "SharedFit":
+    def mended(self, lost: Sequence[int], *, seed: int, thorough: bool = False, yielding: bool = False) -> "SharedFit":
         """The fit with a new search for what happened in some videos, given what the others say; the better of both.
 
         Numbers of a video that are held are held in its search, too.
@@ -180,6 +180,9 @@ class SharedFit:
             Seed of the searches.
         thorough
             Whether a search goes on where it explains a video as well as others are explained.
+        yielding
+            Whether what is found given what the others say is taken where it is only about as probable by itself: a
+            video may be explained as well on a course of events that holds the others back.
         """
         joint = self.joint
         others = [index for index in range(len(self.fits)) if index not in lost]
@@ -206,6 +209,7 @@ class SharedFit:
             asked=others,
             thorough=thorough,
             held=[structure.held for structure in self.structures],
+            yielding=yielding,
         )
         changed = [index for index in lost if fits[index] is not settled[index]]
         if not changed:

@@ -41,6 +41,8 @@ may be wrong where cubes whose yaws nobody measured are on wrong islands."""
 FELL = 20.0
 """Nats by which a fit may be less probable than the one it replaces: residuals of a video that has gone astray
 altogether count as outliers, and what is left looks small."""
+AS_PROBABLE = 5.0
+"""Nats by which a fit may be less probable that is taken since it goes with what the others say."""
 WIDER, LEAST_SD = 2.0, 0.02
 """What the others say is believed with so many times its standard deviation, and at least with this one."""
 
@@ -122,6 +124,7 @@ def look_again(
     thorough: bool = False,
     optimiser: Optimiser = Optimiser.GAUSS_NEWTON,
     held: Sequence[Held] | None = None,
+    yielding: bool = False,
 ) -> list[MapFit]:
     """The fits of single videos, with some of them searched anew, and improved where that is better.
 
@@ -149,6 +152,8 @@ def look_again(
         What refines starts.
     held
         Numbers of each video's own that are not unknown though the model has them; none where None.
+    yielding
+        Whether a fit with what the others say is taken where it is about as probable, too.
     """
     if not chosen:
         return list(fits)
@@ -161,7 +166,8 @@ def look_again(
         structure_of(fit.likelihood.coordinates, known)
         for fit, known in zip(fits, held or [{}] * len(fits), strict=True)
     ]
-    look = _Look(model, _told(fits, structures, model, shared, among, islands=islands), goal, seed, tuple(ways))
+    told = _told(fits, structures, model, shared, among, islands=islands)
+    look = _Look(model, told, goal, seed, tuple(ways), yielding=yielding)
     doubted = [
         _Doubted(
             fits[index],
@@ -213,6 +219,8 @@ class _Look:
         Seed of the searches.
     ways
         Whether each of them believes what other videos say, and how it is made.
+    yielding
+        Whether one that does is better where it is about as probable, too.
     """
 
     model: PhysicsModel
@@ -220,6 +228,7 @@ class _Look:
     goal: float
     seed: int
     ways: tuple[tuple[bool, FitPlan], ...]
+    yielding: bool = False
 
     def __call__(self, doubted: _Doubted) -> MapFit | None:
         """A better fit, if there is one."""
@@ -235,7 +244,8 @@ class _Look:
             model = self.told if believing else self.model
             found = fit_map(best.clues.tracks, model, generator, plan=plan, model_error=False, held=doubted.held)
             gained = best.misfit.residual_sd / found.misfit.residual_sd - 1
-            if gained > SAME and found.log_density > best.log_density - FELL:
+            yields = self.yielding and believing and found.log_density > best.log_density - AS_PROBABLE
+            if yields or (gained > SAME and found.log_density > best.log_density - FELL):
                 structure = structure_of(found.likelihood.coordinates, doubted.held)
                 likelihood = plain_likelihood(found.clues, self.model, structure)
                 best = better = replace(found, likelihood=likelihood)

@@ -9,8 +9,10 @@ import _project  # noqa: F401  the generator belongs to the tests, which lie bes
 
 from tests.discovery.causes import CATALOGUE, VARIANTS
 from tests.discovery.data_set import DataSet
-from tests.discovery.hidden import MET_OFTEN
+from tests.discovery.hidden import MET_OFTEN, ROUGH
+from tests.discovery.measurement import Measurement
 from tests.discovery.other_effects import OTHERS
+from tests.discovery.scales import scaled
 from tests.discovery.scenes import Setting
 from vrdp_prob import load_all
 from vrdp_prob.scene import Tracks
@@ -56,6 +58,36 @@ class Kind(StrEnum):
 
 
 @dataclass(frozen=True)
+class Table:
+    """On which scale, and how, all videos of a task are filmed.
+
+    Parameters
+    ----------
+    length, time
+        Factors by which all lengths and times of the tracks, and so the noise, are multiplied: 0.1 and 0.316 make a
+        table of marbles, on which gravity is the same.
+    frame_rate
+        Frames per second before that, of 4 s.
+    noise
+        Standard deviation in m of a coordinate before that.
+    """
+
+    length: float = 1.0
+    time: float = 1.0
+    frame_rate: float = 25.0
+    noise: float = Measurement.noise
+
+    def __str__(self) -> str:
+        usual = Table()
+        told = [
+            f"{name} {getattr(self, name):g}"
+            for name in ("length", "time", "frame_rate", "noise")
+            if getattr(self, name) != getattr(usual, name)
+        ]
+        return "".join(f", {one.replace('_', ' ')}" for one in told)
+
+
+@dataclass(frozen=True)
 class Task:
     """A data set to draw and to search.
 
@@ -71,6 +103,8 @@ class Task:
         Of the data.
     videos, bodies
         Numbers of videos, and of bodies in each.
+    table
+        On which scale, and how, they are filmed.
     """
 
     kind: Kind
@@ -79,12 +113,14 @@ class Task:
     seed: int
     videos: int = 12
     bodies: int = 4
+    table: Table = Table()
 
     @property
     def name(self) -> str:
         """The task in words, by which its result is found again."""
         what = "+".join(self.ways) or "nothing"
-        return f"{self.kind}: {what}, size {self.effect_size:g}, {self.videos} videos x {self.bodies}, seed {self.seed}"
+        videos = f"{self.videos} videos x {self.bodies}"
+        return f"{self.kind}: {what}, size {self.effect_size:g}, {videos}, seed {self.seed}{self.table}"
 
 
 def tasks(
@@ -95,6 +131,7 @@ def tasks(
     nulls: int = 60,
     videos: int = 12,
     bodies: int = 4,
+    table: Table | None = None,
 ) -> list[Task]:
     """The grid, seed by seed, so that a run that is cut short has seen some of everything.
 
@@ -111,6 +148,8 @@ def tasks(
         that hardly brake.
     videos, bodies
         Numbers of videos, and of bodies in each.
+    table
+        On which scale, and how, they are filmed; the usual one where None.
     """
     chosen = set(causes if causes is not None else (*CATALOGUE, *VARIANTS, *OTHERS))
     single = [way for way in (*CATALOGUE, *VARIANTS) if way in chosen]
@@ -132,17 +171,28 @@ def tasks(
     empty += [Task(Kind.GLIDING_NULL, (), 0.0, k + 1) for k in range(nulls // 3)]
     share = -(-len(empty) // max(seeds, 1))
     listed = [task for k, found in enumerate(rounds) for task in (*found, *empty[k * share : (k + 1) * share])]
-    return [replace(task, videos=videos, bodies=bodies) for task in (listed if rounds else empty)]
+    found = listed if rounds else empty
+    return [replace(task, videos=videos, bodies=bodies, table=table or Table()) for task in found]
 
 
 def setting(task: Task) -> Setting:
     """What kind of videos a data set is made of."""
     resistance = HARDLY if task.kind is Kind.GLIDING_NULL else 1.0
-    return Setting(videos=task.videos, bodies=task.bodies, resistance=resistance)
+    usual, rate = Setting(), task.table.frame_rate
+    frames = round(usual.frames * rate / usual.frame_rate)
+    return Setting(videos=task.videos, bodies=task.bodies, frames=frames, frame_rate=rate, resistance=resistance)
 
 
-def handed_over(data: DataSet) -> list[Tracks]:
-    """What discovery gets of a data set: its tracks, written and read again."""
+def measurement(task: Task) -> Measurement:
+    """How the videos of a data set are measured."""
+    return replace(ROUGH if task.kind is Kind.ROUGH_NULL else Measurement(), noise=task.table.noise)
+
+
+def handed_over(data: DataSet, table: Table | None = None) -> list[Tracks]:
+    """What discovery gets of a data set: its tracks, on the scale of a table, written and read again."""
+    if table is not None:
+        tracks = [scaled(one, length=table.length, time=table.time) for one in data.tracks]
+        data = replace(data, tracks=tracks)
     with tempfile.TemporaryDirectory() as folder:
         data.write(folder)
         return load_all(folder)

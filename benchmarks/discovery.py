@@ -6,7 +6,8 @@ Each task draws videos with a hidden cause (`tests/discovery`: an integrator tha
 but their tracks, reads them back and calls `discover`. Each result is written to `--results` (a file) as it comes, so
 that a run that was interrupted goes on; results of another version of the code are to be deleted by hand. `--causes`
 may also name effects outside the catalogue. `--docs` writes the tables into `discovery-tests.md` there; `--show` only
-reads the results there are. One process per core.
+reads the results there are. One process per core. `--length` and `--time` put the same motion on another scale,
+`--frame-rate` and `--noise` film it otherwise; such results are kept apart by `--results`.
 """
 
 import argparse
@@ -25,11 +26,11 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 import torch
 from _discovery_page import page, tables
 from _discovery_results import checks
-from _discovery_tasks import SIZES, Kind, Task, handed_over, setting, tasks
+from _discovery_tasks import SIZES, Kind, Table, Task, handed_over, measurement, setting, tasks
 from _resumable import Result, measured, read
 
 from tests.discovery.data_set import Truth
-from tests.discovery.hidden import ROUGH, hide, true_values
+from tests.discovery.hidden import hide, true_values
 from tests.discovery.other_effects import ALL
 from tests.discovery.videos import UnendingMotionError
 from vrdp_prob.discovery.discover import discover
@@ -58,6 +59,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--nulls", type=int, default=60, help="data sets with nothing hidden, a third more that glide")
     parser.add_argument("--videos", type=int, default=12)
     parser.add_argument("--bodies", type=int, default=4)
+    parser.add_argument("--length", type=float, default=1.0, help="factor of all lengths, the noise with them")
+    parser.add_argument("--time", type=float, default=1.0, help="factor of all times")
+    parser.add_argument("--frame-rate", type=float, default=25.0, help="frames per second, before that factor")
+    parser.add_argument("--noise", type=float, default=Table.noise, help="noise in m, before that factor")
     parser.add_argument("--results", type=Path, default=RESULTS, help="file of the results, which are gone on with")
     parser.add_argument("--show", action="store_true", help="compute nothing, show all results there are")
     parser.add_argument("--processes", type=int, default=os.cpu_count() or 1)
@@ -77,6 +82,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         nulls=options.nulls,
         videos=options.videos,
         bodies=options.bodies,
+        table=Table(options.length, options.time, options.frame_rate, options.noise),
     )
     listed = [task for task in listed if task.kind in {KINDS[name] for name in kinds}]
     if options.show:
@@ -99,9 +105,9 @@ def one(task: Task) -> Result:
     """What discovery makes of a data set."""
     torch.set_num_threads(1)
     facts: dict[str, Any] = {"task": task.name, **asdict(task)}
-    rough = ROUGH if task.kind is Kind.ROUGH_NULL else None
+    how = {"setting": setting(task), "measurement": measurement(task)}
     try:
-        data = hide(task.ways, seed=task.seed, effect_size=task.effect_size, setting=setting(task), measurement=rough)
+        data = hide(task.ways, seed=task.seed, effect_size=task.effect_size, **how)
     except (UnendingMotionError, ValueError) as error:  # scenes in which this cause finds no room
         return {**facts, "not_drawn": str(error)}
     facts["hidden"] = [
@@ -113,7 +119,7 @@ def one(task: Task) -> Result:
         }
         for cause in data.truth.causes
     ]
-    videos = handed_over(data)
+    videos = handed_over(data, task.table)
     wall, cpu = time.perf_counter(), time.process_time()
     try:
         finding = discover(videos, seed=0, catalogue=catalogue(task), processes=1)

@@ -10,8 +10,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.discovery.data_set import Truth
+from tests.discovery.data_set import DataSet, Truth
 from tests.discovery.hidden import ROUGH, hide
+from tests.discovery.scales import scaled
 from tests.discovery.scenes import Setting
 from vrdp_prob import load_all
 from vrdp_prob.discovery.discover import discover
@@ -43,6 +44,17 @@ def finding_of(
     known = known_effects()
     looked_for = None if catalogue is None else [known[name]() for name in catalogue]
     return truth, discover(load_all(folder), seed=0, catalogue=looked_for, processes=processes)
+
+
+@pytest.mark.slow
+def test_a_tilt_is_named_on_a_table_of_marbles(tmp_path: Path) -> None:
+    """Small bodies spin fast, and everything happens in a third of the time."""
+    data = hide(["surface_tilt"], seed=1, effect_size=3.0, setting=LARGER)
+    DataSet([scaled(one, length=0.1, time=0.316) for one in data.tracks], data.truth).write(tmp_path)
+    finding = discover(load_all(tmp_path), seed=0)
+    assert finding.verdict is Verdict.NAMED
+    assert [cause.name for cause in finding.causes if cause.named] == ["surface_tilt"]
+    assert finding.causes[0].probability > SURE
 
 
 @pytest.fixture(scope="module")

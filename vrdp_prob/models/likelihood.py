@@ -1,6 +1,6 @@
 """Log density of the tracks of one video, given its unknowns as one unconstrained vector."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -32,6 +32,9 @@ from vrdp_prob.scene import Tracks
 EVENT_LIMIT = 1000
 """Events of one world after which it counts as impossible; a video shows a few dozen at most, and bodies that press on
 each other some hundred."""
+FASTEST = 300.0
+"""Spin, in standard deviations of what is believed of it, from which a world counts as impossible: a step of a search
+along numbers of which the tracks tell nothing can ask for 1e8 rad/s, which take minutes to follow."""
 
 
 @dataclass(frozen=True)
@@ -98,6 +101,15 @@ class Likelihood:
     @cached_property
     def _scenery(self) -> Scenery:
         return Scenery.of(self.tracks)
+
+    @cached_property
+    def _fastest(self) -> Float[Tensor, "body"]:
+        """Spin in rad/s of each body that is simulated at most."""
+        fastest = torch.full((len(self.tracks.bodies),), torch.inf, dtype=torch.float64)
+        for entry in self.coordinates.entries:
+            if entry.field == "spin" and entry.owner is not None:
+                fastest[entry.owner] = FASTEST * entry.prior.sd
+        return fastest
 
     @cached_property
     def _times(self) -> Float[Tensor, "time"]:
@@ -306,6 +318,9 @@ class Likelihood:
         """Discrepancies of some worlds, and whether each was simulated."""
         observations = self.observations if frame_count is None else self.observations.until(frame_count)
         worlds = self._worlds(quantities)
+        possible = (worlds.spin.detach().abs() <= self._fastest).all(dim=1)
+        if not possible.all():
+            worlds = replace(worlds, spin=torch.where(possible[:, None], worlds.spin, torch.zeros_like(worlds.spin)))
         rollout, valid = self._rollout(worlds, frame_count)
         states = self._measured(worlds, rollout)
         # index_select, because its derivative is many times faster than that of indexing with several arrays.
@@ -316,7 +331,7 @@ class Likelihood:
         angle = turned / observations.angle_reference
         finite = torch.isfinite(position).all(dim=(1, 2)) & torch.isfinite(angle).all(dim=1)
         rates = _rates(rollout, observations) if jitters(self.model) else None
-        return Discrepancies(position, angle, rates), valid & finite.numpy()
+        return Discrepancies(position, angle, rates), valid & (finite & possible).numpy()
 
 
 def _rates(rollout: Rollout, observations: Observations) -> Float[Tensor, "point number"]:

@@ -13,7 +13,7 @@ from vrdp_prob.discovery.candidates.scores import score_causes
 from vrdp_prob.discovery.finding import HeldOut, VideoErrors
 from vrdp_prob.discovery.residuals.held_out import all_but_each, cavities, left_out
 from vrdp_prob.discovery.residuals.residual_model import ResidualModel
-from vrdp_prob.discovery.selection import estimates
+from vrdp_prob.discovery.selection import estimates, trials
 from vrdp_prob.discovery.selection.estimates import may_vanish
 from vrdp_prob.discovery.selection.forecast import SEEN_SHARE, _forecast, error_ratios, held_out
 from vrdp_prob.discovery.selection.trials import Trial, gain, gains, weights
@@ -251,6 +251,21 @@ def test_videos_that_may_hold_a_cause_back_yield_where_the_climb_broke_off(
     monkeypatch.setattr(Trial, "fitted_density", density)
     assert trial.freed(base, seed=4) is trial
     assert searches == ([] if asked is None else [asked])
+
+
+@pytest.mark.parametrize(("brings", "is_better"), [(9.0, True), (-9.0, False)], ids=["more", "less"])
+def test_a_cause_that_was_freed_stays_so_where_it_brings_more(
+    brings: float, *, is_better: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    _, fit = fitted("surface_tilt", 3.0, seed=2)
+    broken_off = replace(fit, joint=replace(fit.joint, converged=False))
+    monkeypatch.setattr(SharedFit, "mended", lambda _fit, _videos, **_how: fit)
+    monkeypatch.setattr(trials, "with_own_population", lambda fit: fit)
+    base, trial = Trial((), fit), Trial((SurfaceTilt(),), broken_off)
+    values = property(lambda one: np.full(2, brings if one.causes and one is not trial else 0.0))
+    monkeypatch.setattr(Trial, "fitted_density", values)
+    monkeypatch.setattr(Trial, "_fallen_from", lambda *_given: [1])
+    assert (trial.freed(base, seed=0) is not trial) is is_better
 
 
 def test_a_course_that_another_fit_has_found_is_taken_from_it(monkeypatch: pytest.MonkeyPatch) -> None:

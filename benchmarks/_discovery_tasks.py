@@ -74,8 +74,13 @@ class Table:
 
     length: float = 1.0
     time: float = 1.0
-    frame_rate: float = 25.0
+    frame_rate: float = Setting.frame_rate
     noise: float = Measurement.noise
+
+    @property
+    def is_of_usual_scale(self) -> bool:
+        """Whether lengths and times are those of the motion that was drawn."""
+        return self.length == self.time == 1.0
 
     def __str__(self) -> str:
         usual = Table()

@@ -7,7 +7,7 @@ but their tracks, reads them back and calls `discover`. Each result is written t
 that a run that was interrupted goes on; results of another version of the code are to be deleted by hand. `--causes`
 may also name effects outside the catalogue. `--docs` writes the tables into `discovery-tests.md` there; `--show` only
 reads the results there are. One process per core. `--length` and `--time` put the same motion on another scale,
-`--frame-rate` and `--noise` film it otherwise; such results are kept apart by `--results`.
+`--frame-rate` and `--noise` film it otherwise; name another file of results for such, which tables would count alike.
 """
 
 import argparse
@@ -61,7 +61,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--bodies", type=int, default=4)
     parser.add_argument("--length", type=float, default=1.0, help="factor of all lengths, the noise with them")
     parser.add_argument("--time", type=float, default=1.0, help="factor of all times")
-    parser.add_argument("--frame-rate", type=float, default=25.0, help="frames per second, before that factor")
+    parser.add_argument(
+        "--frame-rate", type=float, default=Table.frame_rate, help="frames per second, before that factor"
+    )
     parser.add_argument("--noise", type=float, default=Table.noise, help="noise in m, before that factor")
     parser.add_argument("--results", type=Path, default=RESULTS, help="file of the results, which are gone on with")
     parser.add_argument("--show", action="store_true", help="compute nothing, show all results there are")
@@ -126,7 +128,7 @@ def one(task: Task) -> Result:
     except Exception:  # one failure is a result, and the others go on
         return {**facts, "exception": traceback.format_exc(limit=-4)}
     seconds = {"wall": time.perf_counter() - wall, "cpu": time.process_time() - cpu}
-    return {**facts, **outcome(finding, data.truth), "seconds": seconds}
+    return {**facts, **outcome(finding, data.truth, comparable=task.table.is_of_usual_scale), "seconds": seconds}
 
 
 def catalogue(task: Task) -> list[Effect] | None:
@@ -137,14 +139,14 @@ def catalogue(task: Task) -> list[Effect] | None:
     return [effect() for effect in known_effects().values() if effect.cause_name() not in hidden]
 
 
-def outcome(finding: Finding, truth: Truth) -> Result:
-    """What was found, and the truth beside it."""
+def outcome(finding: Finding, truth: Truth, *, comparable: bool) -> Result:
+    """What was found, and the truth beside it where that is of the same scale."""
     return {
         "verdict": str(finding.verdict),
-        "causes": [_cause(cause, truth) for cause in finding.causes],
+        "causes": [_cause(cause, truth, comparable=comparable) for cause in finding.causes],
         "failing_checks": [check.name for check in finding.checks if check.significant],
         "failing_checks_after": [check.name for check in finding.checks_after if check.significant],
-        "bounds": list(_bounds(finding, truth)),
+        "bounds": list(_bounds(finding, truth)) if comparable else [],
         "notes": list(finding.notes),
     }
 
@@ -161,10 +163,10 @@ def _bounds(finding: Finding, truth: Truth) -> Iterator[Result]:
             yield {"name": bound.name, "parameter": bound.parameter, "bound": bound.bound, "truth": strength}
 
 
-def _cause(cause: FoundCause, truth: Truth) -> Result:
+def _cause(cause: FoundCause, truth: Truth, *, comparable: bool) -> Result:
     right = {hidden.name for hidden in truth.causes}
     true = {}
-    if cause.name in right:
+    if comparable and cause.name in right:
         true = true_values(truth, {name: estimate.mean for name, estimate in cause.parameters.items()})
     gain = cause.gain
     return {

@@ -9,7 +9,14 @@ def scaled(tracks: Tracks, *, length: float, time: float) -> Tracks:
     """Tracks whose lengths, the noise with them, and times are multiplied by a factor each.
 
     With a length of `time` squared gravity is the same, and so are all coefficients of friction.
+
+    Raises
+    ------
+    ValueError
+        If the tracks state a camera, covariances or moments of inertia, which would have to be scaled, too.
     """
+    if tracks.camera or "position_covariance" in tracks.data or any(one.inertia for one in tracks.bodies):
+        raise ValueError("only tracks without camera, covariances and moments of inertia are put on another scale.")
     data = tracks.data.assign(x=length * tracks.data["x"], y=length * tracks.data["y"])
     return replace(
         tracks,

@@ -33,8 +33,8 @@ EVENT_LIMIT = 1000
 """Events of one world after which it counts as impossible; a video shows a few dozen at most, and bodies that press on
 each other some hundred."""
 FASTEST = 300.0
-"""Spin, in standard deviations of what is believed of it, from which a world counts as impossible: a step of a search
-along numbers of which the tracks tell nothing can ask for 1e8 rad/s, which take minutes to follow."""
+"""Release spin, in standard deviations of what is believed of it, from which a world counts as impossible: a step of a
+search along numbers of which the tracks tell nothing can ask for 1e8 rad/s, which take minutes to follow."""
 
 
 @dataclass(frozen=True)
@@ -104,7 +104,7 @@ class Likelihood:
 
     @cached_property
     def _fastest(self) -> Float[Tensor, "body"]:
-        """Spin in rad/s of each body that is simulated at most."""
+        """Release spin in rad/s of each body that is simulated at most."""
         fastest = torch.full((len(self.tracks.bodies),), torch.inf, dtype=torch.float64)
         for entry in self.coordinates.entries:
             if entry.field == "spin" and entry.owner is not None:
@@ -315,7 +315,10 @@ class Likelihood:
     def _discrepancies(
         self, quantities: Quantities, frame_count: int | None
     ) -> tuple[Discrepancies, Bool[np.ndarray, "point"]]:
-        """Discrepancies of some worlds, and whether each was simulated."""
+        """Discrepancies of some worlds, and whether each was simulated.
+
+        Those of an impossible world say nothing: in its place one is simulated in which nothing spins.
+        """
         observations = self.observations if frame_count is None else self.observations.until(frame_count)
         worlds = self._worlds(quantities)
         possible = (worlds.spin.detach().abs() <= self._fastest).all(dim=1)

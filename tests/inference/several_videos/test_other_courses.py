@@ -144,17 +144,25 @@ def _fits(ratios: list[float], *, bodies: int = 2) -> list[Mock]:
 
 
 @pytest.mark.parametrize(
-    ("yielding", "less_probable", "is_taken"),
-    [(True, 3.0, True), (True, 9.0, False), (False, 3.0, False)],
-    ids=["about as probable", "less probable", "not to yield"],
+    ("yielding", "worse", "is_taken"),
+    [(True, 1.005, True), (True, 1.05, False), (False, 1.005, False), (False, 0.9, True)],
+    ids=["as well", "worse", "not to yield", "better"],
 )
-def test_a_video_that_is_to_yield_takes_what_goes_with_the_others_where_it_is_about_as_probable(
-    less_probable: float, *, yielding: bool, is_taken: bool, monkeypatch: pytest.MonkeyPatch
+def test_a_video_that_is_to_yield_takes_what_goes_with_the_others_where_that_explains_it_as_well(
+    worse: float, *, yielding: bool, is_taken: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     fit = fit_together([sliding(1), sliding(2), sliding(3)], model=PhysicsModel.base(), model_error=False)
     single = fit.fits[1]
-    mode = replace(single.modes[0], log_density=single.log_density - less_probable)
-    monkeypatch.setattr(second_look, "fit_map", lambda *_given, **_how: replace(single, modes=(mode,)))
-    found = second_look.look_again(fit.fits, [1], fit.model, None, seed=0, looks=1, yielding=yielding)
-    assert (found[1].log_density < single.log_density) is is_taken
+    believed: list[bool] = []
+
+    def fitted(_tracks: object, model: PhysicsModel, *_given: object, **_how: object) -> MapFit:
+        believed.append(model is not fit.model)
+        return replace(single, misfit=replace(single.misfit, residual_sd=worse * single.misfit.residual_sd))
+
+    monkeypatch.setattr(second_look, "fit_map", fitted)
+    monkeypatch.setattr(second_look, "explained", lambda _fits: False)
+    found = second_look.look_again(fit.fits, [1], fit.model, None, seed=0, looks=2, yielding=yielding, thorough=True)
+    assert (found[1].misfit != single.misfit) is is_taken
     assert found[0] is fit.fits[0]
+    assert believed[0]
+    assert all(believed) is yielding

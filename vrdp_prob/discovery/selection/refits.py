@@ -32,7 +32,8 @@ PLAIN_TURNS = 4
 SEARCHES = 3
 """How often the lost videos of a cause are searched anew, as long as that finds something."""
 LOUD = 20.0
-"""Gain, in those that are needed, that no video promises to a law whose residuals look like noise."""
+"""Gain beside chance, in those that are needed, from which a law is tried before videos are searched anew; few videos
+on wrong courses promise as much."""
 
 
 @dataclass(frozen=True)
@@ -190,8 +191,8 @@ class Refits:
         """One of the refits with its few lost videos searched anew, in the place of which it counts from then on.
 
         What one lost video leaves calls for many causes, of which each costs more to try than the search. Where most
-        videos are explained and something is left still, all of them are searched, unless it calls for a law louder
-        than single videos can.
+        videos are explained and something is left still, all of them are searched, unless that calls for a law loudly,
+        which is tried instead.
         """
         found = one
         for _ in range(SEARCHES):
@@ -209,7 +210,7 @@ class Refits:
         return found
 
     def _calls_for_a_law(self, trial: Trial) -> bool:
-        """Whether what a model leaves beside chance calls for a law so loud that no few wrong courses are behind it."""
+        """Whether what a model leaves beside chance calls for a law louder than a few wrong courses do."""
         laws = (one for one in self.leavings.of(trial).beside_chance if not happens_once(one.effect))
         return any(one.size > 2 * LOUD * self.needed for one in laws)
 

@@ -19,7 +19,13 @@ from vrdp_prob.discovery.selection.forecast import held_out
 from vrdp_prob.inference.several_videos.ascent import Effort, ImpossibleStartError
 from vrdp_prob.inference.several_videos.fitting import SharedFit
 from vrdp_prob.inference.several_videos.population import own_parameters, with_learned_population
-from vrdp_prob.inference.several_videos.second_look import LOST, MOST, explained, lost_videos
+from vrdp_prob.inference.several_videos.second_look import (
+    LOST,
+    MOST,
+    explained,
+    lost_videos,
+    may_take_another_course,
+)
 from vrdp_prob.models.effects.effect import Effect
 from vrdp_prob.models.parameters import Parameter, Scope
 from vrdp_prob.models.physics import PhysicsModel
@@ -164,11 +170,15 @@ class Trial:
         On a wrong course of events a video may be explained as well, and have no world where a cause grows to what the
         others ask for: then the common climb ends there.
         """
-        if self.fit.joint.converged or any(mends_any_course(cause) for cause in self.causes):
+        if self.fit.joint.converged:
             return self
-        holding = self._fallen_from(base, HELD_BACK)
-        found = self.fit.mended(holding[: max(len(self.fit.fits) // MOST, 1)], seed=seed, yielding=True)
-        return self if found is self.fit else replace(self, fit=with_own_population(found)).continued()
+        fits = self.fit.fits
+        holding = [one for one in self._fallen_from(base, HELD_BACK) if may_take_another_course(fits[one])]
+        found = self.mended(holding[: max(len(fits) // MOST, 1)], seed=seed, yielding=True)
+        if found is self:
+            return self
+        found = replace(found, fit=with_own_population(found.fit)).continued()
+        return found if found.brought(base) > self.brought(base) else self
 
     def with_cause_in_place(self, score: CauseScore, least: float) -> "Trial | None":
         """The fit with a cause in the place of the last one, from where that has brought the videos.
@@ -273,14 +283,14 @@ class Trial:
         kicked = [entry.owner for entry in entries if entry.field in own and entry.owner is not None]
         return kicked_at_contact(part.rollout.events, part.likelihood.tracks.times, kicked)
 
-    def mended(self, lost: Sequence[int], *, seed: int, thorough: bool = False) -> "Trial":
+    def mended(self, lost: Sequence[int], *, seed: int, thorough: bool = False, yielding: bool = False) -> "Trial":
         """The fit with some videos searched anew; itself where that finds nothing better, or with kicks.
 
         These are found on the courses that there are.
         """
         if any(mends_any_course(cause) for cause in self.causes):
             return self
-        fit = self.fit.mended(lost, seed=seed, thorough=thorough)
+        fit = self.fit.mended(lost, seed=seed, thorough=thorough, yielding=yielding)
         return self if fit is self.fit else replace(self, fit=fit)
 
     def with_courses_of(self, other: "Trial") -> "Trial":

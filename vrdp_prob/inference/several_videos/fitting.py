@@ -181,8 +181,8 @@ class SharedFit:
         thorough
             Whether a search goes on where it explains a video as well as others are explained.
         yielding
-            Whether what is found given what the others say is taken where it is only about as probable by itself: a
-            video may be explained as well on a course of events that holds the others back.
+            Whether what is found given what the others say is taken where it explains a video only about as well: it
+            may be explained as well on a course of events that holds the others back.
         """
         joint = self.joint
         others = [index for index in range(len(self.fits)) if index not in lost]

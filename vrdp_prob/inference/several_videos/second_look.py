@@ -41,8 +41,6 @@ may be wrong where cubes whose yaws nobody measured are on wrong islands."""
 FELL = 20.0
 """Nats by which a fit may be less probable than the one it replaces: residuals of a video that has gone astray
 altogether count as outliers, and what is left looks small."""
-AS_PROBABLE = 5.0
-"""Nats by which a fit may be less probable that is taken since it goes with what the others say."""
 WIDER, LEAST_SD = 2.0, 0.02
 """What the others say is believed with so many times its standard deviation, and at least with this one."""
 
@@ -153,13 +151,15 @@ def look_again(
     held
         Numbers of each video's own that are not unknown though the model has them; none where None.
     yielding
-        Whether a fit with what the others say is taken where it is about as probable, too.
+        Whether looks are only made with what the others say, and a fit is taken that explains the video about as well.
     """
     if not chosen:
         return list(fits)
     excess = _excess(fits)
     goal = 0.0 if thorough else WORSE * float(np.median([one.misfit.residual_sd for one in fits]))
-    ways = [(look % 2 == 0, IN_DOUBT) for look in range(looks)] + ([(True, TURNING)] if explained(fits) else [])
+    ways = [(yielding or look % 2 == 0, IN_DOUBT) for look in range(looks)] + (
+        [(True, TURNING)] if explained(fits) else []
+    )
     ways = [(believing, replace(plan, optimiser=optimiser)) for believing, plan in ways]
     among = range(len(fits)) if asked is None else asked
     structures = [
@@ -220,7 +220,7 @@ class _Look:
     ways
         Whether each of them believes what other videos say, and how it is made.
     yielding
-        Whether one that does is better where it is about as probable, too.
+        Whether a fit is taken that explains the video about as well.
     """
 
     model: PhysicsModel
@@ -244,8 +244,8 @@ class _Look:
             model = self.told if believing else self.model
             found = fit_map(best.clues.tracks, model, generator, plan=plan, model_error=False, held=doubted.held)
             gained = best.misfit.residual_sd / found.misfit.residual_sd - 1
-            yields = self.yielding and believing and found.log_density > best.log_density - AS_PROBABLE
-            if yields or (gained > SAME and found.log_density > best.log_density - FELL):
+            better_from = -SAME if self.yielding else SAME
+            if gained > better_from and found.log_density > best.log_density - FELL:
                 structure = structure_of(found.likelihood.coordinates, doubted.held)
                 likelihood = plain_likelihood(found.clues, self.model, structure)
                 best = better = replace(found, likelihood=likelihood)

@@ -238,8 +238,8 @@ def test_videos_that_may_hold_a_cause_back_yield_where_the_climb_broke_off(
     _, fit = fitted("surface_tilt", 3.0, seed=2)
     searches: list[list[int]] = []
 
-    def mended(fit: SharedFit, videos: list[int], *, seed: int, yielding: bool) -> SharedFit:
-        assert yielding
+    def mended(fit: SharedFit, videos: list[int], *, seed: int, thorough: bool, yielding: bool) -> SharedFit:
+        assert yielding is not thorough
         assert seed == 4
         searches.append(videos)
         return fit

@@ -20,6 +20,7 @@ def refit_with(cause: str, gained: float, *, patches: bool = False) -> Mock:
     refit.loses_videos_of.return_value = refit.loses_most_of.return_value = False
     refit.fallen_from.return_value = []
     refit.with_courses_of.side_effect = lambda _other: refit
+    refit.continued.return_value = refit
     refit.freed.side_effect = lambda _base, **_how: refit
     return refit
 

@@ -103,18 +103,36 @@ def test_a_cause_is_not_followed_that_promises_less_than_it_needs(
     assert refit.continued.called is followed
 
 
-@pytest.mark.parametrize(("brought", "is_freed"), [(-3.0, True), (12.0, False)], ids=["less", "as promised"])
-def test_a_law_that_falls_short_is_freed_of_videos_that_hold_it_back(
-    brought: float, *, is_freed: bool, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_law_that_falls_short_is_freed_of_videos_that_hold_it_back(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(extensions, "mends_any_course", lambda _cause: False)
     nothing, refit, score = _broken_off(20.0)
     mended, freed = refit_with("cause", 0.0), refit_with("cause", 30.0)
-    for one, gained in ((mended, brought), (freed, 90.0)):
+    for one, gained in ((mended, -3.0), (freed, 90.0)):
         one.causes, one.brought.return_value, one.fit.joint.converged = refit.causes, gained, True
     refit.mended.return_value = mended
     mended.freed.side_effect = lambda base, *, seed: freed if (base, seed) == (nothing, 0) else refit
-    assert extensions_with(needed=6.0).made_of(nothing, [score]) == [freed if is_freed else mended]
+    assert extensions_with(needed=6.0).made_of(nothing, [score]) == [freed]
+
+
+def test_refits_that_may_win_are_followed_to_the_end_and_freed(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(extensions, "mends_any_course", lambda _cause: False)
+    nothing, effects = refit_with("", 0.0), {name: Mock() for name in ("wind", "patch")}
+    wind, further, freed, patch = (
+        refit_with(name, gained) for name, gained in (("w", 1), ("w", 2), ("w", 9), ("p", 1))
+    )
+    for one, name, gained in (
+        (wind, "wind", 50.0),
+        (further, "wind", 60.0),
+        (freed, "wind", 90.0),
+        (patch, "patch", 9.0),
+    ):
+        effects[name].name = name
+        one.causes, one.brought.return_value, one.fit.joint.converged = (effects[name],), gained, one is not wind
+    wind.continued.return_value, further.freed.side_effect = further, lambda _base, *, seed: freed
+    nothing.with_cause = lambda score: wind if score.effect is effects["wind"] else patch
+    scores = [Mock(spec=CauseScore, effect=effect, size=10.0) for effect in effects.values()]
+    assert extensions_with().made_of(nothing, scores) == [freed, patch]
+    assert not patch.freed.called
 
 
 @pytest.mark.parametrize("once", [True, False], ids=["kicks", "a law"])

@@ -86,7 +86,12 @@ class Extensions:
         most = brought_most()
         close = [one for one in found if one.brought(trial) > SHORT * most > 0]
         rest = [one for one in found if one not in close]
-        return sorted([*in_processes(Trial.continued, close), *rest], key=merit, reverse=True)
+        followed = in_processes(partial(self._followed_to_the_end, trial), close)
+        return sorted([*followed, *rest], key=merit, reverse=True)
+
+    def _followed_to_the_end(self, trial: Trial, one: Trial) -> Trial:
+        """A refit of a model after as many steps as it needs, freed of videos that hold it back."""
+        return one.continued().freed(trial, seed=self.seed)
 
     def _all(self, refit: Callable[[CauseScore], Trial | None], scores: Sequence[CauseScore]) -> list[Trial]:
         return [one for one in in_processes(refit, scores, advance=self.advance) if one is not None]

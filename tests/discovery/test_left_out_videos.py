@@ -222,18 +222,25 @@ def test_videos_with_kicks_keep_the_course_on_which_these_were_found(
 
 
 @pytest.mark.parametrize(
-    ("cause", "converged", "gained", "asked"),
+    ("cause", "converged", "explains", "gained", "asked"),
     [
-        (ClockError(), False, [3.0, -9.0, 0.5, -1.5, 2.0, 1.0], [1, 3]),
-        (ClockError(), False, [-9.0, -8.0, -7.0, -6.0, 50.0, 60.0], [0, 1, 2]),
-        (ClockError(), False, [3.0, -0.5, 0.5, 0.0, 2.0, 1.0], []),
-        (ClockError(), True, [3.0, -9.0, 0.5, -1.5, 2.0, 1.0], None),
-        (ExternalImpulse(), False, [3.0, -9.0, 0.5, -1.5, 2.0, 1.0], None),
+        (SurfaceTilt(), False, True, [3.0, -1.5, 0.5, -9.0, 2.0, 1.0, 1.0, 1.0], [3, 1]),
+        (SurfaceTilt(), False, True, [3.0, -9.0, 0.5, -1.5, -2.0, 50.0, 1.0, 1.0], None),
+        (SurfaceTilt(), False, True, [3.0, -0.5, 0.5, 0.0, 2.0, 1.0, 1.0, 1.0], []),
+        (SurfaceTilt(), False, False, [3.0, -1.5, 0.5, -9.0, 2.0, 1.0, 1.0, 1.0], None),
+        (SurfaceTilt(), True, True, [3.0, -9.0, 0.5, -1.5, 2.0, 1.0, 1.0, 1.0], None),
+        (ExternalImpulse(), False, True, [3.0, -9.0, 0.5, -1.5, 2.0, 1.0, 1.0, 1.0], None),
     ],
-    ids=["two", "half at most", "none", "at the top", "kicks"],
+    ids=["two", "more than a quarter", "none", "most are not explained", "at the top", "kicks"],
 )
 def test_videos_that_may_hold_a_cause_back_yield_where_the_climb_broke_off(
-    cause: Effect, gained: list[float], asked: list[int] | None, *, converged: bool, monkeypatch: pytest.MonkeyPatch
+    cause: Effect,
+    gained: list[float],
+    asked: list[int] | None,
+    *,
+    converged: bool,
+    explains: bool,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     _, fit = fitted("surface_tilt", 3.0, seed=2)
     searches: list[list[int]] = []
@@ -244,10 +251,11 @@ def test_videos_that_may_hold_a_cause_back_yield_where_the_climb_broke_off(
         searches.append(videos)
         return fit
 
+    monkeypatch.setattr(trials, "explained", lambda _fits: explains)
     monkeypatch.setattr(SharedFit, "mended", mended)
     base = Trial((), fit)
-    trial = Trial((cause,), replace(fit, fits=((*fit.fits,) * 6)[:6], joint=replace(fit.joint, converged=converged)))
-    density = property(lambda one: np.array(gained) if one is trial else np.zeros(6))
+    trial = Trial((cause,), replace(fit, fits=((*fit.fits,) * 8)[:8], joint=replace(fit.joint, converged=converged)))
+    density = property(lambda one: np.array(gained) if one is trial else np.zeros(8))
     monkeypatch.setattr(Trial, "fitted_density", density)
     assert trial.freed(base, seed=4) is trial
     assert searches == ([] if asked is None else [asked])
@@ -260,6 +268,7 @@ def test_a_cause_that_was_freed_stays_so_where_it_brings_more(
     _, fit = fitted("surface_tilt", 3.0, seed=2)
     broken_off = replace(fit, joint=replace(fit.joint, converged=False))
     monkeypatch.setattr(SharedFit, "mended", lambda _fit, _videos, **_how: fit)
+    monkeypatch.setattr(trials, "explained", lambda _fits: True)
     monkeypatch.setattr(trials, "with_own_population", lambda fit: fit)
     base, trial = Trial((), fit), Trial((SurfaceTilt(),), broken_off)
     values = property(lambda one: np.full(2, brings if one.causes and one is not trial else 0.0))

@@ -22,6 +22,7 @@ from vrdp_prob.inference.several_videos.population import own_parameters, with_l
 from vrdp_prob.inference.several_videos.second_look import (
     LOST,
     MOST,
+    SINGLE,
     explained,
     lost_videos,
     may_take_another_course,
@@ -168,13 +169,14 @@ class Trial:
         """The fit with videos searched anew that may hold back what it has beyond a model with less; the better one.
 
         On a wrong course of events a video may be explained as well, and have no world where a cause grows to what the
-        others ask for: then the common climb ends there.
+        others ask for: then the common climb ends there. Where more videos lose than may be on wrong courses by
+        themselves, or most are not explained, the model lacks something else.
         """
-        if self.fit.joint.converged:
-            return self
         fits = self.fit.fits
+        if self.fit.joint.converged or not explained(fits):
+            return self
         holding = [one for one in self._fallen_from(base, HELD_BACK) if may_take_another_course(fits[one])]
-        found = self.mended(holding[: max(len(fits) // MOST, 1)], seed=seed, yielding=True)
+        found = self if len(holding) > max(len(fits) // SINGLE, 1) else self.mended(holding, seed=seed, yielding=True)
         if found is self:
             return self
         found = replace(found, fit=with_own_population(found.fit)).continued()

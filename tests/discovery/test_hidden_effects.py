@@ -54,7 +54,6 @@ def test_a_tilt_is_named_on_a_table_of_marbles(tmp_path: Path) -> None:
     finding = discover(load_all(tmp_path), seed=0)
     assert finding.verdict is Verdict.NAMED
     assert [cause.name for cause in finding.causes if cause.named] == ["surface_tilt"]
-    assert finding.causes[0].probability > SURE
 
 
 @pytest.fixture(scope="module")

@@ -157,9 +157,9 @@ def look_again(
         return list(fits)
     excess = _excess(fits)
     goal = 0.0 if thorough else WORSE * float(np.median([one.misfit.residual_sd for one in fits]))
-    ways = [(yielding or look % 2 == 0, IN_DOUBT) for look in range(looks)] + (
-        [(True, TURNING)] if explained(fits) else []
-    )
+    ways = [(yielding or look % 2 == 0, IN_DOUBT) for look in range(looks)]
+    if explained(fits):
+        ways.append((True, TURNING))
     ways = [(believing, replace(plan, optimiser=optimiser)) for believing, plan in ways]
     among = range(len(fits)) if asked is None else asked
     structures = [

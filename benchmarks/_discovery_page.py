@@ -43,6 +43,7 @@ def tables(results: Sequence[Result]) -> str:
     parts = {
         "In short": _summary(results),
         "Recall by cause and effect size": _recall(results),
+        "Recall by number of videos and bodies": _recall_by_extent(results),
         "Confusion": _confusion(results),
         "False alarms": _nulls(results),
         "Two causes": _pairs(results),
@@ -89,6 +90,26 @@ def _recall(results: Sequence[Result]) -> str:
         stricter = [str(Share(seen, one)) for one in (sure_hit, alone)]
         rows.append((way or "all", *shares, *stricter, str(len(mine) - len(seen))))
     return _table(head, rows) if ones else ""
+
+
+def _recall_by_extent(results: Sequence[Result]) -> str:
+    """How much of what is hidden is found in few videos of few bodies, and in more."""
+    extents: dict[tuple[int, int], list[Result]] = {}
+    for result in of(results, Kind.ONE):
+        extents.setdefault((result["videos"], result["bodies"]), []).append(result)
+    weak, strong, _ = SIZES
+    rows = []
+    for (videos, bodies), mine in sorted(extents.items(), reverse=True):
+        strongly = between(mine, strong, np.inf)
+        shares = Share(between(mine, weak, strong), hit), Share(strongly, hit), Share(strongly, alone)
+        rows.append((f"{videos} videos of {bodies} bodies", *map(str, shares)))
+    head = (
+        "data",
+        f"from {weak:g} to {strong:g} noise sd",
+        f"from {strong:g} noise sd",
+        f"from {strong:g} noise sd, and nothing else",
+    )
+    return _table(head, rows) if rows else ""
 
 
 def _confusion(results: Sequence[Result]) -> str:

@@ -204,3 +204,18 @@ def test_what_was_believed_of_bodies_is_no_observation() -> None:
     for group in (rolls, ~rolls):  # what such bodies share may shift all of them
         assert group.sum() > 2
         assert other.values[group].std() == pytest.approx(plain.values[group].std(), rel=0.1)
+
+
+def test_what_is_told_of_bodies_moves_with_what_videos_share() -> None:
+    _, fit = fitted(seed=1)
+    (friction,) = (one for one in fit.model.parameters if one.name == "sliding_friction")
+    place = fit.joint.numbers.keys.index((friction.name, ()))
+    middle = float(fit.joint.gaussian.mean[place])
+    stronger = replace(friction, prior=replace(friction.prior, mean=middle + 0.05, sd=1e-4))
+    moved = fit.under(replace(fit.model, beliefs={**fit.model.beliefs, friction.name: stronger}), model_error=False)
+    told = OwnValues.of(fit, FRICTION)
+    away = fit.joint.gaussian.shared_whitened(moved.joint.gaussian.mean[None])[0]
+    change = OwnValues.of(moved, FRICTION).values - told.values
+    np.testing.assert_allclose(change, told.following @ away, atol=5e-3)
+    assert change.min() < -0.04  # bodies rub less than what they share says
+    assert (np.diag(told.whole_covariance) > np.diag(told.covariance)).all()

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float
+from scipy.linalg import block_diag
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.special import expit
@@ -31,18 +32,30 @@ class OwnValues:
     ----------
     values, covariance
         The most probable logarithms where next to nothing was believed of them, given what videos share.
+    following
+        How they move with standard normal coordinates of what videos share.
     bodies
         Video and body that each belongs to.
     """
 
     values: Float[np.ndarray, "number"]
     covariance: Float[np.ndarray, "number number"]
+    following: Float[np.ndarray, "number shared"]
     bodies: tuple[tuple[int, int], ...]
+
+    @property
+    def whole_covariance(self) -> Float[np.ndarray, "number number"]:
+        """Their covariance where what videos share is known no better than the fit says.
+
+        A dependence that a law of the model might as well have by itself is none that it lacks.
+        """
+        whole: np.ndarray = self.covariance + self.following @ self.following.T
+        return whole
 
     @classmethod
     def of(cls, fit: SharedFit, field: str) -> "OwnValues":
         """Those of a fit."""
-        values, blocks, bodies = [], [], []
+        values, blocks, following, bodies = [], [], [], []
         for index, video in enumerate(fit.joint.videos):
             local = fit.joint.gaussian.locals[index]
             entries = [video.likelihood.coordinates.entries[place] for place in video.local_places]
@@ -57,13 +70,10 @@ class OwnValues:
             pull = both @ (local.centre[mine] - expected) + edge
             values += (expected + alone @ pull).tolist()
             blocks.append(alone)
+            following.append(alone @ both @ local.slope[mine])
             bodies += [(index, int(entries[k].owner or 0)) for k in mine]
-        covariance = np.zeros((len(values), len(values)))
-        first = 0
-        for block in blocks:
-            covariance[first : first + len(block), first : first + len(block)] = block
-            first += len(block)
-        return cls(np.array(values), covariance, tuple(bodies))
+        moving = np.concatenate(following) @ fit.joint.gaussian.root
+        return cls(np.array(values), block_diag(*blocks), moving, tuple(bodies))
 
 
 def _edges(
@@ -110,8 +120,8 @@ class Rebounds:
                 met = (one.bodies == pair).all(axis=1)
                 speeds.append(float(np.exp(one.log_speed[met].mean())))
         rows = np.array(owners).reshape(len(owners), len(own.values))
-        covariance = rows @ own.covariance @ rows.T
-        known = np.flatnonzero(np.diag(covariance) < LARGEST_SD**2)
+        known = np.flatnonzero(np.diag(rows @ own.covariance @ rows.T) < LARGEST_SD**2)
+        covariance = rows @ own.whole_covariance @ rows.T
         return cls((rows @ own.values)[known], covariance[np.ix_(known, known)], np.array(speeds)[known], rows[known])
 
 
@@ -194,4 +204,4 @@ class BodyFrictions:
             masses = FittedMasses.of(fit, contacts)
             log_mass = np.array([masses.logarithm.get(one, np.nan) for one in owners])
             groups = masses.membership(owners)
-        return cls(bodies, own.values[keep], own.covariance[np.ix_(keep, keep)], log_mass, groups)
+        return cls(bodies, own.values[keep], own.whole_covariance[np.ix_(keep, keep)], log_mass, groups)

@@ -70,6 +70,7 @@ TASKS = (
     Task(GLIDERS, "surface_tilt", 0.003, first=8),
     Task(PUCKS, first=8),
     Task(PUCKS, "surface_tilt", 0.003, first=8),
+    Task(PUCKS, "lens_distortion", 0.2, first=8),
     Task(PUCKS),
     Task(PUCKS, "lens_distortion", 0.2),
 )

@@ -68,7 +68,6 @@ def steps(folder: Path) -> list[Path]:
     return sorted(folder.glob("step_*.pickle"))
 
 
-@pytest.mark.slow
 def test_a_search_that_was_broken_off_says_the_same(videos: list[Tracks], work: Work, tmp_path: Path) -> None:
     whole = found(videos)
     assert whole.causes[0].name == "surface_tilt"

@@ -86,12 +86,8 @@ class Extensions:
         most = brought_most()
         close = [one for one in found if one.brought(trial) > SHORT * most > 0]
         rest = [one for one in found if one not in close]
-        followed = in_processes(partial(self._followed_to_the_end, trial), close)
+        followed = in_processes(partial(_followed_to_the_end, trial, self.seed), close)
         return sorted([*followed, *rest], key=merit, reverse=True)
-
-    def _followed_to_the_end(self, trial: Trial, one: Trial) -> Trial:
-        """A refit of a model after as many steps as it needs, freed of videos that hold it back."""
-        return one.continued().freed(trial, seed=self.seed)
 
     def _all(self, refit: Callable[[CauseScore], Trial | None], scores: Sequence[CauseScore]) -> list[Trial]:
         return [one for one in in_processes(refit, scores, advance=self.advance) if one is not None]
@@ -154,3 +150,8 @@ class Extensions:
 def explaining(trials: Sequence[Trial]) -> list[Trial]:
     """Those whose last cause does not just mend any course."""
     return [one for one in trials if not mends_any_course(one.causes[-1])]
+
+
+def _followed_to_the_end(trial: Trial, seed: int, one: Trial) -> Trial:
+    """A refit of a model after as many steps as it needs, freed of videos that hold it back."""
+    return one.continued().freed(trial, seed=seed)

@@ -106,8 +106,8 @@ def _recall_by_extent(results: Sequence[Result]) -> str:
     head = (
         "data",
         f"from {weak:g} to {strong:g} noise sd",
-        f"from {strong:g} noise sd",
-        f"from {strong:g} noise sd, and nothing else",
+        f"{strong:g} noise sd and more",
+        f"{strong:g} noise sd and more, and nothing else",
     )
     return _table(head, rows) if rows else ""
 

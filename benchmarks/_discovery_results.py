@@ -168,7 +168,9 @@ def checks(results: Sequence[Result]) -> list[dict[str, Any]]:
     removed = between(of(results, Kind.REMOVED), 3.0, np.inf)
     entries = [
         _at_least("recall from 3 noise sd", Share(strong, hit), STRONG_RECALL),
-        _at_least(f"... in {Task.videos} videos of {Task.bodies} bodies", Share(usual, hit), STRONG_RECALL),
+        _at_least(
+            f"recall from 3 noise sd in {Task.videos} videos of {Task.bodies} bodies", Share(usual, hit), STRONG_RECALL
+        ),
         _at_least("recall from 1.5 to 3 noise sd", Share(weak, hit), WEAK_RECALL),
         _at_most("false alarms", Share(nulls, alarm), FALSE_ALARMS),
         _at_least("nulls", len(nulls), FEWEST_NULLS),

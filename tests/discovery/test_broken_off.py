@@ -1,8 +1,12 @@
 """A search for causes that is broken off goes on where it was, and says what it would have said."""
 
 import json
+import pickle
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from threading import Lock
+from typing import ClassVar
 
 import pytest
 
@@ -12,8 +16,12 @@ from vrdp_prob import load_all
 from vrdp_prob.discovery.discover import discover
 from vrdp_prob.discovery.finding import Finding
 from vrdp_prob.discovery.page.document import to_document
+from vrdp_prob.discovery.selection.extensions import Extensions
+from vrdp_prob.discovery.selection.leavings import Leavings
+from vrdp_prob.discovery.selection.trials import Trial
 from vrdp_prob.errors import InputError
 from vrdp_prob.inference.runs.journal import Step
+from vrdp_prob.models.effects.wind import Wind
 from vrdp_prob.models.model_file import known_effects
 from vrdp_prob.scene import Tracks
 
@@ -97,3 +105,27 @@ def test_a_checkpoint_of_another_search_is_refused(videos: list[Tracks], work: W
     (tmp_path / "step_00001.pickle").write_bytes(b"whose?")
     with pytest.raises(InputError, match="does not say what run it belongs to"):
         found(videos, tmp_path)
+
+
+def test_a_checkpoint_keeps_no_effect_that_is_defined_in_a_function(videos: list[Tracks], tmp_path: Path) -> None:
+    class Breeze(Wind):
+        name: ClassVar = "breeze"
+
+    with pytest.raises(InputError, match="the effect Breeze is defined in a notebook, a script or a function"):
+        discover(videos, catalogue=[Breeze()], checkpoint=tmp_path / "steps")
+    assert not (tmp_path / "steps").exists()
+
+
+def test_refits_that_are_followed_can_be_kept_whatever_shows_the_progress(monkeypatch: pytest.MonkeyPatch) -> None:
+    lock = Lock()  # as a bar on a terminal holds one
+    extensions = Extensions(Leavings((), 0), 6.0, lambda _: lock.release())
+    kept: list[bytes] = []
+
+    def in_processes(task: Callable[[Trial], Trial], items: Sequence[Trial], **_: object) -> list[Trial]:
+        kept.append(pickle.dumps(task))
+        return list(items)
+
+    monkeypatch.setattr("vrdp_prob.discovery.selection.extensions.in_processes", in_processes)
+    nothing_fitted = Trial.__new__(Trial)
+    assert extensions.made_of(nothing_fitted, []) == []
+    assert len(kept) == len(("refitted", "followed to the end"))

@@ -23,7 +23,14 @@ from vrdp_prob.discovery.words import title
 from vrdp_prob.inference import default_model
 from vrdp_prob.inference.assembly import limits_of_tracks
 from vrdp_prob.inference.infer import check_model
-from vrdp_prob.inference.runs.checkpoint import Checkpoint, effects_facts, model_facts, program_facts, videos_facts
+from vrdp_prob.inference.runs.checkpoint import (
+    Checkpoint,
+    check_importable,
+    effects_facts,
+    model_facts,
+    program_facts,
+    videos_facts,
+)
 from vrdp_prob.inference.runs.journal import journal
 from vrdp_prob.inference.runs.parallel import linear_algebra_in_one_thread, several_processes
 from vrdp_prob.inference.several_videos.fitting import SharedFit, fit_together
@@ -79,12 +86,15 @@ def discover(
     ------
     InputError
         If there are fewer than three videos, two have one name, a video shows no motion, the model is none, the videos
-        have no common world, or the checkpoint belongs to another run.
+        have no common world, the checkpoint belongs to another run, or one is asked for with an effect whose class
+        other processes cannot import.
     """
     check_video_count(videos)
     check_model(model)
     physics = default_model() if model is None else model
     looked_for = _catalogue(physics, catalogue)
+    if checkpoint is not None:
+        check_importable((*physics.effects, *looked_for))
     own = None if checkpoint is None else Checkpoint(checkpoint, _facts(videos, physics, looked_for, seed))
     compile_model(physics)
     timed = videos if _reads_stamps((*physics.effects, *looked_for)) else _from_first_frames(videos)

@@ -30,27 +30,34 @@ class OwnValues:
 
     Parameters
     ----------
-    values, covariance
-        The most probable logarithms where next to nothing was believed of them, given what videos share.
+    values, given_shared
+        The most probable logarithms where next to nothing was believed of them, and their covariance given what videos
+        share.
     following
-        How they move with standard normal coordinates of what videos share.
+        Change of each number per standard deviation of each standard normal coordinate of what videos share, as the
+        fit knows it.
     bodies
         Video and body that each belongs to.
     """
 
     values: Float[np.ndarray, "number"]
-    covariance: Float[np.ndarray, "number number"]
+    given_shared: Float[np.ndarray, "number number"]
     following: Float[np.ndarray, "number shared"]
     bodies: tuple[tuple[int, int], ...]
 
     @property
-    def whole_covariance(self) -> Float[np.ndarray, "number number"]:
+    def covariance(self) -> Float[np.ndarray, "number number"]:
         """Their covariance where what videos share is known no better than the fit says.
 
-        A dependence that a law of the model might as well have by itself is none that it lacks.
+        A dependence that a law of the model might as well have by itself is none that the model lacks.
         """
-        whole: np.ndarray = self.covariance + self.following @ self.following.T
+        whole: np.ndarray = self.given_shared + self.following @ self.following.T
         return whole
+
+    @property
+    def sd(self) -> Float[np.ndarray, "number"]:
+        """Standard deviations given what videos share: of what tells bodies apart."""
+        return np.sqrt(np.diag(self.given_shared))
 
     @classmethod
     def of(cls, fit: SharedFit, field: str) -> "OwnValues":
@@ -64,13 +71,14 @@ class OwnValues:
             believed = np.array([1 / entries[k].prior.sd ** 2 for k in mine])
             expected = np.array([entries[k].prior.mean for k in mine])
             edge, curvature = _edges([entries[k].prior for k in mine], local.centre[mine])
-            both = np.linalg.inv(root @ root.T) - np.diag(curvature)
+            precision = np.linalg.inv(root @ root.T)
+            both = precision - np.diag(curvature)
             own, directions = np.linalg.eigh(both - np.diag(believed))
             alone = (directions / (np.maximum(own, 0.0) + 1 / OPEN**2)) @ directions.T
             pull = both @ (local.centre[mine] - expected) + edge
             values += (expected + alone @ pull).tolist()
             blocks.append(alone)
-            following.append(alone @ both @ local.slope[mine])
+            following.append(alone @ precision @ local.slope[mine])
             bodies += [(index, int(entries[k].owner or 0)) for k in mine]
         moving = np.concatenate(following) @ fit.joint.gaussian.root
         return cls(np.array(values), block_diag(*blocks), moving, tuple(bodies))
@@ -95,6 +103,8 @@ class Rebounds:
     ----------
     logarithm, covariance
         Logarithms of the products of the two bodies' factors.
+    sd
+        Their standard deviations given what videos share.
     closing_speed
         Speeds in m/s at which they met; the geometric mean where they did so several times.
     owners
@@ -103,6 +113,7 @@ class Rebounds:
 
     logarithm: Float[np.ndarray, "pair"]
     covariance: Float[np.ndarray, "pair pair"]
+    sd: Float[np.ndarray, "pair"]
     closing_speed: Float[np.ndarray, "pair"]
     owners: Float[np.ndarray, "pair number"]
 
@@ -120,9 +131,10 @@ class Rebounds:
                 met = (one.bodies == pair).all(axis=1)
                 speeds.append(float(np.exp(one.log_speed[met].mean())))
         rows = np.array(owners).reshape(len(owners), len(own.values))
-        known = np.flatnonzero(np.diag(rows @ own.covariance @ rows.T) < LARGEST_SD**2)
-        covariance = rows @ own.whole_covariance @ rows.T
-        return cls((rows @ own.values)[known], covariance[np.ix_(known, known)], np.array(speeds)[known], rows[known])
+        sd = np.sqrt(np.diag(rows @ own.given_shared @ rows.T))
+        known = np.flatnonzero(sd < LARGEST_SD)
+        rows = rows[known]
+        return cls(rows @ own.values, rows @ own.covariance @ rows.T, sd[known], np.array(speeds)[known], rows)
 
 
 @dataclass(frozen=True)
@@ -178,6 +190,8 @@ class BodyFrictions:
         The bodies.
     logarithm, covariance
         Logarithms of their frictions.
+    sd
+        Their standard deviations given what videos share.
     log_mass
         Logarithms of their masses in kg, or in units of those that they met where nobody stated all; not a number
         where unknown.
@@ -188,6 +202,7 @@ class BodyFrictions:
     bodies: tuple[Body, ...]
     logarithm: Float[np.ndarray, "body"]
     covariance: Float[np.ndarray, "body body"]
+    sd: Float[np.ndarray, "body"]
     log_mass: Float[np.ndarray, "body"]
     weighed_together: Float[np.ndarray, "body group"]
 
@@ -195,7 +210,7 @@ class BodyFrictions:
     def of(cls, fit: SharedFit, contacts: Sequence[FittedContacts]) -> "BodyFrictions":
         """Those that are known well enough."""
         own = OwnValues.of(fit, FRICTION)
-        keep = np.flatnonzero(np.diag(own.covariance) < LARGEST_SD**2)
+        keep = np.flatnonzero(own.sd < LARGEST_SD)
         owners = [own.bodies[k] for k in keep]
         bodies = tuple(contacts[video].motion.tracks.bodies[body] for video, body in owners)
         if all(body.mass is not None for body in bodies):
@@ -204,4 +219,5 @@ class BodyFrictions:
             masses = FittedMasses.of(fit, contacts)
             log_mass = np.array([masses.logarithm.get(one, np.nan) for one in owners])
             groups = masses.membership(owners)
-        return cls(bodies, own.values[keep], own.whole_covariance[np.ix_(keep, keep)], log_mass, groups)
+        covariance = own.covariance[np.ix_(keep, keep)]
+        return cls(bodies, own.values[keep], covariance, own.sd[keep], log_mass, groups)

@@ -25,7 +25,7 @@ def restitution_of_pairs(seen: Sequence[Seen]) -> str:
     def points(one: Seen) -> Points:
         rebounds = Rebounds.of(one.fit, one.contacts)
         factor = np.exp(rebounds.logarithm)
-        return Points(rebounds.closing_speed, factor, factor * np.sqrt(np.diag(rebounds.covariance)))
+        return Points(rebounds.closing_speed, factor, factor * rebounds.sd)
 
     return with_bars(
         seen,

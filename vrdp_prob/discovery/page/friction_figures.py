@@ -30,10 +30,7 @@ def _frictions(seen: Sequence[Seen], what: str) -> str:
     else:
         at = [np.exp(one.log_mass) for one in found]
     factors = [np.exp(one.logarithm) for one in found]
-    points = [
-        Points(places, factor, factor * np.sqrt(np.diag(one.covariance)))
-        for places, factor, one in zip(at, factors, found, strict=True)
-    ]
+    points = [Points(places, factor, factor * one.sd) for places, factor, one in zip(at, factors, found, strict=True)]
     told = all(body.mass is not None for one in found for body in one.bodies)
     label = what if names else ("mass (kg)" if told else "mass (of those that met, relative)")
     return with_bars(

@@ -8,7 +8,7 @@ import json
 import pickle
 import sys
 import zipfile
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from functools import cache
 from hashlib import sha256
 from pathlib import Path
@@ -66,6 +66,22 @@ def film_facts(file: Path, camera: Camera | None) -> dict[str, str]:
 def model_facts(model: PhysicsModel) -> dict[str, str]:
     """A physics model with the code of effects from elsewhere, in short texts."""
     return {"model": sha256(model.text.encode()).hexdigest(), **effects_facts(model.effects)}
+
+
+def check_importable(effects: Iterable[Effect]) -> None:
+    """Refuse effects that a checkpoint of a run in several processes cannot keep, as their classes are in no module.
+
+    Raises
+    ------
+    InputError
+        If there is one.
+    """
+    for kind in map(type, effects):
+        if kind.__module__ == "__main__" or "<locals>" in kind.__qualname__:
+            raise InputError(
+                f"the effect {kind.__name__} is defined in a notebook, a script or a function, where a checkpoint does "
+                "not find it again; put its class at the top of a module and import it, or go without the checkpoint."
+            )
 
 
 def effects_facts(effects: Sequence[Effect]) -> dict[str, str]:

@@ -11,8 +11,10 @@ from tests.discovery.fitted import fitted
 from tests.discovery.hidden import hide
 from tests.discovery.measurement import Measurement
 from tests.discovery.scenes import Setting
+from vrdp_prob.discovery.candidates.scores import score_causes
 from vrdp_prob.discovery.checks import kicks
 from vrdp_prob.discovery.checks.battery import run_checks
+from vrdp_prob.discovery.checks.bodies import friction_against
 from vrdp_prob.discovery.checks.flight import QUESTIONS
 from vrdp_prob.discovery.checks.measurement import GENERAL
 from vrdp_prob.discovery.checks.own_values import OwnValues, Rebounds
@@ -21,9 +23,11 @@ from vrdp_prob.discovery.residuals.fitted_contacts import FittedContacts
 from vrdp_prob.discovery.residuals.free_flight import FRICTION, FreeFlight
 from vrdp_prob.discovery.residuals.free_flight_patterns import patterns, spanned
 from vrdp_prob.discovery.residuals.residual_model import ResidualModel
+from vrdp_prob.discovery.selection.trials import Trial, with_own_population
 from vrdp_prob.inference import default_model
 from vrdp_prob.inference.several_videos.fitting import fit_together
 from vrdp_prob.inference.several_videos.population import own_parameters
+from vrdp_prob.models.effects.mass_dependent_friction import MassDependentFriction
 from vrdp_prob.models.parameters import RESTITUTION
 from vrdp_prob.scene import Body, Shape, Tracks
 
@@ -227,3 +231,15 @@ def test_what_is_told_of_bodies_moves_with_what_videos_share() -> None:
     change = met.owners @ (OwnValues.of(moved, RESTITUTION.name).values - told.values)
     np.testing.assert_allclose(change, met.owners @ told.following @ away, atol=0.2 * np.abs(change).max())
     assert np.abs(change).max() > 1e-3
+
+
+@pytest.mark.slow
+def test_a_law_by_the_mass_takes_away_the_slope_that_it_has() -> None:
+    _, fit = fitted("mass_dependent_friction", effect_size=6.0, seed=1, setting=Setting(videos=6, bodies=4))
+    base = Trial((), with_own_population(fit), stated=fit.model.beliefs)
+    (score,) = score_causes(base.fit, ResidualModel.of(base.fit), [MassDependentFriction()], seed=0)
+    law = base.with_cause(score)
+    assert law is not None
+    name = friction_against("mass")
+    assert by_name(run_checks(base.fit, seed=0))[name].p_value < 1e-6
+    assert by_name(run_checks(law.continued().fit, seed=0))[name].p_value > 0.01

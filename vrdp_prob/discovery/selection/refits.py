@@ -58,6 +58,7 @@ class Refits:
     advance: Advance
     _made: dict[Trial, list[Trial]] = field(default_factory=dict)
     _searched: set[Trial] = field(default_factory=set)
+    _shown: dict[Trial, set[str]] = field(default_factory=dict)
 
     @cached_property
     def leavings(self) -> Leavings:
@@ -81,6 +82,7 @@ class Refits:
             met = self.extensions.with_surfaces(trial, placed) if placed else None
             found = [] if met is None else [met]
             plain = sum(one.seen.turns for one in placed) >= PLAIN_TURNS
+            self._shown[trial] = {one.effect.name for one in placed} if plain else set()
             alone = plain and met is not None and not self.doubted(met, trial, self.leavings.of(met).overdispersion)
             self._keep(trial, found if alone else [*found, *self._new(trial)])
         return self._made[trial]
@@ -133,7 +135,8 @@ class Refits:
         """The cause that brings most where all else is noise, but for kicks: enough, and a good part of what lacks.
 
         What happens once is found where it seems to have happened for want of a law, and is held there: a law that
-        brings nearly as much comes first.
+        brings nearly as much comes first. Walls and discs that the tracks show plainly are there, however much they
+        leave.
         """
         possible = [one for one in explaining(found) if not one.loses_most_of(trial)]
         brings = partial(_brings, trial=trial)
@@ -141,7 +144,9 @@ class Refits:
         laws = (one for one in possible if not happens_once(one.causes[-1]))
         law = max(laws, key=brings, default=first)
         first = law if law.brought(trial) > NEARLY * first.brought(trial) else first
-        return None if first.brought(trial) < max(self.needed, FIRST_SHARE * trial.lacking) else first
+        is_shown = {cause.name for cause in first.beyond(trial)} & self._shown.get(trial, set())
+        least = 0.0 if is_shown else FIRST_SHARE * trial.lacking
+        return None if first.brought(trial) < max(self.needed, least) else first
 
     def _with_best_searched(self, trial: Trial, found: Sequence[Trial]) -> list[Trial]:
         """Refits, the best first, with the few lost videos of the one to go on from searched anew.

@@ -142,6 +142,25 @@ def test_where_walls_that_tracks_show_are_plain_nothing_else_is_tried(
     assert refits_with(needed=6.0).of(plain) == ([walls] if alone else [walls, drag])
 
 
+@pytest.mark.parametrize(("turns", "on"), [(6, True), (2, False)], ids=["plain", "of few turns"])
+def test_walls_that_tracks_show_plainly_are_gone_on_from_whatever_they_leave(
+    turns: int, *, on: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """On a slope a floor explains little by itself."""
+    nothing, floor = refit_with("", 0.0), refit_with("wall", 20.0)
+    nothing.lacking, floor.brought.return_value = 5000.0, 400.0
+    shown = Mock(seen=Mock(turns=turns), effect="wall")
+    monkeypatch.setattr(refits.Refits, "_placed", lambda _self, _trial: [shown])
+    monkeypatch.setattr(Extensions, "with_surfaces", lambda _self, _trial, _placed: floor)
+    monkeypatch.setattr(refits.Refits, "_new", lambda _self, _trial: [])
+    monkeypatch.setattr(refits.Refits, "doubted", lambda *_given: True)
+    monkeypatch.setattr(Leavings, "of", Mock())
+    monkeypatch.setattr(extensions, "mends_any_course", lambda _cause: False)
+    monkeypatch.setattr(refits, "happens_once", lambda _cause: False)
+    made = refits_with(needed=6.0)
+    assert made.provisional(nothing, made.of(nothing)) is (floor if on else None)
+
+
 @pytest.mark.parametrize("enough", [True, False], ids=["enough", "too little"])
 @pytest.mark.parametrize(
     ("refitted", "calls", "refits_first"),

@@ -58,7 +58,7 @@ class Refits:
     advance: Advance
     _made: dict[Trial, list[Trial]] = field(default_factory=dict)
     _searched: set[Trial] = field(default_factory=set)
-    _shown: dict[Trial, set[str]] = field(default_factory=dict)
+    _shown: dict[Trial, list[Effect]] = field(default_factory=dict)
 
     @cached_property
     def leavings(self) -> Leavings:
@@ -82,7 +82,7 @@ class Refits:
             met = self.extensions.with_surfaces(trial, placed) if placed else None
             found = [] if met is None else [met]
             plain = sum(one.seen.turns for one in placed) >= PLAIN_TURNS
-            self._shown[trial] = {one.effect.name for one in placed} if plain else set()
+            self._shown[trial] = [one.effect for one in placed] if plain else []
             alone = plain and met is not None and not self.doubted(met, trial, self.leavings.of(met).overdispersion)
             self._keep(trial, found if alone else [*found, *self._new(trial)])
         return self._made[trial]
@@ -144,7 +144,7 @@ class Refits:
         laws = (one for one in possible if not happens_once(one.causes[-1]))
         law = max(laws, key=brings, default=first)
         first = law if law.brought(trial) > NEARLY * first.brought(trial) else first
-        is_shown = {cause.name for cause in first.beyond(trial)} & self._shown.get(trial, set())
+        is_shown = any(cause in self._shown.get(trial, []) for cause in first.beyond(trial))
         least = 0.0 if is_shown else FIRST_SHARE * trial.lacking
         return None if first.brought(trial) < max(self.needed, least) else first
 

@@ -1,5 +1,6 @@
 """Shapes in annotations are checked at run time, in every module that is not compiled."""
 
+from importlib import import_module
 from pathlib import Path
 
 import pytest
@@ -17,6 +18,14 @@ install_import_hook(CHECKED, "shape_checker.check")
 # how long an example takes says nothing on a busy machine, and compiles or builds a grammar the first time
 settings.register_profile("untimed", deadline=None)
 settings.load_profile("untimed")
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Have ArviZ note its warning of the day before workers start: two that import it at once take the file from
+    each other, and one of them fails."""
+    if not hasattr(config, "workerinput"):
+        import_module("arviz")
+
 
 SHARED_DATA = Path(__file__).parents[2] / "shared" / "data"
 

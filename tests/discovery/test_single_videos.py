@@ -61,6 +61,30 @@ def test_two_causes_at_contacts_are_told_where_none_explains_a_video_alone(
         assert found[0][1] == 200.0 * min(len(lost), single_videos.WITH_ALL)
 
 
+@pytest.mark.parametrize(("explains", "told"), [([], []), ([("pair_force",)], ["pair_force"])], ids=["none", "one"])
+def test_the_last_causes_are_told_only_where_one_explains_a_video(
+    explains: list[tuple[str, ...]], told: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """And none that has brought too little in one video is tried in the next, nor two at once."""
+    tried: dict[int, list[str]] = {}
+
+    def searched(
+        _self: object, video: int, candidates: list[tuple[Effect, ...]]
+    ) -> list[tuple[tuple[Effect, ...], single_videos._Found]]:
+        tried[video] = ["+".join(cause.name for cause in causes) for causes in candidates]
+        named = [(causes, tuple(cause.name for cause in causes)) for causes in candidates]
+        return [(causes, single_videos._Found(GAINS.get(names, 0.0), names in explains)) for causes, names in named]
+
+    monkeypatch.setattr(single_videos._Searches, "with_causes", searched)
+    effects = [ContactFriction(), SlipToRoll(), PairForce(), SurfaceTilt()]
+    found = causes_of_lost_videos(
+        create_autospec(SharedFit, instance=True), [2, 0], effects, {"surface_tilt"}, 6.0, seed=0, last=True
+    )
+    assert [cause.name for (cause,), _ in found] == told
+    assert sorted(tried[2]) == ["contact_friction", "pair_force", "slip_to_roll", "surface_tilt"]
+    assert "contact_friction" not in tried[0]
+
+
 @pytest.mark.slow
 def test_friction_of_contacts_is_told_by_the_videos_that_nothing_else_explains() -> None:
     _, fit = fitted("contact_friction", 3.0, seed=1)

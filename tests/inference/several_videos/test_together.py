@@ -108,7 +108,7 @@ def test_both_samplers_agree_with_plain_emcee_on_the_whole_vector() -> None:
             ours, sd = posterior.points[..., place], plain[..., place].std()
             error = sd * np.sqrt(lasting[place] / plain[..., 0].size) + standard_error(ours)
             assert abs(plain[..., place].mean() - ours.mean()) < 4 * error
-            assert ours.std() == pytest.approx(sd, rel=0.12)
+            assert abs(sd - ours.std()) < 4 * np.hypot(error_of_spread(ours), error_of_spread(plain[..., place].T))
 
 
 def test_the_whole_vector_has_the_density_of_its_videos_and_its_slope() -> None:
@@ -144,6 +144,11 @@ def test_samplers_of_one_video_agree_with_gibbs_on_two(sampler: str) -> None:
 
 def standard_error(draws: np.ndarray) -> float:
     return float(draws.std() / np.sqrt(chain_statistics(draws.reshape(4, -1, 1)).ess_bulk))
+
+
+def error_of_spread(draws: np.ndarray) -> float:
+    """Standard error of the standard deviation, which heavy tails widen."""
+    return standard_error((draws - draws.mean()) ** 2) / (2 * float(draws.std()))
 
 
 @pytest.mark.parametrize("sampler", ["gibbs", "laplace"])
@@ -255,7 +260,7 @@ def test_what_is_not_shared_stays_each_video_s_own() -> None:
     one = fit_together([sliding(1)], model=BASE, shared=[])
     alone = sample_together(one, sampler="laplace", draws=100, hand_on=False)
     assert list(alone.shared) == []
-    assert len(alone.to_arviz()["posterior"].data_vars) == 0
+    assert "posterior" not in alone.to_arviz().groups()  # ArviZ keeps no empty group
     assert alone.video("slide 1").draw_count == 100
     for sampler in ("gibbs", "emcee"):
         chains = sample_together(one, sampler=sampler, draws=100)

@@ -51,6 +51,7 @@ def causes_of_lost_videos(
     needed: float,
     *,
     seed: int,
+    last: bool = False,
 ) -> list[tuple[Causes, float]]:
     """Causes with which lost videos are explained much better, the best first, and what is gained (nats).
 
@@ -73,6 +74,9 @@ def causes_of_lost_videos(
         Gain (nats) from which a cause is told of.
     seed
         Seed of the searches.
+    last
+        Whether no cause is looked for beyond these: then none is told of where none explains a video, and one that
+        brings too little in some videos is not tried in a further one.
     """
     telling = [effect for effect in catalogue if _tells(effect)]
     in_contacts = [effect for effect in telling if _acts_in_contacts(effect)]
@@ -93,9 +97,13 @@ def causes_of_lost_videos(
         if explained or rank + 1 >= WITH_ALL:
             least = FAR_BEHIND * gains[effects[0].name]
             effects = [effect for effect in effects[:SECOND_LOOKS] if gains[effect.name] >= least]
-        if len(effects) == 1:
+        if last:
+            effects = [effect for effect in effects if gains[effect.name] > needed]
+        if len(effects) <= 1:
             break
     ranked: list[tuple[Causes, float]] = [((effect,), gains[effect.name]) for effect in effects if effect.name in gains]
+    if last and not explained_any:
+        return []
     if lost and not explained_any:
         pair = _together(searches, lost[:WITH_ALL], in_contacts)
         if pair is not None and pair[1] > best_of_all + needed:

@@ -238,7 +238,8 @@ class Refits:
         best = next((one.fit.fits for one in found if not _mends_several(one)), trial.fit.fits)
         still_lost = lost_videos(best)
         lost = [one for one in lost_videos(trial.fit.fits) if one in still_lost]
-        told = causes_of_lost_videos(trial.fit, lost, left, likely, self.needed, seed=self.seed)
+        last = bool(trial.causes)
+        told = causes_of_lost_videos(trial.fit, lost, left, likely, self.needed, seed=self.seed, last=last)
         again = [causes for causes, promised in told if len(causes) > 1 or reached.get(causes[0].name, 0.0) < promised]
         return [one for causes in again if (one := self.extensions.from_the_beginning(trial, causes)) is not None]
 

@@ -14,7 +14,7 @@ def refit_with(cause: str, gained: float, *, patches: bool = False) -> Mock:
     refit = create_autospec(Trial, instance=True)
     refit.causes, refit.log_density, refit.log_prior = tuple(cause.split("+")), np.full(3, gained), 0.0
     refit.fitted_density = refit.log_density
-    refit.fit = Mock(videos=(0, 1, 2))
+    refit.fit, refit.lacking = Mock(videos=(0, 1, 2)), 0.0
     refit.beyond = lambda base: tuple(one for one in refit.causes if one not in base.causes)
     refit.patches.return_value, refit.may_vanish.return_value = patches, False
     refit.loses_videos_of.return_value = refit.loses_most_of.return_value = False

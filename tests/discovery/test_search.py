@@ -227,6 +227,38 @@ def test_a_course_that_gains_nothing_without_the_cause_is_not_handed_back(monkey
     assert _searcher(needed=6.0).handed_back([plain, tilt], [_step(), _step()]) == [plain, tilt]
 
 
+@pytest.mark.parametrize(("lacking", "again"), [(250.0, True), (350.0, False)])
+def test_causes_are_not_looked_for_anew_for_a_course_that_brings_a_trifle_of_what_a_model_lacks(
+    lacking: float, *, again: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    plain, tilt, better = refit_with("", 0.0), refit_with("tilt", 50.0), refit_with("", 10.0)  # in each of three videos
+    plain.lacking = lacking
+    monkeypatch.setattr(search, "mends_any_course", lambda _cause: True)
+    monkeypatch.setattr(search._Searcher, "_left_out", lambda _self, _trial, *_causes: better)
+    found = _searcher(needed=6.0).handed_back([plain, tilt], [_step(), _step()])
+    assert found == ([better] if again else [plain, tilt])
+
+
+@pytest.mark.parametrize(("lacking", "times"), [(250.0, 2), (350.0, 1)])
+def test_causes_are_not_tried_anew_for_a_course_that_brings_a_trifle_of_what_a_model_lacks(
+    lacking: float, times: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    plain, better = refit_with("", 0.0), refit_with("", 10.0)
+    plain.lacking, plain.causes, better.causes = lacking, (), ()
+    asked: list[Trial] = []
+
+    def tried(self: search._Searcher, trial: Trial) -> search.Step:
+        asked.append(trial)
+        return self.untried(trial)
+
+    monkeypatch.setattr(search._Searcher, "tried", tried)
+    monkeypatch.setattr(search._Searcher, "chosen", lambda _self, _trial, _step: (better, None))
+    monkeypatch.setattr(Leavings, "of", lambda _self, _trial: Left((), (), np.ones(3)))
+    chain, _ = _searcher(needed=6.0).forward(plain)
+    assert chain == [better]
+    assert len(asked) == times
+
+
 @pytest.mark.parametrize(
     ("rival", "lost", "kicks", "remains"),
     [(20.0, [], False, True), (37.0, [], False, False), (20.0, [1], False, False), (20.0, [], True, False)],

@@ -22,6 +22,8 @@ from vrdp_prob.progress import ProgressDisplay, SilentProgress
 MOST_RIVALS = 2
 MOST_CAUSES = 5
 MOST_SWAPS, MOST_ROUNDS = 3, 3
+TRIFLING = 0.1
+"""Share of what a model lacks that a better course must bring for causes to be looked for once more."""
 OUT_OF_REACH = 2.0
 """Gain, in those that are needed, by which a cause is ahead of others for none of them to be as probable as it is."""
 MOSTLY = 0.5
@@ -190,8 +192,8 @@ class _Searcher:
         while len(chain) <= MOST_CAUSES:
             step = steps[-1] = self.tried(chain[-1])
             found, winner = self.chosen(chain[-1], step)
-            found_better_course = found is not chain[-1]
-            if found_better_course:
+            is_exhausted = _is_trifle(found, chain[-1])
+            if found is not chain[-1]:
                 chain[-1], steps[-1] = found, replace(step, left=self.leavings.of(found))
                 back = self.handed_back(chain, steps) if rounds < MOST_ROUNDS else chain
                 compared = zip(back, chain, steps, strict=False)
@@ -205,7 +207,7 @@ class _Searcher:
             if winner is not None:
                 chain.append(winner)
                 steps.append(self.untried(winner))
-            elif not found_better_course:
+            elif is_exhausted:
                 break
         return chain, steps
 
@@ -261,16 +263,17 @@ class _Searcher:
     def handed_back(self, chain: Sequence[Trial], steps: Sequence[Step]) -> list[Trial]:
         """The models up to the first that gains by the course which the last one has found since, with that course.
 
-        What it brings is no merit of the causes beside which it was found: these are looked for once more. The last one
-        stays where it is ahead of the model without it, and of all that was tried in its place, by so much more than
-        the course brings that none of them could overtake it; but not kicks, which mend any course.
+        What it brings is no merit of the causes beside which it was found: these are looked for once more. But not for
+        a trifle: where nothing explains the videos, one wrong course is as good as another. The last one stays where it
+        is ahead of the model without it, and of all that was tried in its place, by so much more than the course brings
+        that none of them could overtake it; but not kicks, which mend any course.
         """
         *before, last = chain
         if not before:
             return [last]
         lesser = self._left_out(last, steps[-1].left.overdispersion, *last.beyond(before[-1]))
         better = self._with_both_courses(lesser, before[-1])
-        if better is before[-1]:
+        if _is_trifle(better, before[-1]):
             return list(chain)
         course = gain(better, before[-1])[0]
         head = self.handed_back([*before[:-1], better], steps[:-1])
@@ -420,6 +423,11 @@ def _tried_at(cause: Effect, steps: Sequence[Step]) -> Step:
             if any(one.name == name for trial in step.tried for one in trial.beyond(step.base)):
                 return step
     return steps[0]
+
+
+def _is_trifle(better: Trial, before: Trial) -> bool:
+    """Whether a better course of events brings too little of what a model lacks for causes to be looked for anew."""
+    return gain(better, before)[0] <= TRIFLING * before.lacking
 
 
 def _in_one_video(trial: Trial, base: Trial) -> list[int]:

@@ -65,6 +65,26 @@ def test_two_causes_are_found_of_which_neither_stands_out_beside_chance(
     assert _searcher(needed=2.0)._pair(nothing, tilt) == ((tilt, second) if is_found else None)
 
 
+@pytest.mark.parametrize(("paired", "best"), [(True, "tilt"), (False, "friction")])
+def test_fits_from_the_beginning_are_tried_where_no_two_causes_are_established(
+    *, paired: bool, best: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A cause may have lost videos in its refit from the model without it, and explain all of them by itself."""
+    nothing, tilt, both = refit_with("", 0.0), refit_with("tilt", 1.0), refit_with("tilt+drag", 8.0)
+    anew = refit_with("friction", 50.0)
+    monkeypatch.setattr(refits.Refits, "of", lambda _self, _trial: [tilt])
+    monkeypatch.setattr(refits.Refits, "settled", lambda _self, _trial, _found: False)
+    monkeypatch.setattr(refits.Refits, "provisional", lambda _self, _trial, _found: tilt)
+    monkeypatch.setattr(refits.Refits, "with_lost_found", lambda _self, _trial, first: first)
+    monkeypatch.setattr(refits.Refits, "with_lost", lambda _self, _trial: [tilt, anew])
+    monkeypatch.setattr(search._Searcher, "_pair", lambda _self, _trial, first: (first, both) if paired else None)
+    monkeypatch.setattr(search._Searcher, "doubted", lambda *_given: False)
+    monkeypatch.setattr(Leavings, "of", lambda _self, _trial: Left((), (), np.ones(3)))
+    step = _searcher(needed=2.0).tried(nothing)
+    assert step.tried[0].causes == (best,)
+    assert step.pair == ((tilt, both) if paired else None)
+
+
 @pytest.mark.parametrize(
     ("kicked", "both", "taken"),
     [(3.0, 8.0, "tilt"), (3.0, 3.1, "kicks"), (None, 8.0, "tilt"), (3.0, None, "kicks"), (None, None, None)],

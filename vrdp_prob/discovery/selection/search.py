@@ -223,10 +223,8 @@ class _Searcher:
             first = self.refits.with_lost_found(trial, first)
             found = self.refits.of(trial)
         if not self.refits.settled(trial, found):
-            if first is None:
-                found = self.refits.with_lost(trial)
-            else:
-                pair = self._pair(trial, first)
+            pair = None if first is None else self._pair(trial, first)
+            found = self.refits.with_lost(trial) if pair is None else found
         return Step(trial, self.leavings.of(trial), tuple(self._in_order(trial, found)), pair)
 
     def _pair(self, trial: Trial, first: Trial) -> tuple[Trial, Trial] | None:

@@ -27,6 +27,18 @@ def _searcher(needed: float = 0.0) -> search._Searcher:
     return search._Searcher(refits_with(needed))
 
 
+def _asked(monkeypatch: pytest.MonkeyPatch) -> list[Trial]:
+    """The models on which causes are tried, as they come; none is."""
+    asked: list[Trial] = []
+
+    def tried(self: search._Searcher, trial: Trial) -> search.Step:
+        asked.append(trial)
+        return self.untried(trial)
+
+    monkeypatch.setattr(search._Searcher, "tried", tried)
+    return asked
+
+
 @pytest.mark.parametrize(("in_doubt", "order"), [(False, ["tilt", "drag", "kicks"]), (True, ["kicks", "tilt", "drag"])])
 def test_kicks_come_last_unless_the_best_other_cause_is_in_doubt(
     in_doubt: bool, order: list[str], monkeypatch: pytest.MonkeyPatch
@@ -224,14 +236,8 @@ def test_a_course_found_beside_causes_is_handed_back_and_causes_are_looked_for_o
     chosen = {plain: (plain, friction), friction: (friction, both), both: (found, None)}
     chosen |= {mended: (mended, None if needs_it else again), again: (again, None)}
     left_out = {found: without_drag, without_drag: mended}
-    asked: list[Trial] = []
-
-    def tried(self: search._Searcher, trial: Trial) -> search.Step:
-        asked.append(trial)
-        return self.untried(trial)
-
+    asked = _asked(monkeypatch)
     monkeypatch.setattr(search, "mends_any_course", lambda _cause: False)
-    monkeypatch.setattr(search._Searcher, "tried", tried)
     monkeypatch.setattr(search._Searcher, "chosen", lambda _self, trial, _step: chosen[trial])
     monkeypatch.setattr(search._Searcher, "_left_out", lambda _self, trial, *_causes: left_out[trial])
     monkeypatch.setattr(Leavings, "of", lambda _self, _trial: Left((), (), np.ones(3)))
@@ -265,13 +271,7 @@ def test_causes_are_not_tried_anew_for_a_course_that_brings_a_trifle_of_what_a_m
 ) -> None:
     plain, better = refit_with("", 0.0), refit_with("", 10.0)
     plain.lacking, plain.causes, better.causes = lacking, (), ()
-    asked: list[Trial] = []
-
-    def tried(self: search._Searcher, trial: Trial) -> search.Step:
-        asked.append(trial)
-        return self.untried(trial)
-
-    monkeypatch.setattr(search._Searcher, "tried", tried)
+    asked = _asked(monkeypatch)
     monkeypatch.setattr(search._Searcher, "chosen", lambda _self, _trial, _step: (better, None))
     monkeypatch.setattr(Leavings, "of", lambda _self, _trial: Left((), (), np.ones(3)))
     chain, _ = _searcher(needed=6.0).forward(plain)

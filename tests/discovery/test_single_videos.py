@@ -32,6 +32,21 @@ GAINS = {
 """What searches with some causes gain (nats) in each video."""
 
 
+def _with_gains(explains: list[tuple[str, ...]], monkeypatch: pytest.MonkeyPatch) -> dict[int, list[str]]:
+    """Searches that gain this, and explain a video with some causes; what they were last asked for of each video."""
+    asked: dict[int, list[str]] = {}
+
+    def searched(
+        _self: object, video: int, candidates: list[tuple[Effect, ...]]
+    ) -> list[tuple[tuple[Effect, ...], single_videos._Found]]:
+        named = [(causes, tuple(cause.name for cause in causes)) for causes in candidates]
+        asked[video] = ["+".join(names) for _, names in named]
+        return [(causes, single_videos._Found(GAINS.get(names, 0.0), names in explains)) for causes, names in named]
+
+    monkeypatch.setattr(single_videos._Searches, "with_causes", searched)
+    return asked
+
+
 @pytest.mark.parametrize(
     ("explains", "told"),
     [
@@ -45,13 +60,7 @@ GAINS = {
 def test_two_causes_at_contacts_are_told_where_none_explains_a_video_alone(
     lost: list[int], explains: list[tuple[str, ...]], told: list[tuple[str, ...]], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def searched(
-        _self: object, _video: int, candidates: list[tuple[Effect, ...]]
-    ) -> list[tuple[tuple[Effect, ...], single_videos._Found]]:
-        named = [(causes, tuple(cause.name for cause in causes)) for causes in candidates]
-        return [(causes, single_videos._Found(GAINS.get(names, 0.0), names in explains)) for causes, names in named]
-
-    monkeypatch.setattr(single_videos._Searches, "with_causes", searched)
+    _with_gains(explains, monkeypatch)
     effects = [ContactFriction(), SlipToRoll(), PairForce(), SurfaceTilt()]
     found = causes_of_lost_videos(
         create_autospec(SharedFit, instance=True), lost, effects, {"surface_tilt"}, 6.0, seed=0
@@ -66,16 +75,7 @@ def test_the_last_causes_are_told_only_where_one_explains_a_video(
     explains: list[tuple[str, ...]], told: list[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """And none that has brought too little in one video is tried in the next, nor two at once."""
-    tried: dict[int, list[str]] = {}
-
-    def searched(
-        _self: object, video: int, candidates: list[tuple[Effect, ...]]
-    ) -> list[tuple[tuple[Effect, ...], single_videos._Found]]:
-        tried[video] = ["+".join(cause.name for cause in causes) for causes in candidates]
-        named = [(causes, tuple(cause.name for cause in causes)) for causes in candidates]
-        return [(causes, single_videos._Found(GAINS.get(names, 0.0), names in explains)) for causes, names in named]
-
-    monkeypatch.setattr(single_videos._Searches, "with_causes", searched)
+    tried = _with_gains(explains, monkeypatch)
     effects = [ContactFriction(), SlipToRoll(), PairForce(), SurfaceTilt()]
     found = causes_of_lost_videos(
         create_autospec(SharedFit, instance=True), [2, 0], effects, {"surface_tilt"}, 6.0, seed=0, last=True

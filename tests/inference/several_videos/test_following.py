@@ -147,25 +147,15 @@ def test_what_is_held_in_a_video_is_held_in_a_new_search_of_it() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    "seed",
-    [
-        pytest.param(
-            1,
-            marks=pytest.mark.xfail(
-                reason="one video is at an edge where two orders of events meet; the climb ends 9 nats below the top"
-            ),
-        ),
-        4,
-        5,
-    ],
-)
+@pytest.mark.parametrize("seed", [1, 4, 5])
 def test_videos_with_collisions_in_a_row_are_all_explained_together(seed: int) -> None:
     """Own numbers that are known to a millionth, and single videos whose own fit takes a wrong course of events."""
     data = draw([], seed=seed)
     fit = fit_together(data.tracks, model=default_model(), model_error=False)
-    assert fit.joint.converged
     assert max(one.misfit.residual_sd for one in fit.fits) < 1.08 * data.truth.measurement.noise
     mean, sd = fit.joint.gaussian.mean, fit.joint.gaussian.sd
     place = [name for name, _ in fit.joint.numbers.keys].index("air_drag")
     assert abs(mean[place] - np.log(data.truth.videos[0].laws.drag)) < 4 * sd[place]
+    if seed == 1 and not fit.joint.converged:
+        pytest.xfail("one video is at an edge where two orders of events meet; the climb ends 9 nats below the top")
+    assert fit.joint.converged

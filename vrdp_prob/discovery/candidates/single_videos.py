@@ -81,7 +81,7 @@ def causes_of_lost_videos(
     telling = [effect for effect in catalogue if _tells(effect)]
     in_contacts = [effect for effect in telling if _acts_in_contacts(effect)]
     effects = in_contacts + [effect for effect in telling if effect.name in likely and effect not in in_contacts]
-    if not effects:
+    if not effects or not lost:
         return []
 
     searches = _Searches(fit, seed)
@@ -101,13 +101,13 @@ def causes_of_lost_videos(
             effects = [effect for effect in effects if gains[effect.name] > needed]
         if len(effects) <= 1:
             break
-    ranked: list[tuple[Causes, float]] = [((effect,), gains[effect.name]) for effect in effects if effect.name in gains]
     if last and not explained_any:
         return []
-    if lost and not explained_any:
+    if not explained_any:
         pair = _together(searches, lost[:WITH_ALL], in_contacts)
         if pair is not None and pair[1] > best_of_all + needed:
             return [pair]
+    ranked: list[tuple[Causes, float]] = [((effect,), gains[effect.name]) for effect in effects if effect.name in gains]
     return [pair for pair in ranked if pair[1] > max(needed, NEARLY * ranked[0][1])][:MOST_TOLD]
 
 

@@ -224,7 +224,8 @@ class _Searcher:
             found = self.refits.of(trial)
         if not self.refits.settled(trial, found):
             pair = None if first is None else self._pair(trial, first)
-            found = self.refits.with_lost(trial) if pair is None else found
+            if pair is None:
+                found = self.refits.with_lost(trial)
         return Step(trial, self.leavings.of(trial), tuple(self._in_order(trial, found)), pair)
 
     def _pair(self, trial: Trial, first: Trial) -> tuple[Trial, Trial] | None:

@@ -225,6 +225,7 @@ def test_a_cause_has_its_few_lost_videos_searched_anew(
     tilt.fallen_from.return_value = anew.fallen_from.return_value = []
     kicks = Mock(spec=CauseScore, effect=ExternalImpulse(), sites=[Mock(video=video) for video in kicked])
     monkeypatch.setattr(refits, "lost_videos", lambda _fit: lost)
+    monkeypatch.setattr(refits, "explained", lambda _fits: True)
     monkeypatch.setattr(courses, "may_take_another_course", lambda _fit: True)
     monkeypatch.setattr(Leavings, "of", lambda _self, _trial: Mock(scores=[kicks], beside_chance=[]))
     monkeypatch.setattr(refits.Refits, "_new", lambda _self, _trial: [drag, tilt])
@@ -265,11 +266,38 @@ def test_where_a_cause_leaves_something_all_videos_are_searched_anew(
     monkeypatch.setattr(refits, "happens_once", lambda _cause: False)
     monkeypatch.setattr(refits, "lost_videos", lambda _fit: [])
     monkeypatch.setattr(refits, "explained", lambda _fits: explains)
+    monkeypatch.setattr(refits.Refits, "_begun_anew", lambda _self, _trial, one: one)
     monkeypatch.setattr(Leavings, "of", lambda _self, _trial: left)
     monkeypatch.setattr(refits.Refits, "_new", lambda _self, _trial: [tilt])
     found = refits_with(needed=2.0)
     assert found.with_lost_found(nothing, tilt).causes == (taken,)
     assert [one.causes[0] for one in found.of(nothing)] == [taken]
+
+
+@pytest.mark.parametrize(
+    ("explains_worst", "brought", "taken"),
+    [(True, 900.0, "radius begun anew"), (True, 50.0, "radius"), (True, None, "radius"), (False, None, "radius")],
+    ids=["explains the worst video", "brings less", "has no world in common", "explains none"],
+)
+def test_a_cause_that_leaves_most_videos_lost_is_fitted_from_the_beginning(
+    brought: float | None, taken: str, *, explains_worst: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    nothing, radius, anew = refit_with("", 0.0), refit_with("radius", 5.0), refit_with("radius begun anew", 9.0)
+    nothing.choices, radius.fit = {}, Mock(fits=[""] * 4)
+    radius.brought.return_value, anew.brought.return_value = 100.0, brought
+    began = Mock(return_value=None if brought is None else anew)
+    searched = Mock(return_value=[(("radius",), 80.0)] if explains_worst else [])
+    monkeypatch.setattr(refits, "lost_videos", lambda fits: [2, 0, 1] if fits is radius.fit.fits else [])
+    monkeypatch.setattr(refits, "explained", lambda fits: fits is not radius.fit.fits)
+    monkeypatch.setattr(refits, "causes_of_lost_videos", searched)
+    monkeypatch.setattr(Extensions, "from_the_beginning", lambda _self, *asked: began(*asked))
+    monkeypatch.setattr(Leavings, "of", lambda _self, _trial: Mock(scores=[], beside_chance=[]))
+    monkeypatch.setattr(refits.Refits, "_new", lambda _self, _trial: [radius])
+    found = refits_with()
+    assert found.with_lost_found(nothing, radius).causes == (taken,)
+    assert [one.causes[0] for one in found.of(nothing)] == [taken]
+    assert searched.call_args.args[1:3] == ([2], ("radius",))
+    assert began.called == explains_worst
 
 
 @pytest.mark.parametrize(

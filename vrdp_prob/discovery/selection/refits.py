@@ -193,13 +193,13 @@ class Refits:
         return found
 
     def with_lost_found(self, trial: Trial, one: Trial) -> Trial:
-        """One of the refits with its few lost videos searched anew, in the place of which it counts from then on.
+        """One of the refits with its lost videos searched anew, in the place of which it counts from then on.
 
         What one lost video leaves calls for many causes, of which each costs more to try than the search. Where most
-        videos are explained and something is left still, all of them are searched, unless that calls for a law loudly,
-        which is tried instead.
+        are lost, the model is fitted from the beginning if that explains them. Where most are explained and something
+        is left still, all of them are searched, unless that calls for a law loudly, which is tried instead.
         """
-        found = one
+        found = one if explained(one.fit.fits) else self._begun_anew(trial, one)
         for _ in range(SEARCHES):
             kicked = [site.video for score in self.leavings.of(found).scores for site in score.sites if _kicks(score)]
             videos = list(dict.fromkeys([*lost_videos(found.fit.fits), *kicked]))
@@ -213,6 +213,19 @@ class Refits:
         if found is not one:
             self._keep(trial, [found if old is one else old for old in self.of(trial)])
         return found
+
+    def _begun_anew(self, trial: Trial, one: Trial) -> Trial:
+        """One of the refits, fitted from the beginning if its cause explains the worst of its lost videos then.
+
+        A model that has lost most videos has courses in them from which no refit finds the way, and most so where the
+        cause that it lacks is strong.
+        """
+        if trial.choices:
+            return one
+        cause, worst = one.beyond(trial), lost_videos(one.fit.fits)[:1]
+        told = causes_of_lost_videos(trial.fit, worst, cause, one.names, self.needed, seed=self.seed, last=True)
+        begun = self.extensions.from_the_beginning(trial, cause) if told else None
+        return begun if begun is not None and begun.brought(trial) > one.brought(trial) else one
 
     def _calls_for_a_law(self, trial: Trial) -> bool:
         """Whether what a model leaves beside chance calls for a law louder than a few wrong courses do."""

@@ -266,7 +266,7 @@ def test_where_a_cause_leaves_something_all_videos_are_searched_anew(
     monkeypatch.setattr(refits, "happens_once", lambda _cause: False)
     monkeypatch.setattr(refits, "lost_videos", lambda _fit: [])
     monkeypatch.setattr(refits, "explained", lambda _fits: explains)
-    monkeypatch.setattr(refits.Refits, "_begun_anew", lambda _self, _trial, one: one)
+    monkeypatch.setattr(refits.Refits, "_from_the_beginning", lambda _self, _trial, one: one)
     monkeypatch.setattr(Leavings, "of", lambda _self, _trial: left)
     monkeypatch.setattr(refits.Refits, "_new", lambda _self, _trial: [tilt])
     found = refits_with(needed=2.0)

@@ -199,7 +199,7 @@ class Refits:
         are lost, the model is fitted from the beginning if that explains them. Where most are explained and something
         is left still, all of them are searched, unless that calls for a law loudly, which is tried instead.
         """
-        found = one if explained(one.fit.fits) else self._begun_anew(trial, one)
+        found = one if explained(one.fit.fits) else self._from_the_beginning(trial, one)
         for _ in range(SEARCHES):
             kicked = [site.video for score in self.leavings.of(found).scores for site in score.sites if _kicks(score)]
             videos = list(dict.fromkeys([*lost_videos(found.fit.fits), *kicked]))
@@ -214,7 +214,7 @@ class Refits:
             self._keep(trial, [found if old is one else old for old in self.of(trial)])
         return found
 
-    def _begun_anew(self, trial: Trial, one: Trial) -> Trial:
+    def _from_the_beginning(self, trial: Trial, one: Trial) -> Trial:
         """One of the refits, fitted from the beginning if its cause explains the worst of its lost videos then.
 
         A model that has lost most videos has courses in them from which no refit finds the way, and most so where the

@@ -388,7 +388,7 @@ def test_beside_a_cause_none_is_tried_where_no_score_stands_out_from_chance(
 
 @pytest.mark.parametrize(
     ("before", "brought", "is_tried"),
-    [((), 1.0, True), ((), 9.0, False), (("tilt",), 1.0, False)],
+    [((), 1.0, True), ((), 9.0, False), (("tilt",), 1.0, True)],
     ids=["nothing brings enough", "something does", "there is a cause already"],
 )
 def test_a_cause_whose_own_check_fails_is_tried_where_nothing_brings_enough(
@@ -415,6 +415,21 @@ def test_a_cause_whose_own_check_fails_is_tried_where_nothing_brings_enough(
     monkeypatch.setattr(Leavings, "of", lambda _self, _trial: Left(scores, scores, np.ones(3)))
     assert refits_with(needed=6.0).of(trial) == [other]
     assert (["mass_dependent_friction"] in made) is is_tried
+
+
+@pytest.mark.parametrize("fails", [True, False], ids=["its check fails", "no check fails"])
+def test_beside_a_cause_one_is_tried_whose_own_check_fails_though_no_score_stands_out(
+    *, fails: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    trial, other = refit_with("tilt", 0.0), refit_with("tilt", 20.0)
+    trial.causes, other.causes = (SurfaceTilt(),), (SurfaceTilt(), MassDependentFriction())
+    faint = Mock(spec=CauseScore, effect=MassDependentFriction(), size=4.0, p_value=0.5, sites=())
+    check = Check("friction of the bodies against mass", 0.07, 1e-9, fails, "")
+    monkeypatch.setattr(refits, "lost_videos", lambda _fits: [])
+    monkeypatch.setattr(leavings, "run_checks", lambda _fit, *, seed: (check,))
+    monkeypatch.setattr(Leavings, "of", lambda _self, _trial: Left((faint,), (faint,), np.ones(3)))
+    monkeypatch.setattr(Extensions, "made_of", lambda _self, _trial, asked, **_beside: [other] if asked else [])
+    assert refits_with(needed=6.0)._new(trial) == ([other] if fails else [])
 
 
 def test_a_cause_with_which_no_joint_world_can_begin_is_left_out(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -99,14 +99,12 @@ class Refits:
     def _new(self, trial: Trial) -> list[Trial]:
         """Refits in any order; hidden things are tried only where nothing explains the videos better than kicks do.
 
-        Where nothing brings enough, causes are tried, too, for whose own traces a check has been made that fails: what
-        lies in numbers that bodies have of their own anyway is hardly seen in residuals. Beside a cause that
-        loses no video none is tried where no score stands out from what is left to chance: beside that is counted, too,
-        what refits bring.
+        Beside a cause that loses no video none is tried for its score where none stands out from what is left to
+        chance: beside that is counted, too, what refits bring.
         """
         by_chance = all(one.p_value >= SHORTLIST_LEVEL for one in self.leavings.of(trial).beside_chance)
         if trial.causes and by_chance and not lost_videos(trial.fit.fits):
-            return []
+            return self._with_traced(trial, [])
         found = self._asked_by_most(trial)
         if found and (self.settled(trial, found) or any(not lost_videos(one.fit.fits) for one in found)):
             return found
@@ -121,15 +119,23 @@ class Refits:
         if not self.settled(trial, found):
             found += self.extensions.made_of(trial, [one for one in likely if one not in close], beside=found)
             found.sort(key=merit, reverse=True)
-        if not trial.causes and (not found or found[0].brought(trial) < self.needed):
-            tried = {one.causes[-1].name for one in found}
-            seen = causes_with_own_check_failing(self.leavings.checks(trial)) - tried
-            found += self.extensions.made_of(trial, [one for one in scores if one.effect.name in seen], beside=found)
-            found.sort(key=merit, reverse=True)
+        found = self._with_traced(trial, found)
         kicks = next((one for one in scores if _kicks(one) and one.sites), None)
         if kicks is not None and (not found or found[0].causes[-1].name == kicks.effect.name):
             found += self._hidden(trial, found, kicks)
         return found
+
+    def _with_traced(self, trial: Trial, found: Sequence[Trial]) -> list[Trial]:
+        """Refits, the best first; where none explains enough with causes for whose own traces a check fails.
+
+        What lies in numbers that bodies have of their own anyway is hardly seen in residuals.
+        """
+        if any(one.brought(trial) >= self.needed for one in explaining(found)):
+            return list(found)
+        tried = {one.causes[-1].name for one in found}
+        traced = causes_with_own_check_failing(self.leavings.checks(trial)) - tried
+        scores = [one for one in self.leavings.of(trial).scores if one.effect.name in traced]
+        return sorted([*found, *self.extensions.made_of(trial, scores, beside=found)], key=merit, reverse=True)
 
     def provisional(self, trial: Trial, found: Sequence[Trial]) -> Trial | None:
         """The cause that brings most where all else is noise, but for kicks: enough, and a good part of what lacks.

@@ -87,6 +87,7 @@ def test_fits_from_the_beginning_are_tried_where_no_two_causes_are_established(
     monkeypatch.setattr(refits.Refits, "of", lambda _self, _trial: [tilt])
     monkeypatch.setattr(refits.Refits, "settled", lambda _self, _trial, _found: False)
     monkeypatch.setattr(refits.Refits, "provisional", lambda _self, _trial, _found: tilt)
+    monkeypatch.setattr(refits.Refits, "leaves_unexplained", lambda _self, _trial, _first: False)
     monkeypatch.setattr(refits.Refits, "with_lost_found", lambda _self, _trial, first: first)
     monkeypatch.setattr(refits.Refits, "with_lost", lambda _self, _trial: [tilt, anew])
     monkeypatch.setattr(search._Searcher, "_pair", lambda _self, _trial, first: (first, both) if paired else None)
@@ -95,6 +96,30 @@ def test_fits_from_the_beginning_are_tried_where_no_two_causes_are_established(
     step = _searcher(needed=2.0).tried(nothing)
     assert step.tried[0].causes == (best,)
     assert step.pair == ((tilt, both) if paired else None)
+
+
+@pytest.mark.parametrize("leaves", [True, False], ids=["explains no lost video", "explains them"])
+def test_lost_videos_are_searched_with_every_cause_before_one_that_explains_none_of_them_is_gone_on_from(
+    *, leaves: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    nothing, jitter, slip = refit_with("", 0.0), refit_with("jitter", 5.0), refit_with("slip", 50.0)
+    gone_on_from: list[str] = []
+
+    def with_lost_found(_self: object, _trial: Trial, first: Trial) -> Trial:
+        gone_on_from.append(str(first.causes[0]))
+        return first
+
+    monkeypatch.setattr(refits.Refits, "of", lambda _self, _trial: [jitter])
+    monkeypatch.setattr(refits.Refits, "settled", lambda _self, _trial, found: slip in found)
+    monkeypatch.setattr(refits.Refits, "provisional", lambda _self, _trial, _found: jitter)
+    monkeypatch.setattr(refits.Refits, "leaves_unexplained", lambda _self, _trial, _first: leaves)
+    monkeypatch.setattr(refits.Refits, "with_lost_found", with_lost_found)
+    monkeypatch.setattr(refits.Refits, "with_lost", lambda _self, _trial: [slip, jitter])
+    monkeypatch.setattr(search._Searcher, "_pair", lambda *_given: None)
+    monkeypatch.setattr(search._Searcher, "doubted", lambda *_given: False)
+    monkeypatch.setattr(Leavings, "of", lambda _self, _trial: Left((), (), np.ones(3)))
+    assert _searcher(needed=2.0).tried(nothing).tried == (slip, jitter)
+    assert gone_on_from == ([] if leaves else ["jitter"])
 
 
 @pytest.mark.parametrize(

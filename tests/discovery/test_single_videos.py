@@ -70,6 +70,20 @@ def test_two_causes_at_contacts_are_told_where_none_explains_a_video_alone(
         assert found[0][1] == 200.0 * min(len(lost), single_videos.WITH_ALL)
 
 
+@pytest.mark.parametrize(
+    ("explains", "told"),
+    [([("slip_to_roll",)], ["slip_to_roll"]), ([], ["pair_force"])],
+    ids=["one explains videos", "none does"],
+)
+def test_what_gains_most_and_explains_no_video_is_not_told_beside_what_explains_some(
+    explains: list[tuple[str, ...]], told: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    _with_gains(explains, monkeypatch)
+    effects = [SlipToRoll(), PairForce()]
+    found = causes_of_lost_videos(create_autospec(SharedFit, instance=True), [2, 0, 1], effects, set(), 6.0, seed=0)
+    assert [cause.name for (cause,), _ in found] == told
+
+
 @pytest.mark.parametrize(("explains", "told"), [([], []), ([("pair_force",)], ["pair_force"])], ids=["none", "one"])
 def test_the_last_causes_are_told_only_where_one_explains_a_video(
     explains: list[tuple[str, ...]], told: list[str], monkeypatch: pytest.MonkeyPatch

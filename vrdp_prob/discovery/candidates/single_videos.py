@@ -4,6 +4,7 @@ Scores and refits begin at the fit without the cause. Where that has taken the w
 near it to be found, and a search from the beginning is the only way.
 """
 
+from collections import Counter
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field
 from functools import partial
@@ -55,8 +56,10 @@ def causes_of_lost_videos(
 ) -> list[tuple[Causes, float]]:
     """Causes with which lost videos are explained much better, the best first, and what is gained (nats).
 
-    Where no single one explains any of the videos, two of those that act in contacts may do so together: neither need
-    bring anything by itself then. Such a pair is told of alone.
+    Those that explain most videos come first, and where any does, none is told of that explains no video: what gains
+    much and explains nothing mends a wrong course of events. Where no single one explains any of the videos, two of
+    those that act in contacts may do so together: neither need bring anything by itself then. Such a pair is told of
+    alone.
 
     Parameters
     ----------
@@ -86,28 +89,36 @@ def causes_of_lost_videos(
 
     searches = _Searches(fit, seed)
     gains: dict[str, float] = {}
-    best_of_all, explained_any = 0.0, False
+    explained: Counter[str] = Counter()
+    best_of_all = 0.0
+
+    def explaining_first(effect: Effect) -> tuple[int, float]:
+        return -explained[effect.name], -gains[effect.name]
+
     for rank, video in enumerate(lost[:VIDEOS]):
         found = searches.with_causes(video, [(effect,) for effect in effects])
         gains = {effect.name: one.gain + gains.get(effect.name, 0.0) for (effect,), one in found}
-        explained = any(one.explains for _, one in found)
-        explained_any = explained_any or explained
+        explaining = [effect.name for (effect,), one in found if one.explains]
+        explained.update(explaining)
         best_of_all = max(gains.values()) if rank < WITH_ALL else best_of_all
-        effects = sorted((effect for (effect,), _ in found), key=lambda effect: -gains[effect.name])
-        if explained or rank + 1 >= WITH_ALL:
+        effects = sorted((effect for (effect,), _ in found), key=explaining_first)
+        if explaining or rank + 1 >= WITH_ALL:
             least = FAR_BEHIND * gains[effects[0].name]
             effects = [effect for effect in effects[:SECOND_LOOKS] if gains[effect.name] >= least]
         if last:
             effects = [effect for effect in effects if gains[effect.name] > needed]
         if len(effects) <= 1:
             break
-    if last and not explained_any:
+    if last and not explained:
         return []
-    if not explained_any:
+    if not explained:
         pair = _together(searches, lost[:WITH_ALL], in_contacts)
         if pair is not None and pair[1] > best_of_all + needed:
             return [pair]
-    ranked: list[tuple[Causes, float]] = [((effect,), gains[effect.name]) for effect in effects if effect.name in gains]
+    told = [effect for effect in effects if effect.name in gains and (explained[effect.name] or not explained)]
+    ranked: list[tuple[Causes, float]] = [
+        ((effect,), gains[effect.name]) for effect in sorted(told, key=explaining_first)
+    ]
     return [pair for pair in ranked if pair[1] > max(needed, NEARLY * ranked[0][1])][:MOST_TOLD]
 
 

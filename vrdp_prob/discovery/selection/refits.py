@@ -16,7 +16,14 @@ from vrdp_prob.discovery.selection.extensions import Extensions, explaining
 from vrdp_prob.discovery.selection.leavings import Leavings
 from vrdp_prob.discovery.selection.shortlist import CLOSE, SHORTLIST_LEVEL, shortlist
 from vrdp_prob.discovery.selection.trials import Trial, gain, merit, weights
-from vrdp_prob.inference.several_videos.second_look import MOST, explained, lost_videos, outweigh, trusted
+from vrdp_prob.inference.several_videos.second_look import (
+    MOST,
+    explained,
+    loses_single_videos,
+    lost_videos,
+    outweigh,
+    trusted,
+)
 from vrdp_prob.models.effects.effect import Effect
 from vrdp_prob.models.effects.external_impulse import ExternalImpulse
 from vrdp_prob.progress import Advance
@@ -59,6 +66,7 @@ class Refits:
     _made: dict[Trial, list[Trial]] = field(default_factory=dict)
     _searched: set[Trial] = field(default_factory=set)
     _shown: dict[Trial, list[Effect]] = field(default_factory=dict)
+    _explaining: dict[Trial, bool] = field(default_factory=dict)
 
     @cached_property
     def leavings(self) -> Leavings:
@@ -226,12 +234,27 @@ class Refits:
         A model that has lost most videos has courses in them from which no refit finds the way, and most so where the
         cause that it lacks is strong.
         """
-        if trial.choices:
+        if trial.choices or not self._explains_worst(trial, one):
             return one
-        cause, worst = one.beyond(trial), lost_videos(one.fit.fits)[:1]
-        told = causes_of_lost_videos(trial.fit, worst, cause, one.names, self.needed, seed=self.seed, last=True)
-        begun = self.extensions.from_the_beginning(trial, cause) if told else None
+        begun = self.extensions.from_the_beginning(trial, one.beyond(trial))
         return begun if begun is not None and begun.brought(trial) > one.brought(trial) else one
+
+    def leaves_unexplained(self, trial: Trial, one: Trial) -> bool:
+        """Whether a refit leaves more than single videos lost, and its cause does not explain the worst of them.
+
+        What scatters positions along the paths, say, takes up some of what wrong courses leave, and explains none.
+        """
+        fits = one.fit.fits
+        several = lost_videos(fits) and not loses_single_videos(fits)
+        return bool(several) and not trial.choices and not self._explains_worst(trial, one)
+
+    def _explains_worst(self, trial: Trial, one: Trial) -> bool:
+        """Whether the cause of a refit explains the worst of its lost videos, searched by itself."""
+        if one not in self._explaining:
+            cause, worst = one.beyond(trial), lost_videos(one.fit.fits)[:1]
+            told = causes_of_lost_videos(trial.fit, worst, cause, one.names, self.needed, seed=self.seed, last=True)
+            self._explaining[one] = bool(told)
+        return self._explaining[one]
 
     def _calls_for_a_law(self, trial: Trial) -> bool:
         """Whether what a model leaves beside chance calls for a law louder than a few wrong courses do."""

@@ -219,6 +219,9 @@ class _Searcher:
         """The step with the causes tried that may be the best one."""
         found, pair = self.refits.of(trial), None
         first = None if self.refits.settled(trial, found) else self.refits.provisional(trial, found)
+        if first is not None and self.refits.leaves_unexplained(trial, first):
+            found = self.refits.with_lost(trial)
+            first = None if self.refits.settled(trial, found) else self.refits.provisional(trial, found)
         if first is not None:
             first = self.refits.with_lost_found(trial, first)
             found = self.refits.of(trial)

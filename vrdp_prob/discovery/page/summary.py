@@ -28,6 +28,7 @@ SURE = 0.9
 """Probability from which videos show a cause, and do not merely suggest it."""
 POSSIBLE = 0.05
 """Probability from which a cause that was not named is told of as possible."""
+UNEXPLAINED = "something that no cause of the catalogue explains"
 CARRIED = 0.9
 """Share of a gain from which a single video is said to carry it."""
 
@@ -41,11 +42,12 @@ def verdict_sentence(finding: Finding) -> str:
         alone = finding.named[0] if len(finding.named) == 1 else None
         others = [one for one in possible(finding) if alone is not None and one.probability >= alone.probability]
         found += "".join(f", or, no less likely, that {_clause(cause.sentence)}" for cause in others)
-        rest = ", and something else that no cause of the catalogue explains" if _leaves_a_rest(finding) else ""
-        return f"{sentence(videos)} {verb} {found}{rest}."
+        if _leaves_a_rest(finding):
+            return f"{sentence(videos)} show {UNEXPLAINED}, and {verb} beside it {found}."
+        return f"{sentence(videos)} {verb} {found}."
     if finding.verdict is Verdict.NONE:
         return f"The model explains {videos}."
-    return f"{sentence(videos)} show something that no cause of the catalogue explains."
+    return f"{sentence(videos)} show {UNEXPLAINED}."
 
 
 def summary(finding: Finding) -> list[str]:

@@ -14,6 +14,7 @@ from vrdp_prob.discovery.selection.extensions import Extensions
 from vrdp_prob.discovery.selection.leavings import Leavings, Left
 from vrdp_prob.discovery.selection.trials import Trial
 from vrdp_prob.models.effects.bowl import Bowl
+from vrdp_prob.models.effects.effect import Effect
 from vrdp_prob.models.effects.external_impulse import ExternalImpulse
 from vrdp_prob.models.effects.lens_distortion import LensDistortion
 from vrdp_prob.models.effects.mass_dependent_friction import MassDependentFriction
@@ -214,19 +215,27 @@ def test_a_cause_whose_own_check_fails_is_tried_where_nothing_brings_enough(
     assert (["mass_dependent_friction"] in made) is is_tried
 
 
-@pytest.mark.parametrize("fails", [True, False], ids=["its check fails", "no check fails"])
-def test_beside_a_cause_one_is_tried_whose_own_check_fails_though_no_score_stands_out(
-    *, fails: bool, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize(
+    ("cause", "check", "is_tried"),
+    [
+        (MassDependentFriction(), "friction of the bodies against mass", True),
+        (MassDependentFriction(), "friction of the bodies against material", False),
+        (LensDistortion(), "distortion of positions", False),
+    ],
+    ids=["its check fails", "another one does", "residuals would show it"],
+)
+def test_beside_a_cause_one_is_tried_that_residuals_hardly_show_where_its_own_check_fails(
+    cause: Effect, check: str, *, is_tried: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     trial, other = refit_with("tilt", 0.0), refit_with("tilt", 20.0)
-    trial.causes, other.causes = (SurfaceTilt(),), (SurfaceTilt(), MassDependentFriction())
-    faint = Mock(spec=CauseScore, effect=MassDependentFriction(), size=4.0, p_value=0.5, sites=())
-    check = Check("friction of the bodies against mass", 0.07, 1e-9, fails, "")
+    trial.causes, other.causes = (SurfaceTilt(),), (SurfaceTilt(), cause)
+    faint = Mock(spec=CauseScore, effect=cause, size=4.0, p_value=0.5, sites=())
+    failing = Check(check, 0.07, 1e-9, True, "")
     monkeypatch.setattr(refits, "lost_videos", lambda _fits: [])
-    monkeypatch.setattr(leavings, "run_checks", lambda _fit, *, seed: (check,))
+    monkeypatch.setattr(leavings, "run_checks", lambda _fit, *, seed: (failing,))
     monkeypatch.setattr(Leavings, "of", lambda _self, _trial: Left((faint,), (faint,), np.ones(3)))
     monkeypatch.setattr(Extensions, "made_of", lambda _self, _trial, asked, **_beside: [other] if asked else [])
-    assert refits_with(needed=6.0)._new(trial) == ([other] if fails else [])
+    assert refits_with(needed=6.0)._new(trial) == ([other] if is_tried else [])
 
 
 @pytest.mark.parametrize(

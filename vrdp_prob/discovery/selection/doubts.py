@@ -47,6 +47,8 @@ OWN_CHECKS: Mapping[str, tuple[str, ...]] = {
     MaterialFriction.name: (friction_against("material"),),
 }
 """By the name of a cause: the checks that ask for what it does, and for nothing else."""
+HELD_BY_BODIES = frozenset({SpeedDependentRestitution.name, MassDependentFriction.name, MaterialFriction.name})
+"""Causes of which most lies in numbers that bodies have of their own anyway, so that residuals hardly show them."""
 
 
 @dataclass(frozen=True)

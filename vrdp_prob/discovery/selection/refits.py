@@ -11,7 +11,7 @@ from vrdp_prob.discovery.candidates.scores import CauseScore, happens_once, mend
 from vrdp_prob.discovery.candidates.single_videos import causes_of_lost_videos
 from vrdp_prob.discovery.candidates.surfaces import Placed, placed_surfaces
 from vrdp_prob.discovery.selection.courses import Courses
-from vrdp_prob.discovery.selection.doubts import causes_with_own_check_failing
+from vrdp_prob.discovery.selection.doubts import HELD_BY_BODIES, causes_with_own_check_failing
 from vrdp_prob.discovery.selection.extensions import Extensions, explaining
 from vrdp_prob.discovery.selection.leavings import Leavings
 from vrdp_prob.discovery.selection.shortlist import CLOSE, SHORTLIST_LEVEL, shortlist
@@ -136,12 +136,13 @@ class Refits:
     def _with_traced(self, trial: Trial, found: Sequence[Trial]) -> list[Trial]:
         """Refits, the best first; where none explains enough with causes for whose own traces a check fails.
 
-        What lies in numbers that bodies have of their own anyway is hardly seen in residuals.
+        Beside a cause, and where kicks mend what is left, these are causes that residuals hardly show.
         """
         if any(one.brought(trial) >= self.needed for one in explaining(found)):
             return list(found)
-        tried = {one.causes[-1].name for one in found}
-        traced = causes_with_own_check_failing(self.leavings.checks(trial)) - tried
+        traced = causes_with_own_check_failing(self.leavings.checks(trial)) - {one.causes[-1].name for one in found}
+        if trial.causes or any(one.brought(trial) >= self.needed for one in found):
+            traced &= HELD_BY_BODIES
         scores = [one for one in self.leavings.of(trial).scores if one.effect.name in traced]
         return sorted([*found, *self.extensions.made_of(trial, scores, beside=found)], key=merit, reverse=True)
 

@@ -218,7 +218,8 @@ def unknown() -> Finding:
 
 def with_a_rest() -> Finding:
     """Two causes, and something beside them that no cause explains."""
-    return replace(named(), verdict=Verdict.UNKNOWN, description=unknown().description)
+    halved = tuple(replace(one, probability=one.probability / 2) for one in named().causes)
+    return replace(named(), verdict=Verdict.UNKNOWN, causes=halved, description=unknown().description)
 
 
 def with_many_videos(number: int = 62) -> Finding:

@@ -76,7 +76,7 @@ def test_the_verdict_is_one_sentence_without_intervals():
         "likely, that the air moves at 0.42 m/s towards x = 0.8, y = -0.6."
     )
     assert verdict_sentence(with_a_rest()).startswith(
-        "These 12 videos show something that no cause of the catalogue explains, and show beside it that the table"
+        "These 12 videos show something that no cause of the catalogue explains, and suggest beside it that"
     )
 
 

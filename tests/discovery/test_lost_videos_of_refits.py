@@ -230,6 +230,8 @@ def test_a_cause_leaves_videos_unexplained_where_it_does_not_explain_the_worst_o
     assert found.leaves_unexplained(nothing, jitter) is leaves
     assert found.leaves_unexplained(nothing, jitter) is leaves
     assert searched.call_count == (len(lost) > 1)
+    found._shown[nothing] = list(jitter.beyond(nothing))
+    assert not found.leaves_unexplained(nothing, jitter)
 
 
 @pytest.mark.parametrize(

@@ -185,26 +185,31 @@ def test_beside_a_cause_none_is_tried_where_no_score_stands_out_from_chance(
 
 
 @pytest.mark.parametrize(
-    ("before", "brought", "is_tried"),
-    [((), 1.0, True), ((), 9.0, False), (("tilt",), 1.0, True)],
-    ids=["nothing brings enough", "something does", "there is a cause already"],
+    ("before", "cause", "brought", "is_tried"),
+    [
+        ((), Bowl(), 1.0, True),
+        ((), Bowl(), 9.0, False),
+        ((), ExternalImpulse(), 9.0, True),
+        (("tilt",), Bowl(), 1.0, True),
+    ],
+    ids=["nothing brings enough", "something does", "kicks do", "there is a cause already"],
 )
-def test_a_cause_whose_own_check_fails_is_tried_where_nothing_brings_enough(
-    before: tuple[str, ...], brought: float, *, is_tried: bool, monkeypatch: pytest.MonkeyPatch
+def test_a_cause_whose_own_check_fails_is_tried_where_no_law_brings_enough(
+    before: tuple[str, ...], cause: Effect, brought: float, *, is_tried: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    trial, other = refit_with("nothing", 0.0), refit_with("bowl", 1.0)
-    trial.causes, other.causes = before, (Bowl(),)
+    trial, other = refit_with("nothing", 0.0), refit_with("other", 1.0)
+    trial.causes, other.causes = before, (cause,)
     other.brought.return_value = brought
     clear, faint = (
         Mock(spec=CauseScore, effect=effect, size=size, p_value=p_value, sites=())
-        for effect, size, p_value in ((Bowl(), 50.0, 1e-9), (MassDependentFriction(), 4.0, 0.04))
+        for effect, size, p_value in ((cause, 50.0, 1e-9), (MassDependentFriction(), 4.0, 0.04))
     )
     scores = (clear, faint)
     made: list[list[str]] = []
 
     def made_of(_self: object, _trial: Trial, asked: list[CauseScore], **_beside: object) -> list[Trial]:
         made.append([one.effect.name for one in asked])
-        return [other] if made[-1] == ["bowl"] else []
+        return [other] if made[-1] == [cause.name] else []
 
     failing = Check("friction of the bodies against mass", 0.07, 1e-9, True, "")
     monkeypatch.setattr(leavings, "run_checks", lambda _fit, *, seed: (failing,))

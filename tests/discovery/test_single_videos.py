@@ -84,6 +84,19 @@ def test_what_gains_most_and_explains_no_video_is_not_told_beside_what_explains_
     assert [cause.name for (cause,), _ in found] == told
 
 
+def test_what_explains_more_videos_is_told_before_what_gains_more(monkeypatch: pytest.MonkeyPatch) -> None:
+    def searched(
+        _self: object, video: int, candidates: list[tuple[Effect, ...]]
+    ) -> list[tuple[tuple[Effect, ...], single_videos._Found]]:
+        gained = {SlipToRoll.name: (20.0, True), PairForce.name: (30.0, video == 2)}
+        return [(causes, single_videos._Found(*gained[causes[0].name])) for causes in candidates]
+
+    monkeypatch.setattr(single_videos._Searches, "with_causes", searched)
+    fit = create_autospec(SharedFit, instance=True)
+    found = causes_of_lost_videos(fit, [2, 0, 1], [PairForce(), SlipToRoll()], set(), 6.0, seed=0)
+    assert [(cause.name, gained) for (cause,), gained in found] == [("slip_to_roll", 60.0), ("pair_force", 90.0)]
+
+
 @pytest.mark.parametrize(("explains", "told"), [([], []), ([("pair_force",)], ["pair_force"])], ids=["none", "one"])
 def test_the_last_causes_are_told_only_where_one_explains_a_video(
     explains: list[tuple[str, ...]], told: list[str], monkeypatch: pytest.MonkeyPatch

@@ -23,9 +23,9 @@ VIDEOS, WITH_ALL, SECOND_LOOKS = 4, 2, 4
 """Lost videos that are looked at, those of them that are searched with every cause, and causes, the best first, with
 which the others are."""
 NEARLY, MOST_TOLD = 0.6, 2
-"""Share of the largest gain from which another cause is told of, too, and number of causes that are."""
+"""Share of the gain of the first from which another cause is told of, too, and number of causes that are."""
 FAR_BEHIND = 0.3
-"""Share of the largest gain below which a cause is not tried in a further video."""
+"""Share of the gain of the first, which explains most, below which a cause is not tried in a further video."""
 EXPLAINED = 1.1
 """Residuals in units of the noise up to which a cause explains a video; no further ones are tried then."""
 CONTACT_HOOKS = (
@@ -103,7 +103,7 @@ def causes_of_lost_videos(
         best_of_all = max(gains.values()) if rank < WITH_ALL else best_of_all
         effects = sorted((effect for (effect,), _ in found), key=explaining_first)
         if explaining or rank + 1 >= WITH_ALL:
-            least = FAR_BEHIND * gains[effects[0].name]
+            least = FAR_BEHIND * gains[effects[0].name] if explained else 0.0
             effects = [effect for effect in effects[:SECOND_LOOKS] if gains[effect.name] >= least]
         if last:
             effects = [effect for effect in effects if gains[effect.name] > needed]

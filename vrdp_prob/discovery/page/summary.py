@@ -29,6 +29,7 @@ SURE = 0.9
 POSSIBLE = 0.05
 """Probability from which a cause that was not named is told of as possible."""
 UNEXPLAINED = "something that no cause of the catalogue explains"
+"""What is told first where a finding leaves something."""
 CARRIED = 0.9
 """Share of a gain from which a single video is said to carry it."""
 

@@ -66,7 +66,7 @@ class Refits:
     _made: dict[Trial, list[Trial]] = field(default_factory=dict)
     _searched: set[Trial] = field(default_factory=set)
     _shown: dict[Trial, list[Effect]] = field(default_factory=dict)
-    _explaining: dict[Trial, bool] = field(default_factory=dict)
+    _explain_worst: dict[tuple[Trial, Trial], bool] = field(default_factory=dict)
 
     @cached_property
     def leavings(self) -> Leavings:
@@ -134,7 +134,7 @@ class Refits:
         return found
 
     def _with_traced(self, trial: Trial, found: Sequence[Trial]) -> list[Trial]:
-        """Refits, the best first; where none explains enough with causes for whose own traces a check fails.
+        """Refits, the best first; where none explains enough, with causes, too, for whose own traces a check fails.
 
         Beside a cause, and where kicks mend what is left, these are causes that residuals hardly show.
         """
@@ -159,8 +159,7 @@ class Refits:
         laws = (one for one in possible if not happens_once(one.causes[-1]))
         law = max(laws, key=brings, default=first)
         first = law if law.brought(trial) > NEARLY * first.brought(trial) else first
-        is_shown = any(cause in self._shown.get(trial, []) for cause in first.beyond(trial))
-        least = 0.0 if is_shown else FIRST_SHARE * trial.lacking
+        least = 0.0 if self._is_shown(trial, first) else FIRST_SHARE * trial.lacking
         return None if first.brought(trial) < max(self.needed, least) else first
 
     def _with_best_searched(self, trial: Trial, found: Sequence[Trial]) -> list[Trial]:
@@ -244,18 +243,29 @@ class Refits:
         """Whether a refit leaves more than single videos lost, and its cause does not explain the worst of them.
 
         What scatters positions along the paths, say, takes up some of what wrong courses leave, and explains none.
+        Walls and discs that the tracks show plainly are there, however much they leave.
         """
         fits = one.fit.fits
-        several = lost_videos(fits) and not loses_single_videos(fits)
-        return bool(several) and not trial.choices and not self._explains_worst(trial, one)
+        several = bool(lost_videos(fits)) and not loses_single_videos(fits)
+        if not several or trial.choices or self._is_shown(trial, one):
+            return False
+        return not self._explains_worst(trial, one)
 
     def _explains_worst(self, trial: Trial, one: Trial) -> bool:
-        """Whether the cause of a refit explains the worst of its lost videos, searched by itself."""
-        if one not in self._explaining:
+        """Whether the cause of a refit explains the worst of its lost videos, searched by itself, and gains enough.
+
+        It does not where a single video says too little of it.
+        """
+        key = (trial, one)
+        if key not in self._explain_worst:
             cause, worst = one.beyond(trial), lost_videos(one.fit.fits)[:1]
             told = causes_of_lost_videos(trial.fit, worst, cause, one.names, self.needed, seed=self.seed, last=True)
-            self._explaining[one] = bool(told)
-        return self._explaining[one]
+            self._explain_worst[key] = bool(told)
+        return self._explain_worst[key]
+
+    def _is_shown(self, trial: Trial, one: Trial) -> bool:
+        """Whether a refit has a wall or a disc that the tracks show plainly."""
+        return any(cause in self._shown.get(trial, []) for cause in one.beyond(trial))
 
     def _calls_for_a_law(self, trial: Trial) -> bool:
         """Whether what a model leaves beside chance calls for a law louder than a few wrong courses do."""

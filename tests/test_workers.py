@@ -5,8 +5,13 @@ import signal
 import subprocess
 import sys
 import time
+import warnings
 from collections.abc import Callable
 from pathlib import Path
+
+import pytest
+
+from vrdp_prob.workers import local_workers
 
 PROGRAM = """
 import os, sys, time
@@ -32,6 +37,13 @@ def test_workers_end_when_their_parent_is_killed(tmp_path: Path) -> None:
     parent.send_signal(signal.SIGKILL)
     parent.wait()
     assert _within_patience(lambda: not _is_running(worker))
+
+
+def test_that_a_grown_worker_is_replaced_is_no_news(recwarn: pytest.WarningsRecorder) -> None:
+    with local_workers(1, tasks=1) as workers:
+        warnings.warn("A worker was restarted while some jobs were given to the executor", UserWarning, stacklevel=1)
+        assert workers.submit(abs, -3).result() == 3
+    assert not recwarn
 
 
 def _within_patience(holds: Callable[[], bool]) -> bool:

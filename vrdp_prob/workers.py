@@ -3,6 +3,7 @@
 import os
 import threading
 import time
+import warnings
 from collections.abc import Iterator
 from concurrent.futures import Executor
 from contextlib import contextmanager
@@ -26,7 +27,9 @@ def local_workers(processes: int | None, *, tasks: int) -> Iterator[Executor]:
     )
     finished = False
     try:
-        yield workers
+        with warnings.catch_warnings():  # a worker that has grown is replaced between two tasks, which loses nothing
+            warnings.filterwarnings("ignore", "A worker was restarted", UserWarning)
+            yield workers
         finished = True
     finally:
         workers.shutdown(wait=finished, kill_workers=not finished)

@@ -19,6 +19,11 @@ def extensions_with(needed: float = 0.0) -> Extensions:
     return Extensions(Leavings((), seed=0), needed=needed, advance=lambda _count: None)
 
 
+@pytest.fixture(autouse=True)
+def something_explains_the_videos(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(extensions, "explained", lambda _fits: True)
+
+
 @pytest.mark.parametrize(
     ("stated", "explains", "leaves", "near", "taken"),
     [
@@ -133,6 +138,32 @@ def test_refits_that_may_win_are_followed_to_the_end_and_freed(monkeypatch: pyte
     scores = [Mock(spec=CauseScore, effect=effect, size=10.0) for effect in effects.values()]
     assert extensions_with().made_of(nothing, scores) == [freed, patch]
     assert not patch.freed.called
+
+
+@pytest.mark.parametrize(
+    ("explains", "promised", "is_followed"),
+    [(False, 40.0, True), (True, 40.0, False), (False, 20.0, False)],
+    ids=["nothing explains the videos", "something does", "it promises far less"],
+)
+def test_where_nothing_explains_the_videos_refits_that_broke_off_are_followed_if_they_promise_as_much(
+    explains: bool, promised: float, *, is_followed: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Drag broke off at a third of what a bowl had brought, on the way to more."""
+    monkeypatch.setattr(extensions, "mends_any_course", lambda _cause: False)
+    monkeypatch.setattr(extensions, "explained", lambda _fits: explains)
+    nothing, effects = refit_with("", 0.0), {name: Mock() for name in ("bowl", "drag")}
+    bowl, drag, arrived = (refit_with(name, merit) for name, merit in (("bowl", 2), ("drag", 1), ("drag", 9)))
+    for one, name, gained in ((bowl, "bowl", 88.0), (drag, "drag", 34.0), (arrived, "drag", 89.0)):
+        effects[name].name = name
+        one.causes, one.brought.return_value, one.fit.joint.converged = (effects[name],), gained, one is not drag
+    bowl.continued.return_value = bowl
+    bowl.freed.side_effect = lambda _base, *, seed: bowl
+    drag.continued.return_value = arrived
+    arrived.freed.side_effect = lambda _base, *, seed: arrived
+    nothing.with_cause = lambda score: drag if score.effect is effects["drag"] else bowl
+    sizes = {"bowl": 50.0, "drag": promised}
+    scores = [Mock(spec=CauseScore, effect=effects[name], size=size) for name, size in sizes.items()]
+    assert extensions_with().made_of(nothing, scores)[0] is (arrived if is_followed else bowl)
 
 
 @pytest.mark.parametrize("once", [True, False], ids=["kicks", "a law"])

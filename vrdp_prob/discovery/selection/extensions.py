@@ -52,6 +52,8 @@ class Extensions:
         it back.
         So it is with the cause whose score promises most of all, whatever others have brought, if that is as much as a
         cause needs at all. What mends any course is no measure of other causes.
+        Those that bring a good part of the most are followed to the end; where none explains the videos these are also
+        those that broke off and whose scores promise a good part of the most.
         """
         found = self._all(trial.with_cause, scores)
         promised = {one.effect.name: one.size / 2 for one in scores if not mends_any_course(one.effect)}
@@ -68,7 +70,7 @@ class Extensions:
                 for one in found
                 if (told := promised.get(name := one.causes[-1].name, 0.0)) > max(one.brought(trial), 0.0)
                 and (name == leader or told > max(most, one.brought(trial) / SHORT))
-                and (not one.fit.joint.converged or one.fallen_from(trial))
+                and (_broke_off(one) or one.fallen_from(trial))
             ]
             if not short:
                 break
@@ -83,8 +85,14 @@ class Extensions:
                 promised.pop(hopeful.causes[-1].name)
             if gained > 0:
                 found = [further if one is hopeful else one for one in found]
-        most = brought_most()
-        close = [one for one in found if one.brought(trial) > SHORT * most > 0]
+        most, leading = brought_most(), max(promised.values(), default=0.0)
+        nothing_explains = not any(explained(one.fit.fits) for one in explaining(found))
+        close = [
+            one
+            for one in found
+            if one.brought(trial) > SHORT * most > 0
+            or (nothing_explains and _broke_off(one) and promised.get(one.causes[-1].name, 0.0) > SHORT * leading)
+        ]
         rest = [one for one in found if one not in close]
         followed = in_processes(partial(_followed_to_the_end, trial, self.seed), close)
         return sorted([*followed, *rest], key=merit, reverse=True)
@@ -150,6 +158,11 @@ class Extensions:
 def explaining(trials: Sequence[Trial]) -> list[Trial]:
     """Those whose last cause does not just mend any course."""
     return [one for one in trials if not mends_any_course(one.causes[-1])]
+
+
+def _broke_off(one: Trial) -> bool:
+    """Whether a refit ended before it had arrived."""
+    return not one.fit.joint.converged
 
 
 def _followed_to_the_end(trial: Trial, seed: int, one: Trial) -> Trial:

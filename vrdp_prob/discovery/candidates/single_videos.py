@@ -91,17 +91,14 @@ def causes_of_lost_videos(
     gains: dict[str, float] = {}
     explained: Counter[str] = Counter()
     best_of_all = 0.0
-
-    def explaining_first(effect: Effect) -> tuple[int, float]:
-        return -explained[effect.name], -gains[effect.name]
-
     for rank, video in enumerate(lost[:VIDEOS]):
         found = searches.with_causes(video, [(effect,) for effect in effects])
         gains = {effect.name: one.gain + gains.get(effect.name, 0.0) for (effect,), one in found}
         explaining = [effect.name for (effect,), one in found if one.explains]
         explained.update(explaining)
         best_of_all = max(gains.values()) if rank < WITH_ALL else best_of_all
-        effects = sorted((effect for (effect,), _ in found), key=explaining_first)
+        tried = [effect for (effect,), _ in found]
+        effects = sorted(tried, key=lambda effect: (-explained[effect.name], -gains[effect.name]))
         if explaining or rank + 1 >= WITH_ALL:
             least = FAR_BEHIND * gains[effects[0].name] if explained else 0.0
             effects = [effect for effect in effects[:SECOND_LOOKS] if gains[effect.name] >= least]
@@ -115,10 +112,8 @@ def causes_of_lost_videos(
         pair = _together(searches, lost[:WITH_ALL], in_contacts)
         if pair is not None and pair[1] > best_of_all + needed:
             return [pair]
-    told = [effect for effect in effects if effect.name in gains and (explained[effect.name] or not explained)]
-    ranked: list[tuple[Causes, float]] = [
-        ((effect,), gains[effect.name]) for effect in sorted(told, key=explaining_first)
-    ]
+    told = [effect for effect in effects if explained[effect.name] or not explained]
+    ranked: list[tuple[Causes, float]] = [((effect,), gains[effect.name]) for effect in told]
     return [pair for pair in ranked if pair[1] > max(needed, NEARLY * ranked[0][1])][:MOST_TOLD]
 
 

@@ -218,10 +218,10 @@ class _Searcher:
     def tried(self, trial: Trial) -> Step:
         """The step with the causes tried that may be the best one."""
         found, pair = self.refits.of(trial), None
-        first = None if self.refits.settled(trial, found) else self.refits.provisional(trial, found)
+        first = self._to_go_on_from(trial, found)
         if first is not None and self.refits.leaves_unexplained(trial, first):
             found = self.refits.with_lost(trial)
-            first = None if self.refits.settled(trial, found) else self.refits.provisional(trial, found)
+            first = self._to_go_on_from(trial, found)
         if first is not None:
             first = self.refits.with_lost_found(trial, first)
             found = self.refits.of(trial)
@@ -230,6 +230,10 @@ class _Searcher:
             if pair is None:
                 found = self.refits.with_lost(trial)
         return Step(trial, self.leavings.of(trial), tuple(self._in_order(trial, found)), pair)
+
+    def _to_go_on_from(self, trial: Trial, found: Sequence[Trial]) -> Trial | None:
+        """The refit that a second cause is looked for beside; None where the best settles it or none brings enough."""
+        return None if self.refits.settled(trial, found) else self.refits.provisional(trial, found)
 
     def _pair(self, trial: Trial, first: Trial) -> tuple[Trial, Trial] | None:
         """A cause and a second one beside it, if both together are established.

@@ -17,7 +17,7 @@ from vrdp_prob.discovery.checks.battery import run_checks
 from vrdp_prob.discovery.checks.bodies import friction_against
 from vrdp_prob.discovery.checks.flight import QUESTIONS
 from vrdp_prob.discovery.checks.measurement import GENERAL
-from vrdp_prob.discovery.checks.own_values import OwnValues, Rebounds
+from vrdp_prob.discovery.checks.own_values import BodyFrictions, OwnValues, Rebounds
 from vrdp_prob.discovery.finding import Check
 from vrdp_prob.discovery.residuals.fitted_contacts import FittedContacts
 from vrdp_prob.discovery.residuals.free_flight import FRICTION, FreeFlight
@@ -157,6 +157,15 @@ def test_friction_that_goes_with_masses_that_nobody_stated_is_seen() -> None:
     assert check.significant
     assert check.p_value < 1e-6
     assert abs(abs(check.statistic) - cause.strength) < 0.1
+
+
+@pytest.mark.parametrize(("groups", "ratio"), [([], 6.0), ([[1, 1, 0, 0], [0, 0, 1, 0]], 2.0)])
+def test_masses_are_compared_where_their_ratio_is_known(groups: list[list[int]], ratio: float) -> None:
+    bodies = tuple(Body(str(k), Shape.CYLINDER, radius=0.1) for k in range(4))
+    weighed_together = np.array(groups, dtype=float).reshape(len(groups), 4).T
+    log_mass = np.log([1.0, 2.0, 6.0, np.nan])
+    own = BodyFrictions(bodies, np.zeros(4), np.eye(4), np.ones(4), log_mass, weighed_together)
+    assert own.largest_mass_ratio == pytest.approx(ratio)
 
 
 @pytest.mark.slow

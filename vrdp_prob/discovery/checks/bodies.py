@@ -82,9 +82,8 @@ def _friction_checks(fit: SharedFit, contacts: Sequence[FittedContacts]) -> Iter
         _independent_columns(np.concatenate([own.weighed_together[rows], known[rows]], axis=1)),
         own.log_mass[rows, None],
     )
-    power = 0.0 if found is None else float(found.slope[0])
     visible = "" if found is None else f"a power of {number(NORMAL_95 * float(found.sd[0]))} of the mass"
-    yield from _friction_check("mass", found, f"it goes with the mass to the power {number(power)}", visible)
+    yield from _friction_check("mass", found, _mass_words(found, own.largest_mass_ratio), visible)
 
 
 def _friction_check(name: str, found: Dependence | None, words: str, visible: str = "") -> Iterator[Check]:
@@ -116,6 +115,16 @@ def _material_words(found: Dependence | None, materials: Sequence[str]) -> str:
         f"that of {name} is {number(100 * abs(np.expm1(slope)))} % {opposite(slope, 'smaller', 'larger')} than that of "
         f"{materials[0]}"
         for name, slope in zip(materials[1:], slopes, strict=False)
+    )
+
+
+def _mass_words(found: Dependence | None, ratio: float) -> str:
+    """A power alone says little where masses hardly differ."""
+    power = 0.0 if found is None else float(found.slope[0])
+    change = ratio**power - 1
+    return (
+        f"it {opposite(change, 'falls', 'grows')} by {number(100 * abs(change))} % where the mass grows by "
+        f"{number(100 * (ratio - 1))} %, as much as it differs among them (the mass to the power {number(power)})"
     )
 
 

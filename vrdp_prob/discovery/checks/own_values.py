@@ -221,3 +221,11 @@ class BodyFrictions:
             groups = masses.membership(owners)
         covariance = own.covariance[np.ix_(keep, keep)]
         return cls(bodies, own.values[keep], covariance, own.sd[keep], log_mass, groups)
+
+    @property
+    def largest_mass_ratio(self) -> float:
+        """The heaviest body's mass in those of the lightest, where their ratio is known; 1 where none is."""
+        known = np.isfinite(self.log_mass)
+        groups = self.weighed_together.T > 0 if self.weighed_together.shape[1] else np.ones((1, len(known)), dtype=bool)
+        spreads = [np.ptp(self.log_mass[known & group]) for group in groups if (known & group).any()]
+        return float(np.exp(max(spreads, default=0.0)))

@@ -106,7 +106,7 @@ def test_the_statistic_is_that_of_the_dense_gaussian(bodies: int) -> None:
     _, fit = fitted(None, seed=1, setting=Setting(videos=3, bodies=bodies, frames=50))
     generator = np.random.default_rng(1)
     model = with_noise(ResidualModel.of(fit), generator)
-    fastest = max(float(np.sqrt((video.late_frames**2).sum(axis=0).max())) for video in model.videos)
+    fastest = max(float(np.sqrt((video.late_frames() ** 2).sum(axis=0).max())) for video in model.videos)
     true = 6.0 / fastest
     jittering = [
         replace(
@@ -114,7 +114,7 @@ def test_the_statistic_is_that_of_the_dense_gaussian(bodies: int) -> None:
             linear=replace(
                 video.linear,
                 residuals=video.linear.residuals
-                + video.linear.padded(video.late_frames @ (true * generator.standard_normal((50, 1))))[:, 0],
+                + video.linear.padded(video.late_frames() @ (true * generator.standard_normal((50, 1))))[:, 0],
             ),
         )
         for video in model.videos
@@ -135,7 +135,7 @@ def dense(model: ResidualModel, start: float) -> tuple[float, float]:
     for video, left in zip(model.videos, model.left, strict=True):
         data = video.linear.data
         basis = null_space(video.linear.own[:data].T, rcond=1e-6)
-        parts.append((basis.T @ left[:data], basis.T @ video.late_frames))
+        parts.append((basis.T @ left[:data], basis.T @ video.late_frames()))
 
     def cost(logs: np.ndarray) -> float:
         variance, ratio = np.exp(logs[0]), np.exp(2 * logs[1])

@@ -83,7 +83,7 @@ def test_accelerations_at_random_are_found(size: float, monkeypatch: pytest.Monk
     # Two steps of half a second each, of which the first moves a body by 3/8 of a m per m/s^2 and the second by 1/8.
     assert 0.6 < np.median(strayed) / (size * np.hypot(3 / 8, 1 / 8)) < 1.6
     assert found.gains.min() > 6
-    assert found.model.dispersion < 1.2 < found.plain.dispersion
+    assert found.independent().dispersion < 1.2 < found.plain.dispersion
     assert found.shared_widening.max() > 1.5
 
 

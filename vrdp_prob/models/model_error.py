@@ -204,15 +204,17 @@ def factors(
     strands: Sequence[Strand], size: float, duration: float, variance: Float[np.ndarray, "all_numbers"]
 ) -> Factors:
     """The places of each strand and what makes its numbers independent; see `Strand.covariance`."""
-    return tuple(_factor(one, one.covariance(size, duration, variance)) for one in strands)
+    found: Factors = ()
+    for alike in by_law(strands, variance):
+        inverse = _inverse_root(alike[0].covariance(size, duration, variance))
+        found += tuple((torch.from_numpy(strand.places), inverse) for strand in alike)
+    return found
 
 
-def _factor(strand: Strand, covariance: Float[np.ndarray, "number number"]) -> tuple[Tensor, Tensor]:
-    root = np.linalg.cholesky(covariance)
-    inverse = torch.linalg.solve_triangular(
-        torch.from_numpy(root), torch.eye(len(root), dtype=torch.float64), upper=False
-    )
-    return torch.from_numpy(strand.places), inverse
+def _inverse_root(covariance: Float[np.ndarray, "number number"]) -> Float[Tensor, "number number"]:
+    """Inverse of the Cholesky factor."""
+    root = torch.from_numpy(np.linalg.cholesky(covariance))
+    return torch.linalg.solve_triangular(root, torch.eye(len(root), dtype=torch.float64), upper=False)
 
 
 def _whitened(residuals: Float[Tensor, "point number"], factors: Factors) -> Float[Tensor, "point number"]:

@@ -52,7 +52,7 @@ class LateFrames:
         lasting
             Whether all later frames are as late.
         """
-        rows = model.videos[index].late_frames
+        rows = model.videos[index].late_frames()
         if lasting:
             rows = rows @ np.tril(np.ones((rows.shape[1], rows.shape[1])))
         scores, blocks = model.linear.scores_in(index, rows[:, :, None])

@@ -89,7 +89,7 @@ def _independent(model: ResidualModel, index: int) -> tuple[Float[np.ndarray, "p
 
     What the fit absorbs, of all frames together, ties them: their slopes are not independent one by one.
     """
-    rows, linear = model.videos[index].late_frames, model.linear.videos[index]
+    rows, linear = model.videos[index].late_frames(), model.linear.videos[index]
     reduced = linear.without_own(linear.padded(rows))
     values, vectors = np.linalg.eigh(reduced.T @ reduced)
     told = values > SEEN * float((rows**2).sum(axis=0).max(initial=0.0))

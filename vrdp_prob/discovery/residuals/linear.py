@@ -76,6 +76,11 @@ class LinearVideo:
         return -float(np.log(_told(values) * self._scale).sum())
 
     @property
+    def log_stretch(self) -> float:
+        """Logarithm of the factor by which the residuals were stretched when they were made independent."""
+        return 0.0 if self.whitening is None else float(self.whitening.position_log_volume.sum())
+
+    @property
     def own_sd(self) -> Float[np.ndarray, "own"]:
         """Standard deviations of the own unknowns where the shared ones are known."""
         _, values, turn = self._decomposed

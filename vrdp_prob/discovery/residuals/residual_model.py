@@ -197,9 +197,8 @@ class VideoResiduals:
         result[self.positions :] *= self.noise.slope(1)
         return result
 
-    @cached_property
     def late_frames(self) -> Float[np.ndarray, "data frame"]:
-        """What 1 s does to the data's residuals by which each single frame is late."""
+        """What 1 s does to the data's residuals by which each single frame is late; large, and not kept."""
         motion = self.motion
         rates = np.concatenate([motion.velocity, motion.spin[..., None]], axis=-1)
         moves = np.where(motion.moving[..., None], rates, 0.0)

@@ -74,14 +74,18 @@ class Unexplained:
         How each video strays along its axes; of size 0 where noise explains what is left.
     gains
         How much (nats) more probable each video is with them, given the others.
-    plain, model
-        Residuals of the fit without them, and with them made independent.
+    plain
+        Residuals of the fit without them.
+    shared_widening, own_widening
+        Factors by which the shared unknowns, and each video's own ones, are less well known than noise alone would
+        leave them.
     """
 
     straying: tuple[tuple[Straying, ...], ...]
     gains: Float[np.ndarray, "video"]
     plain: ResidualModel
-    model: ResidualModel
+    shared_widening: Float[np.ndarray, "shared"]
+    own_widening: tuple[Float[np.ndarray, "_"], ...]
 
     @property
     def accelerated(self) -> tuple[Straying, ...]:
@@ -89,14 +93,13 @@ class Unexplained:
         largest = (max(video, key=lambda one: one.size) for video in self.straying)
         return tuple(one for one in largest if one.size)
 
-    @cached_property
-    def shared_widening(self) -> Float[np.ndarray, "shared"]:
-        """Factors by which the shared unknowns are less well known than noise alone would leave them."""
-        return _ratio(self.model.linear.shared_sd, self.plain.linear.shared_sd)
+    def independent(self) -> ResidualModel:
+        """Residuals of the fit with them made independent.
 
-    def own_widening(self, index: int) -> Float[np.ndarray, "own"]:
-        """The same of a video's own unknowns."""
-        return _ratio(self.model.linear.videos[index].own_sd, self.plain.linear.videos[index].own_sd)
+        Not kept: what makes those of n frames independent has n^2 numbers for each body and axis, and a search asks
+        each of a hundred models for it once.
+        """
+        return _independent(self.plain, self.straying)
 
 
 def unexplained(fit: SharedFit) -> Unexplained:
@@ -107,14 +110,44 @@ def unexplained(fit: SharedFit) -> Unexplained:
         for video, part in zip(plain.videos, fit.fits, strict=True)
     ]
     straying = tuple(in_processes(_Search.found, searches))
-    whitenings = [search.whitening(one) for search, one in zip(searches, straying, strict=True)]
-    videos = tuple(
-        replace(video, linear=video.linear.straying(one)) for video, one in zip(plain.videos, whitenings, strict=True)
+    model = _independent(plain, straying)
+    gains = _log_densities(model.linear) - _log_densities(plain.linear)
+    shared = _ratio(model.linear.shared_sd, plain.linear.shared_sd)
+    own = tuple(
+        _ratio(one.own_sd, two.own_sd) for one, two in zip(model.linear.videos, plain.linear.videos, strict=True)
     )
-    model = ResidualModel(replace(plain.linear, videos=tuple(one.linear for one in videos)), videos)
-    gains = _log_densities(model.linear, [_stretch(one) for one in whitenings])
-    gains -= _log_densities(plain.linear, [0.0] * len(searches))
-    return Unexplained(straying, gains, plain, model)
+    return Unexplained(straying, gains, plain, shared, own)
+
+
+def _independent(plain: ResidualModel, straying: Sequence[Sequence[Straying]]) -> ResidualModel:
+    """Residuals made independent where they stray."""
+    videos = tuple(
+        replace(video, linear=video.linear.straying(_whitening(video, one)))
+        for video, one in zip(plain.videos, straying, strict=True)
+    )
+    return ResidualModel(replace(plain.linear, videos=tuple(one.linear for one in videos)), videos)
+
+
+def _whitening(video: VideoResiduals, straying: Sequence[Straying]) -> Whitening:
+    """What makes the residuals of a video independent; angles do not stray."""
+    positions: Factors = ()
+    for some, one in zip(_strands(video), straying, strict=True):
+        positions += factors(some, one.size * _unit(video), one.duration, np.full(video.positions, one.noise))
+    angles = np.ones(video.linear.data - video.positions)
+    return Whitening(positions, factors(video.likelihood.strands.angles, 0.0, 1.0, angles))
+
+
+def _strands(video: VideoResiduals) -> list[list[Strand]]:
+    """Strands of positions along each axis, or of both together where the noise mixes them."""
+    by_axes: dict[tuple[int, ...], list[Strand]] = {}
+    for strand in video.likelihood.strands.positions:
+        by_axes.setdefault(tuple(sorted({int(place) % 2 for place in strand.places})), []).append(strand)
+    return [by_axes[axes] for axes in sorted(by_axes)]
+
+
+def _unit(video: VideoResiduals) -> float:
+    """A metre in units of the noise."""
+    return video.noise.slope(2) / video.noise_sd
 
 
 @dataclass(frozen=True)
@@ -195,18 +228,13 @@ class _Search:
             variance = np.full(self.video.positions, one.noise)
             found, stretch = [], 0.0
             for alike in self._alike[axis]:
-                root = np.linalg.cholesky(alike[0].covariance(one.size * self._unit, one.duration, variance))
+                root = np.linalg.cholesky(alike[0].covariance(one.size * _unit(self.video), one.duration, variance))
                 side_by_side = np.concatenate([self._rows[strand.places] for strand in alike], axis=1)
                 independent = solve_triangular(root, side_by_side, lower=True, check_finite=False)
                 found += np.split(independent, len(alike), axis=1)
                 stretch -= len(alike) * float(np.log(np.diag(root)).sum())
             known = self._last[axis] = one, np.concatenate(found), stretch
         return known[1:]
-
-    @property
-    def _unit(self) -> float:
-        """A metre in units of the noise."""
-        return self.video.noise.slope(2) / self.video.noise_sd
 
     @cached_property
     def _rows(self) -> Float[np.ndarray, "residual column"]:
@@ -218,42 +246,17 @@ class _Search:
     def _alike(self) -> list[list[list[Strand]]]:
         """Strands of each axis, those together that stray alike."""
         variance = np.ones(self.video.positions)
-        return [by_law(some, variance) for some in self._strands]
-
-    @cached_property
-    def _strands(self) -> list[list[Strand]]:
-        """Strands of each axis."""
-        positions = self.video.likelihood.strands.positions
-        return [[strand for strand in positions if _axes(strand) == axes] for axes in self._axes]
+        return [by_law(some, variance) for some in _strands(self.video)]
 
     @cached_property
     def _alone(self) -> LinearVideo:
         return self.video.linear.alone(self.prior)
 
-    def whitening(self, straying: tuple[Straying, ...]) -> Whitening:
-        """What makes the residuals independent."""
-        positions: Factors = ()
-        for some, one in zip(self._strands, straying, strict=True):
-            positions += factors(some, one.size * self._unit, one.duration, np.full(self.video.positions, one.noise))
-        return Whitening(positions, self._angles)
-
-    @cached_property
-    def _angles(self) -> Factors:
-        """Angles do not stray."""
-        video = self.video
-        return factors(video.likelihood.strands.angles, 0.0, 1.0, np.ones(video.linear.data - video.positions))
-
-    @cached_property
-    def _axes(self) -> list[tuple[int, ...]]:
-        """The axes, or both together where the noise mixes them."""
-        return sorted({_axes(strand) for strand in self.video.likelihood.strands.positions})
-
     def _variances(self, residuals: Float[np.ndarray, "residual"]) -> list[float]:
         """Mean square of the residuals, axis by axis."""
-        strands = self.video.likelihood.strands.positions
         return [
-            max(LEAST_NOISE, float(np.mean(residuals[np.concatenate(places)] ** 2)))
-            for places in ([one.places for one in strands if _axes(one) == axes] for axes in self._axes)
+            max(LEAST_NOISE, float(np.mean(residuals[np.concatenate([one.places for one in some])] ** 2)))
+            for some in _strands(self.video)
         ]
 
     @cached_property
@@ -262,15 +265,13 @@ class _Search:
 
         Bodies shake, and noise may be alike in neighbouring frames.
         """
-        several: list[list[float]] = [[] for _ in self._axes]
-        for strand in self.video.likelihood.strands.positions:
-            values = self.video.linear.residuals[strand.places].reshape(len(strand.times), -1)
-            several[self._axes.index(_axes(strand))].extend(_about_parabolas(values, strand.times))
-        return [max(LEAST_NOISE, float(np.median(some))) if some else 1.0 for some in several]
-
-
-def _axes(strand: Strand) -> tuple[int, ...]:
-    return tuple(sorted({int(place) % 2 for place in strand.places}))
+        residuals, found = self.video.linear.residuals, []
+        for some in _strands(self.video):
+            several: list[float] = []
+            for strand in some:
+                several += _about_parabolas(residuals[strand.places].reshape(len(strand.times), -1), strand.times)
+            found.append(max(LEAST_NOISE, float(np.median(several))) if several else 1.0)
+        return found
 
 
 def _about_parabolas(values: Float[np.ndarray, "seen axis"], times: Float[np.ndarray, "seen"]) -> list[float]:
@@ -288,31 +289,13 @@ def _about_parabolas(values: Float[np.ndarray, "seen axis"], times: Float[np.nda
     return found
 
 
-def _stretch(whitening: Whitening) -> float:
-    """Logarithm of the factor by which the residuals of a video are stretched when they are made independent."""
-    return float(whitening.position_log_volume.sum())
-
-
-def _log_densities(linear: LinearFit, stretched: Sequence[float]) -> Float[np.ndarray, "video"]:
-    """Log density (nats, up to constants of the tracks) of each video given the others.
-
-    Parameters
-    ----------
-    linear
-        Residuals of all videos.
-    stretched
-        Logarithm of the factor by which those of each video were stretched.
-    """
+def _log_densities(linear: LinearFit) -> Float[np.ndarray, "video"]:
+    """Log density (nats, up to constants of the tracks) of each video given the others."""
     found = []
-    for video, left, slope, log_factor, others in zip(
-        linear.videos,
-        linear.left,
-        linear.slopes,
-        stretched,
-        all_but_each(linear.prior, linear.curvatures),
-        strict=True,
+    for video, left, slope, others in zip(
+        linear.videos, linear.left, linear.slopes, all_but_each(linear.prior, linear.curvatures), strict=True
     ):
-        own = video.log_volume + log_factor - float(left @ left) / 2
+        own = video.log_volume + video.log_stretch - float(left @ left) / 2
         found.append(left_out(own, slope, video.reduced_shared, others, np.zeros(len(slope))).log_density)
     return np.array(found)
 

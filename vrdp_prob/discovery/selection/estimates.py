@@ -61,7 +61,7 @@ def estimates(
         coordinates, point = video.likelihood.coordinates, joint.point(index)
         sd = np.sqrt(factors[index] * np.diag(np.linalg.inv(joint.precision(index))))
         if unexplained is not None:
-            sd[list(unexplained.plain.videos[index].own_places)] *= unexplained.own_widening(index)
+            sd[list(unexplained.plain.videos[index].own_places)] *= unexplained.own_widening[index]
         for place in video.local_places:
             entry = coordinates.entries[place]
             if entry.field in units:

@@ -56,9 +56,10 @@ class Leavings:
             further = self.further(trial)
             found = trial.unexplained
             scores = beside = score_causes(trial.fit, found.plain, further, seed=self.seed)
+            independent = found.independent()
             if found.accelerated:
-                beside = score_causes(trial.fit, found.model, further, seed=self.seed)
-            self._left[trial] = Left(tuple(scores), tuple(beside), overdispersion(found.model, seed=self.seed))
+                beside = score_causes(trial.fit, independent, further, seed=self.seed)
+            self._left[trial] = Left(tuple(scores), tuple(beside), overdispersion(independent, seed=self.seed))
         return self._left[trial]
 
     def further(self, trial: Trial) -> list[Effect]:

@@ -198,6 +198,16 @@ def lost_frames(videos: Videos, strength: float, generator: np.random.Generator)
     )
 
 
+def frames_dropped_often(videos: Videos, strength: float, generator: np.random.Generator) -> Videos:
+    """Strength: how many frames, to the next whole number, are missing of every video; in its first two thirds."""
+    found = []
+    for video in videos:
+        after = generator.permutation(np.arange(video.frames // 12, 2 * video.frames // 3))[: round(strength)]
+        missing = (np.arange(video.frames)[:, None] > after).sum(axis=1)
+        found.append(replace(video, late=missing / video.frame_rate))
+    return tuple(found)
+
+
 def irregular_frames(videos: Videos, strength: float, generator: np.random.Generator) -> Videos:
     """Strength: standard deviation in s of the true times about the stamps; frames keep their order."""
     late = []
@@ -245,6 +255,7 @@ CATALOGUE: dict[str, Cause] = {
 """The twenty causes by name."""
 
 VARIANTS: dict[str, Cause] = {
+    "frames_dropped_often": Cause("clock_error", frames_dropped_often, "1", 8.0, least=2.0),
     "irregular_frames": Cause("clock_error", irregular_frames, "s", 0.018),
     "obstacle_met_often": Cause(
         "hidden_obstacle", obstacle_met_often, "m", places.LARGEST_DISC, least=0.2, placed=True

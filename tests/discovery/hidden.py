@@ -85,6 +85,8 @@ def true_values(truth: Truth, found: Mapping[str, float]) -> dict[str, float]:
             values |= _OF_THE_TABLE[cause.way](truth.videos[0])
         elif cause.way == "clock_error":
             values |= {f"lost_time[{name}]": cause.strength for name in _named(truth)}
+        elif cause.way == "frames_dropped_often":
+            values["dropped_frame_time"] = 1 / truth.videos[0].frame_rate
         elif cause.way == "irregular_frames":
             values["frame_jitter"] = cause.strength
         elif cause.way == "external_impulse":

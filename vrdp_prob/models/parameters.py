@@ -139,6 +139,8 @@ class Parameter:
         Whether motion depends on it only where there is something fixed to touch.
     goes_with_masses
         Whether motion depends on its ratio to the masses alone, so that it is as unknown as their scale.
+    inferred
+        Whether it is unknown; else it has its default wherever nothing shows another value.
     """
 
     name: str
@@ -151,6 +153,7 @@ class Parameter:
     shapes: frozenset[Shape] = frozenset(Shape)
     needs_walls: bool = False
     goes_with_masses: bool = False
+    inferred: bool = True
 
     def __post_init__(self) -> None:
         low, high = self.transform.support

@@ -204,7 +204,7 @@ def _physics(tracks: Tracks, model: PhysicsModel, structure: Structure) -> Itera
     spin_matters = turning or model.path_depends_on_spin or bool(Observations.of(tracks).angle_bodies)
     walls = bool(tracks.walls) or any(effect.overrides("obstacles") for effect in model.effects)
     for parameter in model.parameters:
-        if parameter.needs_walls and not walls:
+        if not parameter.inferred or (parameter.needs_walls and not walls):
             continue
         concerned = [index for index, body in enumerate(tracks.bodies) if body.shape in parameter.shapes]
         if parameter.scope.per_video and concerned and (spin_matters or parameter.name != ANGULAR_DRAG.name):

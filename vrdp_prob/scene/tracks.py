@@ -207,6 +207,10 @@ class Tracks:
             f"{self.video}: there is no object '{body}'; the objects are {', '.join(b.id for b in self.bodies)}."
         )
 
+    def at_times(self, times: Float[np.ndarray, "time"]) -> "Tracks":
+        """The same tracks with other times (s) of the frames."""
+        return replace(self, data=self.data.assign_coords(time=("time", times, self.data["time"].attrs)))
+
     def until(self, time: float) -> "Tracks":
         """The same tracks up to and including a time (s); objects not seen twice by then are left out.
 

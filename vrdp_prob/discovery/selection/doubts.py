@@ -20,6 +20,7 @@ from vrdp_prob.discovery.words import title
 from vrdp_prob.models.effects.clock_error import ClockError
 from vrdp_prob.models.effects.contact_friction import ContactFriction
 from vrdp_prob.models.effects.contact_radius_error import ContactRadiusError
+from vrdp_prob.models.effects.dropped_frames import DroppedFrames
 from vrdp_prob.models.effects.effect import Effect
 from vrdp_prob.models.effects.external_impulse import ExternalImpulse
 from vrdp_prob.models.effects.irregular_frames import IrregularFrames
@@ -41,6 +42,7 @@ OWN_CHECKS: Mapping[str, tuple[str, ...]] = {
     ContactRadiusError.name: (DISTANCE, *DURATION.values()),
     ExternalImpulse.name: (KICK,),
     ClockError.name: (LOST,),
+    DroppedFrames.name: (LOST,),
     IrregularFrames.name: (SINGLE,),
     LensDistortion.name: (DISTORTION,),
     MassDependentFriction.name: (friction_against("mass"),),

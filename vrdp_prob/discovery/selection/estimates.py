@@ -234,7 +234,10 @@ def upper_bounds(
             UpperBound(effect.cause_name(), name, one.size, "m", way=effect.way(), measure=one.words)
             for name, one in effect.unmet(videos).items()
         ]
-    names = dict.fromkeys([*effect.vanishes_at, *effect.vanishes_like]) or [effect.parameters[0].name]
+    names = dict.fromkeys([*effect.vanishes_at, *effect.vanishes_like])
+    if not names and effect.stepwise:
+        return []  # tracks show it plainly, or not at all; its cause's other ways have bounds
+    names = names or {effect.parameters[0].name: None}
     units = {parameter.name: parameter.unit for parameter in effect.parameters}
     largest = {name: (score.largest if score else {}).get(name, Largest(None, 1, 0)) for name in names}
     return [

@@ -1,19 +1,25 @@
 """Fits of a model with further causes: from their scores, from the beginning, or in the place of kicks."""
 
+import math
 from collections.abc import Callable, Collection, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
+import numpy as np
+
+from vrdp_prob.discovery.candidates.dropped_frames import Dropped
 from vrdp_prob.discovery.candidates.proposals import hidden_things
 from vrdp_prob.discovery.candidates.scores import CauseScore, mends_any_course
 from vrdp_prob.discovery.candidates.surfaces import Placed
 from vrdp_prob.discovery.selection.leavings import Leavings
 from vrdp_prob.discovery.selection.met_surfaces import fit_with_surfaces
+from vrdp_prob.discovery.selection.restamped import fit_with_dropped_frames
 from vrdp_prob.discovery.selection.trials import Trial, merit
 from vrdp_prob.inference.runs.parallel import in_processes
 from vrdp_prob.inference.several_videos.ascent import ImpossibleStartError
 from vrdp_prob.inference.several_videos.fitting import SharedFit, fit_together
 from vrdp_prob.inference.several_videos.second_look import explained
+from vrdp_prob.models.effects.dropped_frames import DroppedFrames
 from vrdp_prob.models.effects.effect import Effect
 from vrdp_prob.progress import Advance
 
@@ -126,6 +132,25 @@ class Extensions:
             return found
         near = self._began_anew(trial, effects, partial(fit_with_surfaces, trial, placed, [], seed=self.seed))
         return max((one for one in (found, near) if one is not None), key=merit, default=None)
+
+    def with_dropped_frames(self, trial: Trial, dropped: Sequence[Dropped]) -> Trial | None:
+        """The fit from the beginning with the frames that tracks show to be missing, and what else it shows of them.
+
+        None where videos have no world in common.
+        """
+        known = list(dropped)
+
+        def fitted() -> SharedFit:
+            fit, known[:] = fit_with_dropped_frames(trial, dropped, seed=self.seed)
+            return fit
+
+        found = self._began_anew(trial, [effect := DroppedFrames()], fitted)
+        if found is None:
+            return None
+        places = [
+            len(one.after) * math.log(len(video.times) - 1) for one, video in zip(known, trial.fit.tracks, strict=True)
+        ]
+        return replace(found, choices={**found.choices, effect.name: np.array(places)})
 
     def hidden_instead(
         self, kicked: Trial, trial: Trial, p_value: float = 0.0, *, known: Collection[str] = ()

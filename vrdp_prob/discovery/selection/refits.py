@@ -7,6 +7,7 @@ from functools import cached_property, partial
 import numpy as np
 from jaxtyping import Float
 
+from vrdp_prob.discovery.candidates.dropped_frames import Dropped, dropped_frames
 from vrdp_prob.discovery.candidates.scores import CauseScore, happens_once, mends_any_course
 from vrdp_prob.discovery.candidates.single_videos import causes_of_lost_videos
 from vrdp_prob.discovery.candidates.surfaces import Placed, placed_surfaces
@@ -24,6 +25,7 @@ from vrdp_prob.inference.several_videos.second_look import (
     outweigh,
     trusted,
 )
+from vrdp_prob.models.effects.dropped_frames import DroppedFrames
 from vrdp_prob.models.effects.effect import Effect
 from vrdp_prob.models.effects.external_impulse import ExternalImpulse
 from vrdp_prob.progress import Advance
@@ -86,9 +88,13 @@ class Refits:
     def of(self, trial: Trial) -> list[Trial]:
         """Refits of a model, the best first."""
         if trial not in self._made:
+            dropped = self._dropped(trial)
+            taken = self.extensions.with_dropped_frames(trial, dropped) if dropped else None
+            if taken is not None and self.settled(trial, [taken]):
+                return self._keep(trial, [taken])
             placed = self._placed(trial)
             met = self.extensions.with_surfaces(trial, placed) if placed else None
-            found = [] if met is None else [met]
+            found = [one for one in (taken, met) if one is not None]
             plain = sum(one.seen.turns for one in placed) >= PLAIN_TURNS
             self._shown[trial] = [one.effect for one in placed] if plain else []
             alone = plain and met is not None and not self.doubted(met, trial, self.leavings.of(met).overdispersion)
@@ -318,6 +324,12 @@ class Refits:
         if trial.causes or any(effect.overrides("obstacles") for effect in trial.fit.model.effects):
             return []
         return placed_surfaces([part.clues.tracks for part in trial.fit.fits], self.catalogue)
+
+    def _dropped(self, trial: Trial) -> list[Dropped]:
+        """Frames that tracks show to be missing again and again, where nothing in the model shifts the clock."""
+        looked_for = any(isinstance(effect, DroppedFrames) for effect in self.catalogue)
+        shifted = any(effect.overrides("measured_times") for effect in trial.fit.model.effects)
+        return dropped_frames(trial.fit.tracks) if looked_for and not shifted else []
 
     def _hidden(self, trial: Trial, found: Sequence[Trial], kicks: CauseScore) -> list[Trial]:
         """Fits with something unseen in the place of kicks."""

@@ -1,0 +1,93 @@
+"""Fits from the beginning at the times at which frames were taken, where tracks show that frames are missing."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from vrdp_prob.discovery.candidates.dropped_frames import SIGNIFICANT, Dropped
+from vrdp_prob.discovery.checks.clock import LateFrames
+from vrdp_prob.discovery.residuals.residual_model import ResidualModel
+from vrdp_prob.discovery.selection.trials import FIRST, Trial
+from vrdp_prob.inference.several_videos.fitting import SharedFit, fit_together
+from vrdp_prob.models.effects.dropped_frames import DROPPED_AFTER, FRAME_TIME, MOST_DROPPED, DroppedFrames
+from vrdp_prob.models.unknowns import Held
+
+ROUNDS = 6
+"""How often a fit is asked for a further dropped frame of each video."""
+LEAST = 0.2
+"""Share of the time between two stamps by which a video must be late for a further frame to be tried: what other
+unknowns take up of it is much, as long as a frame is missing."""
+
+
+def fit_with_dropped_frames(trial: Trial, dropped: Sequence[Dropped], *, seed: int) -> tuple[SharedFit, list[Dropped]]:
+    """Fit a model with the frames that tracks show to be missing, and those that it shows itself by then.
+
+    Parameters
+    ----------
+    trial
+        The model without them.
+    dropped
+        The frames that each video lacks.
+    seed
+        Of the searches.
+
+    Returns
+    -------
+    The fit, and the frames that each video lacks in it.
+
+    Raises
+    ------
+    ImpossibleStartError
+        If videos have no world in common.
+    """
+    tracks = trial.fit.tracks
+    first = trial.with_stated_population(trial.fit.model)
+    told = [one.restamped(video) for one, video in zip(dropped, tracks, strict=True)]
+    fit = fit_together(told, model=first, shared=trial.fit.shared, seed=seed, model_error=False)
+    start = {FRAME_TIME.name: float(np.median([one.frame_time for one in dropped]))}
+    known = list(dropped)
+    found = fit.of_tracks(tracks).under(
+        first.with_effect(DroppedFrames(), tracks), start=start, held=_held(fit, known), effort=FIRST, model_error=False
+    )
+    for _ in range(ROUNDS):
+        further = _further(found, known)
+        places = [
+            (len(more.after) - len(less.after)) * math.log(len(video.times))
+            for more, less, video in zip(further, known, tracks, strict=True)
+        ]
+        if not any(places):
+            break
+        more = found.under(found.model, held=_held(found, further), effort=FIRST, model_error=False)
+        if more.joint.log_density < found.joint.log_density + sum(places):
+            break
+        found, known = more, further
+    return found, known
+
+
+def _held(fit: SharedFit, dropped: Sequence[Dropped]) -> list[Held]:
+    """What is known of each video, with the frames that it lacks."""
+    return [
+        {**structure.held, **{(one.name, None): time for one, time in zip(DROPPED_AFTER, mine.after, strict=False)}}
+        for structure, mine in zip(fit.structures, dropped, strict=True)
+    ]
+
+
+def _further(fit: SharedFit, dropped: Sequence[Dropped]) -> list[Dropped]:
+    """The same with the frames that each video lacks where its residuals show most plainly that all later are late."""
+    model = ResidualModel.of(fit)
+    return [_with_plainest(model, index, known) for index, known in enumerate(dropped)]
+
+
+def _with_plainest(model: ResidualModel, index: int, known: Dropped) -> Dropped:
+    video = model.videos[index]
+    late = LateFrames.of(model, index, np.zeros((len(video.linear.residuals), 1)), lasting=True)
+    possible = np.flatnonzero((late.frames > 0) & (late.statistic > SIGNIFICANT**2))
+    if not len(possible):
+        return known
+    best = possible[np.argmax(late.statistic[possible])]
+    frames, frame = float(late.lateness[best]) / known.frame_time, int(late.frames[best])
+    missing = max(round(frames), 1)
+    after = sorted((*known.after, *[float(video.likelihood.tracks.times[frame - 1 : frame + 1].mean())] * missing))
+    return replace(known, after=tuple(after)) if frames > LEAST and len(after) <= MOST_DROPPED else known

@@ -136,6 +136,17 @@ def test_lost_frames() -> None:
     assert ClockError().measured_times(stamps, lost)[0].tolist() == pytest.approx([0.0, 0.4, 0.9, 1.3])
 
 
+def test_dropped_frames() -> None:
+    stamps = torch.tensor([[0.0, 0.4, 0.8, 1.2]], dtype=torch.float64).expand(2, -1)
+    never = {one.name: torch.full((2,), one.default).double() for one in DROPPED_AFTER}
+    after = {DROPPED_AFTER[0].name: [0.2, 0.6], DROPPED_AFTER[1].name: [0.2, 1.0]}
+    places = never | {name: torch.tensor(values).double() for name, values in after.items()}
+    lost = {FRAME_TIME.name: torch.tensor([0.4, 0.5]).double(), **places}
+    times = DroppedFrames().measured_times(stamps, lost)
+    assert times[0].tolist() == pytest.approx([0.0, 1.2, 1.6, 2.0])
+    assert times[1].tolist() == pytest.approx([0.0, 0.4, 1.3, 2.2])
+
+
 def test_a_lens_moves_what_is_far_from_its_middle() -> None:
     places = torch.tensor([[[[1.0, 0.0], [1.0, 2.0]]]], dtype=torch.float64)
     lens = {

@@ -53,17 +53,37 @@ def fit_with_dropped_frames(trial: Trial, dropped: Sequence[Dropped], *, seed: i
     )
     for _ in range(ROUNDS):
         further = _further(found, known)
-        places = [
-            (len(more.after) - len(less.after)) * math.log(len(video.times))
-            for more, less, video in zip(further, known, tracks, strict=True)
-        ]
-        if not any(places):
+        more = _taken(found, known, further, seed=seed)
+        if more is None:
             break
-        more = found.under(found.model, held=_held(found, further), effort=FIRST, model_error=False)
-        if more.joint.log_density < found.joint.log_density + sum(places):
-            break
-        found, known = more, further
+        found, known = more
     return found, known
+
+
+def _taken(
+    fit: SharedFit, known: Sequence[Dropped], further: Sequence[Dropped], *, seed: int
+) -> tuple[SharedFit, list[Dropped]] | None:
+    """The fit with further frames that are missing, in those videos that it explains better; None where it does none.
+
+    Without the frame a video may have taken another course of events, so it is searched anew where it is no better.
+    """
+    changed = [k for k, (more, less) in enumerate(zip(further, known, strict=True)) if more != less]
+    if not changed:
+        return None
+    found = fit.under(fit.model, held=_held(fit, further), effort=FIRST, model_error=False)
+    found = found.mended([k for k in changed if not _explains_better(found, fit, k)], seed=seed)
+    better = [k for k in changed if _explains_better(found, fit, k)]
+    taken = [more if k in better else less for k, (more, less) in enumerate(zip(further, known, strict=True))]
+    if len(better) < len(changed):
+        found = fit.under(fit.model, held=_held(fit, taken), effort=FIRST, model_error=False)
+    choices = sum(
+        (len(taken[k].after) - len(known[k].after)) * math.log(len(tracks.times)) for k, tracks in enumerate(fit.tracks)
+    )
+    return (found, taken) if found.joint.log_density > fit.joint.log_density + choices else None
+
+
+def _explains_better(fit: SharedFit, other: SharedFit, video: int) -> bool:
+    return fit.fits[video].misfit.ratio < other.fits[video].misfit.ratio
 
 
 def _held(fit: SharedFit, dropped: Sequence[Dropped]) -> list[Held]:

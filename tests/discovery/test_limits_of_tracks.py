@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from vrdp_prob.discovery.discover import _from_first_frames, _limits, _not_asked
+from vrdp_prob.discovery.discover import _from_first_frames, _in_motion, _limits, _not_asked
 from vrdp_prob.scene import Body, Shape, Tracks
 
 
@@ -33,6 +33,17 @@ def test_what_is_true_of_all_is_told_once() -> None:
 def test_of_a_limit_that_many_videos_have_one_is_told() -> None:
     (sentence,) = _limits([_tracks("u", 2.0), _tracks("v", 0.04), _tracks("w", 33.0), _tracks("x", 0.5)])
     assert sentence.startswith("u (and two other videos alike): Frames are 2 s apart")
+
+
+def test_videos_in_which_nothing_moves_are_left_out_where_enough_are_left() -> None:
+    moving = [_tracks(name, 0.04) for name in "uvw"]
+    noise = np.random.default_rng(2).normal(0, 1e-3, (40, 1, 2))
+    rest = Tracks.from_arrays("rest", moving[0].bodies, moving[0].times, noise)
+    assert _in_motion(moving) == (moving, [])
+    seen, still = _in_motion([moving[0], rest, *moving[1:]])
+    assert [one.video for one in seen] == ["u", "v", "w"]
+    assert still == ["rest"]
+    assert _in_motion([rest, *moving[1:]])[1] == []
 
 
 def test_times_of_clips_of_one_recording_are_counted_from_their_first_frames() -> None:

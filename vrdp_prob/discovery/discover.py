@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from vrdp_prob.datasets.folder import some
-from vrdp_prob.discovery.checking import check_video_count
+from vrdp_prob.discovery.checking import FEWEST_VIDEOS, check_video_count
 from vrdp_prob.discovery.describe import describe
 from vrdp_prob.discovery.finding import Finding, FoundCause, UpperBound, Verdict
 from vrdp_prob.discovery.outcome import Outcome, outcome_of
@@ -33,7 +33,8 @@ from vrdp_prob.inference.runs.checkpoint import (
 )
 from vrdp_prob.inference.runs.journal import journal
 from vrdp_prob.inference.runs.parallel import linear_algebra_in_one_thread, several_processes
-from vrdp_prob.inference.several_videos.fitting import SharedFit, fit_together
+from vrdp_prob.inference.search.clues import Clues
+from vrdp_prob.inference.several_videos.fitting import SharedFit, check_videos, fit_together
 from vrdp_prob.inference.several_videos.second_look import explained, loses_single_videos
 from vrdp_prob.inference.several_videos.spin_islands import with_other_spins
 from vrdp_prob.models.effects.effect import Effect
@@ -67,7 +68,7 @@ def discover(
     Parameters
     ----------
     videos
-        What was seen, at least three videos of one table.
+        What was seen, at least three videos of one table. Those in which nothing moves are left out.
     model
         The physics that is put to the test.
     seed
@@ -85,11 +86,13 @@ def discover(
     Raises
     ------
     InputError
-        If there are fewer than three videos, two have one name, a video shows no motion, the model is none, the videos
+        If there are fewer than three videos that show motion, two have one name, the model is none, the videos
         have no common world, the checkpoint belongs to another run, or one is asked for with an effect whose class
         other processes cannot import.
     """
     check_video_count(videos)
+    check_videos(videos)
+    videos, still = _in_motion(videos)
     check_model(model)
     physics = default_model() if model is None else model
     looked_for = _catalogue(physics, catalogue)
@@ -109,12 +112,13 @@ def discover(
         found, causes = outcome.found, outcome.causes
         tried = tried_causes(found, _names_of(found, causes), seed=seed)
     doubtful, bounds = outcome.verdict is Verdict.UNKNOWN, _bounds(found, causes)
+    upper = tuple(_without_strengths(bounds) if doubtful else bounds)
     return Finding(
         verdict=outcome.verdict,
         causes=causes,
         checks=outcome.checks,
         checks_after=outcome.after,
-        upper_bounds=tuple(_without_strengths(bounds) if doubtful else bounds),
+        upper_bounds=upper,
         model=physics,
         extended=extended_model(found.best, found.overdispersion),
         videos=tuple(tracks.video for tracks in videos),
@@ -123,10 +127,11 @@ def discover(
             *_notes(found, causes, outcome.reasons, outcome.unlisted, doubtful=doubtful),
             *details_left(found.best.causes, outcome.after),
             *rivals_outside((cause.effect for cause in causes if cause.named), outcome.checks),
-            *mass_scale_notes(_told(found, causes), videos),
+            *mass_scale_notes([*_told(found, causes), *_bounded(found, upper)], videos),
             *_limits(videos),
             *_not_asked(videos),
             *([] if timed is videos else [COUNTED_ANEW]),
+            *([f"Nothing moves in {listed(still)}, so nothing was asked of what is seen there."] if still else []),
         ),
         figures=residual_figures(
             found.base.fit,
@@ -207,6 +212,15 @@ def _limits(videos: Sequence[Tracks]) -> list[str]:
     return limits
 
 
+def _in_motion(videos: Sequence[Tracks]) -> tuple[Sequence[Tracks], list[str]]:
+    """The videos in which something moves, and the names of the others; all where too few are left."""
+    moves = [Clues.of(tracks).show_motion for tracks in videos]
+    if all(moves) or sum(moves) < FEWEST_VIDEOS:
+        return videos, []
+    moving = [tracks for tracks, one in zip(videos, moves, strict=True) if one]
+    return moving, [tracks.video for tracks, one in zip(videos, moves, strict=True) if not one]
+
+
 def _facts(videos: Sequence[Tracks], model: PhysicsModel, catalogue: Sequence[Effect], seed: int) -> dict[str, str]:
     """What a search depends on, in short texts by name."""
     names = ", ".join(sorted(effect.name for effect in catalogue))
@@ -246,6 +260,12 @@ def _bounds(found: Search, told: Sequence[FoundCause]) -> list[UpperBound]:
         if effect.cause_name() not in estimated and effect.follows not in catalogue
         for bound in upper_bounds(effect, scores.get(effect.name), widening=widening, videos=videos)
     ]
+
+
+def _bounded(found: Search, bounds: Sequence[UpperBound]) -> list[Effect]:
+    """The effects of which some bounds are."""
+    names = {one.way or one.name for one in bounds if one.bound is not None}
+    return [effect for effect in found.refits.catalogue if effect.name in names]
 
 
 def _without_strengths(bounds: Sequence[UpperBound]) -> list[UpperBound]:

@@ -245,6 +245,8 @@ class UpperBound:
         anything: nobody was at the others.
     way
         Name of the effect that has the parameter, where that is a further way in which the cause acts.
+    elsewhere
+        Where else nothing would have been seen of it, in words that follow the bound; None where nowhere.
     measure
         What is bounded where that is not how far the parameter is from where the cause does nothing: of something in
         the way, how large it may be without that any body has met it.
@@ -258,6 +260,7 @@ class UpperBound:
     places: int = 1
     told: int = 1
     way: str | None = None
+    elsewhere: str | None = None
     measure: str | None = None
 
 

@@ -55,7 +55,11 @@ def with_answers(
     """
     if not finding.named:
         return replace(finding, notes=(*finding.notes, NOT_ASKED)) if any(questions.values()) else finding
-    asked = [(tracks, tuple(questions[tracks.video])) for tracks in videos if questions.get(tracks.video)]
+    asked = [
+        (tracks, tuple(questions[tracks.video]))
+        for tracks in videos
+        if questions.get(tracks.video) and tracks.video in finding.videos
+    ]
     compile_model(finding.extended)
     work = _Comparison(finding, tuple(words), seed)
     shown = progress or SilentProgress()

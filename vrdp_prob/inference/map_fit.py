@@ -156,7 +156,7 @@ def fit_map(
         If no object moves.
     """
     clues = Clues.of(tracks)
-    if not clues.moving and not clues.contacts:
+    if not clues.show_motion:
         raise InputError(f"{tracks.video}: no object moves, so nothing can be inferred; give tracks with motion.")
     family = clues.noise_family if noise is None else noise
     stages = FitPlan() if plan is None else plan

@@ -21,6 +21,7 @@ from vrdp_prob.discovery.residuals.free_flight import NORMAL_95, ONE_SIDED_95, F
 from vrdp_prob.discovery.residuals.linear import Score
 from vrdp_prob.discovery.residuals.residual_model import ResidualModel
 from vrdp_prob.discovery.words import number, opposite
+from vrdp_prob.plural import several
 
 RUBBING = "tangential against normal impulse"
 DISTANCE = "centre distance at contact"
@@ -173,7 +174,7 @@ def _momentum_check(score: Score, contacts: int) -> Iterator[Check]:
         f"Momentum is not kept at contacts: velocities that bodies have in common change {excess**0.5:.1f} times as "
         "much as noise lets them."
     )
-    sentence = found if score.p_value < SEEN else f"Nothing seen at {contacts} contacts."
+    sentence = found if score.p_value < SEEN else f"Nothing seen at {several(contacts, 'contact')}."
     yield Check(MOMENTUM, excess, score.p_value, False, sentence)
 
 

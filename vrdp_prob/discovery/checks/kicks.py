@@ -155,11 +155,12 @@ def kick_check(model: ResidualModel, replicas: Sequence[Float[np.ndarray, "_ rep
     video = model.videos[places.video]
     size = float(np.linalg.norm(places.change[strongest]))
     name = video.motion.tracks.bodies[places.bodies[strongest]].id
-    where = f"at {video.motion.times[places.frames[strongest]]:.2f} s object {name} of video {video.linear.name}"
+    who = f"object {name} of video {video.linear.name}"
+    when = f"at {video.motion.times[places.frames[strongest]]:.2f} s"
     sentence = (
-        f"Without a partner in reach, {where} changes its velocity by {number(size)} m/s."
+        f"Without a partner in reach, {who} changes its velocity by {number(size)} m/s {when}."
         if p_value < SEEN
-        else f"Nothing seen; the strongest was {number(size)} m/s {where}."
+        else f"Nothing seen; the strongest was {number(size)} m/s, of {who} {when}."
     )
     yield Check(KICK, size, p_value, False, sentence)
 

@@ -123,12 +123,12 @@ def may_vanish(
 
 
 def mass_scale_notes(effects: Iterable[Effect], videos: Iterable[Tracks]) -> Iterator[str]:
-    """What limits estimates of parameters that show only as their ratio to the masses, where no mass is stated.
+    """What limits what is told of parameters that show only as their ratio to the masses, where no mass is stated.
 
     Parameters
     ----------
     effects
-        Effects whose parameters are told.
+        Effects of whose parameters estimates or bounds are told.
     videos
         What was seen.
     """
@@ -136,8 +136,8 @@ def mass_scale_notes(effects: Iterable[Effect], videos: Iterable[Tracks]) -> Ite
         return
     for name in (one.name for effect in effects for one in effect.parameters if one.goes_with_masses):
         yield (
-            f"No mass is stated, and only the ratio of {name.replace('_', ' ')} to the masses shows: its value and its "
-            "interval are those for masses of the scale that was believed, and change in proportion with it."
+            f"No mass is stated, and only the ratio of {name.replace('_', ' ')} to the masses shows: what is told "
+            "of it is for masses of the scale that was believed, and changes in proportion with it."
         )
 
 
@@ -250,6 +250,7 @@ def upper_bounds(
             places=one.places,
             told=one.told,
             way=effect.way(),
+            elsewhere=effect.also_vanishes.get(name),
         )
         for name, one in largest.items()
     ]

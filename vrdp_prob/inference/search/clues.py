@@ -93,6 +93,11 @@ class Clues:
         """Bodies that are not at rest when they are released."""
         return frozenset(body for body in range(len(self.tracks.bodies)) if not self._rests(body))
 
+    @property
+    def show_motion(self) -> bool:
+        """Whether anything moves."""
+        return bool(self.moving or self.contacts)
+
     @cached_property
     def acceleration(self) -> float:
         """Typical acceleration (m/s^2) of what moves, over stretches in which hardly any contact falls."""

@@ -129,6 +129,8 @@ class Effect:
     """Its parameters."""
     vanishes_at: ClassVar[Mapping[str, float]] = {}
     """Values of parameters at which the effect is gone, so that the model without it is nested."""
+    also_vanishes: ClassVar[Mapping[str, str]] = {}
+    """Where else nothing is seen of the effect, by a strength and in words that follow an upper bound of it."""
     vanishes_like: ClassVar[Mapping[str, str]] = {}
     """Parameters, each with the one of another effect that leaves nothing of this one where both are equal."""
     told_by_differences: ClassVar[frozenset[str]] = frozenset()

@@ -56,6 +56,7 @@ class SlipToRoll(Effect):
     source: ClassVar = "A. Sommerfeld, Mechanics (Lectures on theoretical physics 1), section 27: the billiard ball"
     parameters: ClassVar = (SLIP_FRICTION, RELEASE_ROLLING, RELEASE_ROLLING_ACROSS)
     vanishes_like: ClassVar = {"slip_friction": "rolling_resistance"}
+    also_vanishes: ClassVar = {"slip_friction": "or so large that spheres roll at once"}
 
     def search_points(self, videos: Sequence[Tracks]) -> Sequence[Mapping[str, float]]:
         """With spheres that are released without rolling; they slow down as rolling ones do if the frictions agree."""

@@ -91,6 +91,17 @@ def test_the_extended_model_believes_what_the_videos_say(tilted: tuple[Truth, Fi
     assert {one.name: one for one in read.parameters} == {one.name: one for one in finding.extended.parameters}
 
 
+def test_among_all_causes_of_the_catalogue_dropped_frames_are_named(tmp_path: Path) -> None:
+    truth, finding = finding_of(tmp_path, ["frames_dropped_often"], seed=2, setting=PAIRS)
+    assert finding.verdict is Verdict.NAMED
+    (cause,) = (one for one in finding.causes if one.named)
+    assert (cause.name, cause.effect) == ("clock_error", "dropped_frames")
+    assert cause.probability > SURE
+    assert cause.gain.elpd_difference > 100
+    interval = cause.parameters["dropped_frame_time"]
+    assert interval.q025 < 1 / truth.videos[0].frame_rate < interval.q975
+
+
 def test_a_check_shows_it(tilted: tuple[Truth, Finding]) -> None:
     _, finding = tilted
     assert next(check for check in finding.checks if check.name == "push in one direction").significant

@@ -14,7 +14,7 @@ from vrdp_prob.inference.several_videos.fitting import SharedFit, fit_together
 from vrdp_prob.models.effects.dropped_frames import DROPPED_AFTER, FRAME_TIME, MOST_DROPPED, DroppedFrames
 from vrdp_prob.models.unknowns import Held
 
-ROUNDS = 6
+ROUNDS = 12
 """How often a fit is asked for a further dropped frame of each video."""
 LEAST = 0.2
 """Share of the time between two stamps by which a video must be late for a further frame to be tried: what other
@@ -108,6 +108,5 @@ def _with_plainest(model: ResidualModel, index: int, known: Dropped) -> Dropped:
         return known
     best = possible[np.argmax(late.statistic[possible])]
     frames, frame = float(late.lateness[best]) / known.frame_time, int(late.frames[best])
-    missing = max(round(frames), 1)
-    after = sorted((*known.after, *[float(video.likelihood.tracks.times[frame - 1 : frame + 1].mean())] * missing))
+    after = sorted((*known.after, float(video.likelihood.tracks.times[frame - 1 : frame + 1].mean())))
     return replace(known, after=tuple(after)) if frames > LEAST and len(after) <= MOST_DROPPED else known

@@ -19,7 +19,7 @@ MOST_DROPPED = 24
 """Frames that are dropped in one video at most."""
 NEVER = 1e9
 """Time in s that no video reaches."""
-FRAME_TIME_SD = 0.1
+FRAME_TIME_SD = 0.02
 """Standard deviation of the logarithm of the time that goes with one frame, about that between two stamps."""
 FRAME_TIME = Parameter(
     "dropped_frame_time",

@@ -144,6 +144,14 @@ def test_checks_and_causes_go_by_their_names(trial: Trial) -> None:
     assert names >= {name for name in own if "friction of the bodies" not in name and AT_WALLS not in name}
 
 
+def test_what_is_left_without_a_cause_may_clear_it(trial: Trial) -> None:
+    """A fit without it that has lost its videos sees p = 1e-20; one that has found them sees what it is worth."""
+    after = left(RUBBING, 7e-4)
+    assert list(doubts(trial, ContactFriction(), after, without=lambda: left(RUBBING, 1e-20)))
+    assert outcome._leaving_details(trial, [ContactFriction()], after, left(RUBBING, 1e-50)) == [ContactFriction()]
+    assert outcome._leaving_details(trial, [ContactFriction()], after, left(RUBBING, 1e-20)) == []
+
+
 @pytest.mark.slow
 def test_a_doubted_cause_is_told_of_and_not_part_of_the_extended_model(monkeypatch: pytest.MonkeyPatch) -> None:
     data, _ = fitted("surface_tilt", 5.0, seed=2, setting=SMALL)

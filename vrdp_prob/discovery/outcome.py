@@ -1,6 +1,6 @@
 """What a search for causes has found, and what is believed of it: doubts, probabilities and the verdict."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -66,13 +66,18 @@ def outcome_of(fit: SharedFit, catalogue: Sequence[Effect], *, seed: int, progre
     found, after, unlisted = _without_mimics(found, seed=seed, progress=progress)
     not_named: list[FoundCause] = []
     reasons: list[Doubt] = []
-    while doubted := _doubted(found, after):
-        not_named += [one for one in _causes(found, doubted, seed) if not one.named]
+    cleared: set[Effect] = set()
+    while doubted := {cause: some for cause, some in _doubted(found, after).items() if cause not in cleared}:
         other = next((one for cause in doubted if (one := found.with_rival(cause, _credible)) is not None), None)
+        left = found.without(list(doubted)) if other is None else other
+        left, after_left, further = _without_mimics(left, seed=seed, progress=progress)
         if other is None:
+            if details := _leaving_details(found.best, doubted, after, after_left):
+                cleared.update(details)
+                continue
             reasons += [one for some in doubted.values() for one in some]
-        found = found.without(list(doubted)) if other is None else other
-        found, after, further = _without_mimics(found, seed=seed, progress=progress)
+        not_named += [one for one in _causes(found, doubted, seed) if not one.named]
+        found, after = left, after_left
         unlisted += further
     verdict = Verdict.UNKNOWN if unlisted or reasons else _verdict(found, checks, after)
     causes = _in_order([*_causes(found, {}, seed), *not_named])
@@ -112,6 +117,16 @@ def _doubted(found: Search, after: Sequence[Check]) -> dict[Effect, tuple[Doubt,
         for cause, lesser in zip(found.best.causes, found.lesser, strict=True)
     }
     return {cause: some for cause, some in reasons.items() if some}
+
+
+def _leaving_details(
+    trial: Trial, doubted: Iterable[Effect], after: Sequence[Check], without: Sequence[Check]
+) -> list[Effect]:
+    """The causes of a model that are cleared by the checks of the model without all that are doubted.
+
+    The one without a cause is fitted roughly when that is doubted, and sees little through what lost videos leave.
+    """
+    return [cause for cause in doubted if not any(doubts(trial, cause, after, without=lambda: without))]
 
 
 def _credible(trial: Trial) -> bool:

@@ -13,10 +13,12 @@ reads the results there are. One process per core. `--length` and `--time` put t
 import argparse
 import json
 import os
+import signal
 import sys
 import time
 import traceback
 from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -42,6 +44,10 @@ from vrdp_prob.models.simulator.rollout import compile_model
 
 RESULTS = Path("out") / "discovery.jsonl"
 KINDS = {kind.name.lower(): kind for kind in Kind}
+LIMIT = 3600.0
+"""Processor seconds after which a data set is broken off, and counts as missed."""
+NOT_THROUGH = "not through"
+"""What then stands in the place of the verdict."""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -124,11 +130,30 @@ def one(task: Task) -> Result:
     videos = handed_over(data, task.table)
     wall, cpu = time.perf_counter(), time.process_time()
     try:
-        finding = discover(videos, seed=0, catalogue=catalogue(task), processes=1)
+        with broken_off_after(LIMIT):
+            finding = discover(videos, seed=0, catalogue=catalogue(task), processes=1)
+    except TimeoutError:
+        return {**facts, "verdict": NOT_THROUGH, "causes": []}
     except Exception:  # one failure is a result, and the others go on
         return {**facts, "exception": traceback.format_exc(limit=-4)}
     seconds = {"wall": time.perf_counter() - wall, "cpu": time.process_time() - cpu}
     return {**facts, **outcome(finding, data.truth, comparable=task.table.is_of_usual_scale), "seconds": seconds}
+
+
+@contextmanager
+def broken_off_after(limit: float) -> Iterator[None]:
+    """What takes longer, in processor seconds of this process, ends as a `TimeoutError`."""
+
+    def end(_signal: int, _frame: object) -> None:
+        raise TimeoutError
+
+    before = signal.signal(signal.SIGPROF, end)
+    signal.setitimer(signal.ITIMER_PROF, limit)
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_PROF, 0.0)
+        signal.signal(signal.SIGPROF, before)
 
 
 def catalogue(task: Task) -> list[Effect] | None:

@@ -129,6 +129,35 @@ def test_cubes_of_a_video_that_was_lost_are_turned_on_where_it_is_explained(
     assert [plan.like_noise for plan in made if plan.yaws] == [like_noise]
 
 
+@pytest.mark.parametrize(
+    "left",
+    [(0.9, 0.8, 0.7, 0.6, 0.5), (1.0, 0.8, 0.4, 0.8, 0.9), (1.0, 1.0, 0.1, 0.1, 0.7), (0.9, 0.9, 0.5, 0.9, 0.9)],
+    ids=["ever better", "one way settled", "two ways settled", "settled on the way"],
+)
+def test_looks_side_by_side_find_what_they_find_one_after_the_other(
+    left: tuple[float, ...], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    fit = fit_map(colliding(0), default_model(), stream(0, "v0"), plan=IN_DOUBT, model_error=False)
+    made: list[int] = []
+
+    def looked_at(_self: object, asked: tuple[object, int]) -> MapFit:
+        made.append(asked[1])
+        return replace(fit, misfit=replace(fit.misfit, residual_sd=left[asked[1]] * fit.misfit.residual_sd))
+
+    monkeypatch.setattr(second_look._Look, "_made", looked_at)
+    ways = (*[(look % 2 == 0, IN_DOUBT) for look in range(4)], (True, TURNING))
+    search = second_look._Look(default_model(), default_model(), 0.0, 0, ways)
+    doubted = second_look._Doubted(fit, far_worse=False, turned_on=False, held={})
+    found, looks = [], []
+    for at_once in (False, True):
+        made.clear()
+        (better,) = search.looked([doubted], at_once=at_once)
+        found.append(None if better is None else better.misfit.residual_sd)
+        looks.append(sorted(made))
+    assert found[0] == found[1]
+    assert looks[0] == looks[1]
+
+
 def test_what_is_held_in_a_video_is_held_in_a_new_search_of_it() -> None:
     videos = [colliding(0), colliding(1)]
     held: list[Held] = [{}, {(SLIDING_FRICTION.name, None): 0.25}]

@@ -5,7 +5,7 @@ the other videos hold it, the search finds its way.
 """
 
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from jaxtyping import Bool
@@ -177,7 +177,8 @@ def look_again(
         )
         for index in chosen
     ]
-    improved = dict(zip(chosen, in_processes(look, doubted), strict=True))
+    better = look.looked(doubted, at_once=True) if thorough else in_processes(look, doubted)
+    improved = dict(zip(chosen, better, strict=True))
     return [improved.get(index) or fit for index, fit in enumerate(fits)]
 
 
@@ -231,29 +232,96 @@ class _Look:
     yielding: bool = False
 
     def __call__(self, doubted: _Doubted) -> MapFit | None:
-        """A better fit, if there is one."""
-        best, better = doubted.fit, None
-        settled: set[tuple[bool, FitPlan]] = set()
-        for look, way in enumerate(self.ways):
-            if way in settled:
-                continue
-            believing, plan = way
-            if plan.yaws and doubted.turned_on:
-                plan = replace(plan, like_noise=0.0)
-            generator = stream(self.seed, f"{best.clues.tracks.video} {look}")
-            model = self.told if believing else self.model
-            found = fit_map(best.clues.tracks, model, generator, plan=plan, model_error=False, held=doubted.held)
-            gained = best.misfit.residual_sd / found.misfit.residual_sd - 1
-            better_from = -SAME if self.yielding else SAME
-            if gained > better_from and found.log_density > best.log_density - FELL:
-                structure = structure_of(found.likelihood.coordinates, doubted.held)
-                likelihood = plain_likelihood(found.clues, self.model, structure)
-                best = better = replace(found, likelihood=likelihood)
-            if best.misfit.residual_sd < self.goal:
-                break
-            if abs(gained) < SAME and not doubted.far_worse:
-                settled.add(way)
-        return better
+        """A better fit, if there is one, by one look after the other."""
+        (found,) = self.looked([doubted], at_once=False)
+        return found
+
+    def looked(self, doubted: Sequence[_Doubted], *, at_once: bool) -> list[MapFit | None]:
+        """Better fits of videos, where there are any.
+
+        Parameters
+        ----------
+        doubted
+            The videos.
+        at_once
+            Whether the looks that are sure to be made are made side by side: the first ones in each way, then the
+            second ones. What comes out is the same.
+        """
+        videos = [_Looked(one, one.fit) for one in doubted]
+        while asked := [(one, look) for one in videos for look in self._next(one, at_once=at_once)]:
+            fits = in_processes(self._made, [(one.doubted, look) for one, look in asked])
+            for (one, look), fit in zip(asked, fits, strict=True):
+                one.made[look] = fit
+            for one in videos:
+                self._take(one)
+        return [one.better for one in videos]
+
+    def _next(self, one: "_Looked", *, at_once: bool) -> list[int]:
+        """Looks at a video that are to be made now."""
+        first: dict[tuple[bool, FitPlan], int] = {}
+        for look in range(one.taken, len(self.ways)):
+            if self.ways[look] not in one.settled:
+                first.setdefault(self.ways[look], look)
+        looks = [look for look in first.values() if look not in one.made]
+        return looks if at_once else looks[:1]
+
+    def _made(self, asked: tuple[_Doubted, int]) -> MapFit:
+        doubted, look = asked
+        believing, plan = self.ways[look]
+        if plan.yaws and doubted.turned_on:
+            plan = replace(plan, like_noise=0.0)
+        tracks = doubted.fit.clues.tracks
+        generator = stream(self.seed, f"{tracks.video} {look}")
+        model = self.told if believing else self.model
+        return fit_map(tracks, model, generator, plan=plan, model_error=False, held=doubted.held)
+
+    def _take(self, one: "_Looked") -> None:
+        """Take what was made of a video, in the order of the looks, as far as that is known."""
+        while one.taken < len(self.ways):
+            way = self.ways[one.taken]
+            if way not in one.settled:
+                if one.taken not in one.made:
+                    return
+                self._judge(one, way, one.made.pop(one.taken))
+            one.taken = len(self.ways) if one.best.misfit.residual_sd < self.goal else one.taken + 1
+
+    def _judge(self, one: "_Looked", way: tuple[bool, FitPlan], found: MapFit) -> None:
+        gained = one.best.misfit.residual_sd / found.misfit.residual_sd - 1
+        better_from = -SAME if self.yielding else SAME
+        if gained > better_from and found.log_density > one.best.log_density - FELL:
+            structure = structure_of(found.likelihood.coordinates, one.doubted.held)
+            likelihood = plain_likelihood(found.clues, self.model, structure)
+            one.best = one.better = replace(found, likelihood=likelihood)
+        if abs(gained) < SAME and not one.doubted.far_worse:
+            one.settled.add(way)
+
+
+@dataclass
+class _Looked:
+    """How far a video was looked at.
+
+    Parameters
+    ----------
+    doubted
+        The video.
+    best
+        Its best fit so far.
+    better
+        The same if it is another one than before.
+    taken
+        Number of looks that are done with.
+    made
+        Fits of looks that come after these.
+    settled
+        Ways in which no further look is made.
+    """
+
+    doubted: _Doubted
+    best: MapFit
+    better: MapFit | None = None
+    taken: int = 0
+    made: dict[int, MapFit] = field(default_factory=dict)
+    settled: set[tuple[bool, FitPlan]] = field(default_factory=set)
 
 
 def _excess(fits: Sequence[MapFit]) -> np.ndarray:

@@ -288,6 +288,15 @@ def test_values_of_single_bodies_are_folded_where_they_are_many():
     assert "values of single bodies" not in render(replace(finding, causes=(few,)))
 
 
+def test_values_of_single_videos_are_folded_where_they_are_many():
+    places = {f"dropped_after_{place}[v{number}]": ROLLING for place in (1, 2, 3) for number in (1, 2)}
+    parameters = {"dropped_frame_time": ROLLING, **places}
+    dropped = replace(TILT, name="clock_error", parameters=parameters, way="dropped_frames")
+    finding = replace(named(), causes=(dropped,))
+    assert "<summary>Six values of single videos</summary>" in render(finding)
+    assert "and six values of single videos" in "\n".join(lines(finding))
+
+
 def test_it_says_why_strengths_have_no_bound():
     finding = unknown()
     strengths = tuple(replace(one, bound=None) for one in finding.upper_bounds)

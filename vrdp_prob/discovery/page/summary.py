@@ -16,6 +16,7 @@ from vrdp_prob.discovery.page.wording import (
     leading_and_own,
     length_unit,
     number,
+    own_words,
     ratio_words,
     told_gains,
     tried_words,
@@ -81,11 +82,12 @@ def lines(finding: Finding) -> list[str]:
     told = [verdict_sentence(finding)]
     for cause in finding.named:
         told.append(f"  {cause_title(cause)}: probability {chance(cause.probability)}; {_gain_line(cause.gain)}")
-        leading, own = leading_and_own(cause, effect_of(cause.effect, finding.extended))
+        effect = effect_of(cause.effect, finding.extended)
+        leading, own = leading_and_own(cause, effect)
         for name, estimate in leading.items():
             mean, interval = estimate_words(estimate)
             told.append(f"      {title(name)} {mean} (95 %: {interval})")
-        told += [f"      and {counted(len(own), 'value')} of single bodies"] if own else []
+        told += [f"      and {own_words(own, effect)}"] if own else []
     told += [f"  {words}: {_gain_line(gain)}" for words, gain in told_gains(finding) if words == TOGETHER]
     if finding.description is not None:
         told += [f"  {line}" for line in finding.description.sentences]

@@ -2,7 +2,7 @@
 
 import math
 import re
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 
 from vrdp_prob.discovery.finding import (
     ErrorRatio,
@@ -18,7 +18,7 @@ from vrdp_prob.models.effects.effect import Effect
 from vrdp_prob.models.model_file import known_effects
 from vrdp_prob.models.parameters import Scope
 from vrdp_prob.models.physics import PhysicsModel
-from vrdp_prob.report.wording import percent
+from vrdp_prob.report.wording import counted, percent
 
 UNDEFINED = "\N{EN DASH}"
 """Stands where a number is not defined."""
@@ -28,8 +28,8 @@ MINUS = "\N{MINUS SIGN}"
 TIMES = " \N{MULTIPLICATION SIGN} "
 LEAST_P_VALUE = 1e-99
 """So far out no law of chance is known to hold."""
-MOST_OF_BODIES = 4
-"""Estimates of single bodies that stand among the others of a cause."""
+MOST_OF_SINGLES = 4
+"""Estimates of single bodies and videos that stand among the others of a cause."""
 PLAIN_FROM, PLAIN_TO = 1e-4, 1e5
 """Sizes that are written without a power of ten."""
 SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
@@ -186,13 +186,24 @@ def effect_of(name: str, model: PhysicsModel) -> Effect | type[Effect] | None:
 def leading_and_own(
     cause: FoundCause, effect: Effect | type[Effect] | None
 ) -> tuple[dict[str, Estimate], dict[str, Estimate]]:
-    """Estimates of a cause that lead, and those of single bodies where these are many and something shared leads."""
-    scopes = {one.name: one.scope for one in (() if effect is None else effect.parameters)}
-    of = {name: scopes.get(name.partition("[")[0]) for name in cause.parameters}
-    of_bodies = {name: one for name, one in cause.parameters.items() if of[name] is Scope.BODY}
-    if len(of_bodies) <= MOST_OF_BODIES or not {Scope.SHARED, Scope.MATERIAL} & set(of.values()):
+    """Estimates of a cause that lead, and those of single bodies and videos where they are many and others lead."""
+    scopes = {name: _scope(name, effect) for name in cause.parameters}
+    own = {name: one for name, one in cause.parameters.items() if scopes[name] in (Scope.BODY, Scope.VIDEO)}
+    if len(own) <= MOST_OF_SINGLES or not {Scope.SHARED, Scope.MATERIAL} & set(scopes.values()):
         return dict(cause.parameters), {}
-    return {name: one for name, one in cause.parameters.items() if name not in of_bodies}, of_bodies
+    return {name: one for name, one in cause.parameters.items() if name not in own}, own
+
+
+def own_words(own: Collection[str], effect: Effect | type[Effect] | None) -> str:
+    """How many estimates belong to single bodies or videos, by their names."""
+    of_videos = {_scope(name, effect) for name in own} == {Scope.VIDEO}
+    return f"{counted(len(own), 'value')} of single {'videos' if of_videos else 'bodies'}"
+
+
+def _scope(name: str, effect: Effect | type[Effect] | None) -> Scope | None:
+    """What has one value each of a parameter of an effect, of which one value has a name."""
+    plain = name.partition("[")[0]
+    return next((one.scope for one in (() if effect is None else effect.parameters) if one.name == plain), None)
 
 
 def parameter_words(name: str, effect: Effect | type[Effect] | None) -> str:

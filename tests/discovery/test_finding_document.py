@@ -70,7 +70,7 @@ def test_evidence_bounds_and_notes():
         "vanishes_at": 0.0,
         "places": 1,
         "told": 1,
-        "elsewhere": None,
+        "remark": None,
         "measure": None,
     }
     assert found["upper_bounds"][-1]["bound"] is None

@@ -81,7 +81,7 @@ def test_bounds_and_units() -> None:
     assert bound_words(UpperBound("material_friction", "ratio", 0.04, "1", 1.0)) == "within 0.04 of 1"
     slip = UpperBound("slip_to_roll", "slip_friction", 3e-4, "1", "rolling_resistance")
     assert bound_words(slip) == "within 0.0003 of the rolling resistance"
-    slipping = replace(slip, elsewhere="or so large that spheres roll at once")
+    slipping = replace(slip, remark="or so large that spheres roll at once")
     assert bound_words(slipping) == "within 0.0003 of the rolling resistance, or so large that spheres roll at once"
     assert with_unit("3", "1") == "3"
     wall = UpperBound("wall", "hidden_wall_distance", 0.0, "m", measure="depth of a wall")

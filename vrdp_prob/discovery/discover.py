@@ -112,13 +112,12 @@ def discover(
         found, causes = outcome.found, outcome.causes
         tried = tried_causes(found, _names_of(found, causes), seed=seed)
     doubtful, bounds = outcome.verdict is Verdict.UNKNOWN, _bounds(found, causes)
-    upper = tuple(_without_strengths(bounds) if doubtful else bounds)
     return Finding(
         verdict=outcome.verdict,
         causes=causes,
         checks=outcome.checks,
         checks_after=outcome.after,
-        upper_bounds=upper,
+        upper_bounds=tuple(_without_strengths(bounds) if doubtful else bounds),
         model=physics,
         extended=extended_model(found.best, found.overdispersion),
         videos=tuple(tracks.video for tracks in videos),
@@ -127,7 +126,7 @@ def discover(
             *_notes(found, causes, outcome.reasons, outcome.unlisted, doubtful=doubtful),
             *details_left(found.best.causes, outcome.after),
             *rivals_outside((cause.effect for cause in causes if cause.named), outcome.checks),
-            *mass_scale_notes([*_told(found, causes), *_bounded(found, upper)], videos),
+            *mass_scale_notes(_told(found, causes), videos),
             *_limits(videos),
             *_not_asked(videos),
             *([] if timed is videos else [COUNTED_ANEW]),
@@ -260,12 +259,6 @@ def _bounds(found: Search, told: Sequence[FoundCause]) -> list[UpperBound]:
         if effect.cause_name() not in estimated and effect.follows not in catalogue
         for bound in upper_bounds(effect, scores.get(effect.name), widening=widening, videos=videos)
     ]
-
-
-def _bounded(found: Search, bounds: Sequence[UpperBound]) -> list[Effect]:
-    """The effects of which some bounds are."""
-    names = {one.way or one.name for one in bounds if one.bound is not None}
-    return [effect for effect in found.refits.catalogue if effect.name in names]
 
 
 def _without_strengths(bounds: Sequence[UpperBound]) -> list[UpperBound]:

@@ -245,8 +245,9 @@ class UpperBound:
         anything: nobody was at the others.
     way
         Name of the effect that has the parameter, where that is a further way in which the cause acts.
-    elsewhere
-        Where else nothing would have been seen of it, in words that follow the bound; None where nowhere.
+    remark
+        What goes with it, in words that follow it: where else nothing would have been seen of the cause, or for which
+        masses it holds.
     measure
         What is bounded where that is not how far the parameter is from where the cause does nothing: of something in
         the way, how large it may be without that any body has met it.
@@ -260,7 +261,7 @@ class UpperBound:
     places: int = 1
     told: int = 1
     way: str | None = None
-    elsewhere: str | None = None
+    remark: str | None = None
     measure: str | None = None
 
 

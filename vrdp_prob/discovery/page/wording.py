@@ -129,8 +129,8 @@ def bound_words(bound: UpperBound) -> str:
     if bound.measure is not None and bound.bound <= 0:
         return "no room for any"
     where = f" at {bound.told} of {bound.places} places, the others tell nothing" if bound.told < bound.places else ""
-    elsewhere = f", {bound.elsewhere}" if bound.elsewhere else ""
-    return f"{_bound_size(bound)}{elsewhere}{where}"
+    remark = f", {bound.remark}" if bound.remark else ""
+    return f"{_bound_size(bound)}{remark}{where}"
 
 
 def _bound_size(bound: UpperBound) -> str:

@@ -18,6 +18,8 @@ from vrdp_prob.scene import Tracks
 
 CERTAIN = 0.95
 """Probability of the intervals."""
+OF_BELIEVED_MASSES = "for masses of the scale that was believed"
+"""What is said of a bound that goes with the scale of the masses, where none is stated."""
 MIDDLE = 1.959964
 """Standard deviations from the middle of a normal distribution to the ends of its middle 95 %."""
 
@@ -128,11 +130,11 @@ def mass_scale_notes(effects: Iterable[Effect], videos: Iterable[Tracks]) -> Ite
     Parameters
     ----------
     effects
-        Effects of whose parameters estimates or bounds are told.
+        Effects whose parameters are told.
     videos
         What was seen.
     """
-    if any(body.mass is not None for tracks in videos for body in tracks.bodies):
+    if _weighed(videos):
         return
     for name in (one.name for effect in effects for one in effect.parameters if one.goes_with_masses):
         yield (
@@ -239,6 +241,7 @@ def upper_bounds(
         return []  # tracks show it plainly, or not at all; its cause's other ways have bounds
     names = names or {effect.parameters[0].name: None}
     units = {parameter.name: parameter.unit for parameter in effect.parameters}
+    unscaled = set() if _weighed(videos) else {one.name for one in effect.parameters if one.goes_with_masses}
     largest = {name: (score.largest if score else {}).get(name, Largest(None, 1, 0)) for name in names}
     return [
         UpperBound(
@@ -250,10 +253,15 @@ def upper_bounds(
             places=one.places,
             told=one.told,
             way=effect.way(),
-            elsewhere=effect.also_vanishes.get(name),
+            remark=OF_BELIEVED_MASSES if name in unscaled else effect.also_vanishes.get(name),
         )
         for name, one in largest.items()
     ]
+
+
+def _weighed(videos: Iterable[Tracks]) -> bool:
+    """Whether any mass is stated."""
+    return any(body.mass is not None for tracks in videos for body in tracks.bodies)
 
 
 def _nothing(effect: Effect, strength: str) -> float | str:

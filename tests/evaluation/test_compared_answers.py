@@ -70,7 +70,7 @@ def sliding(video: str) -> Tracks:
 
 def test_both_models_are_asked_about_the_videos_with_questions() -> None:
     base = default_model()
-    finding = replace(named(), model=base, extended=base.with_effect(SurfaceTilt()), notes=())
+    finding = replace(named(), model=base, extended=base.with_effect(SurfaceTilt()), videos=("a", "b"), notes=())
     moving = Question("How many objects are moving at the beginning of the video?", question_id=0, answer="1")
     impossible = Question("What color is the cube?", question_id=1)
     told = with_answers(finding, [sliding("a"), sliding("b")], {"b": [moving, impossible]}, processes=1)

@@ -7,6 +7,7 @@ import pytest
 import torch
 
 from vrdp_prob.models.effects.bowl import Bowl
+from vrdp_prob.models.effects.dropped_frames import FRAME_TIME
 from vrdp_prob.models.effects.effect import Effect
 from vrdp_prob.models.effects.external_impulse import ExternalImpulse
 from vrdp_prob.models.effects.friction_patch import FrictionPatch
@@ -32,6 +33,9 @@ LOOKED_FOR = [
 SIZES = {"patch_radius", "obstacle_radius", "second_obstacle_radius", "pair_softening"}
 """Parameters that are expected to go with the size of the scene; they are stated for one of a half width of 3 m."""
 
+OF_FRAMES = {FRAME_TIME.name}
+"""Parameters that are expected to go with the time between two frames."""
+
 
 def seen(
     middle: tuple[float, float] = (0.0, 0.0), *, begin: float = 0.0, half_width: float = 1.5, frames: int = 801
@@ -44,7 +48,7 @@ def seen(
 
 @pytest.mark.parametrize("effect", LOOKED_FOR, ids=lambda effect: effect.name)
 def test_a_small_scene_around_the_origin_changes_little(effect: Effect) -> None:
-    stated = {parameter.name: parameter for parameter in effect.parameters if parameter.name not in SIZES}
+    stated = {parameter.name: parameter for parameter in effect.parameters if parameter.name not in SIZES | OF_FRAMES}
     for name, parameter in effect.expected([seen(half_width=0.5)]).items():
         if name not in stated:
             continue

@@ -11,6 +11,7 @@ from scipy.integrate import solve_ivp
 from tests.simulator.scenes import DISC, at, world
 from vrdp_prob.models.effects.bowl import Bowl
 from vrdp_prob.models.effects.clock_error import ClockError
+from vrdp_prob.models.effects.dropped_frames import DROPPED_AFTER, FRAME_TIME, DroppedFrames
 from vrdp_prob.models.effects.effect import Effect
 from vrdp_prob.models.effects.lens_distortion import LensDistortion
 from vrdp_prob.models.effects.magnus_curl import MagnusCurl

@@ -91,9 +91,9 @@ def discover(
         other processes cannot import.
     """
     check_video_count(videos)
+    check_model(model)
     check_videos(videos)
     videos, still = _in_motion(videos)
-    check_model(model)
     physics = default_model() if model is None else model
     looked_for = _catalogue(physics, catalogue)
     if checkpoint is not None:

@@ -327,9 +327,10 @@ class Refits:
 
     def _dropped(self, trial: Trial) -> list[Dropped]:
         """Frames that tracks show to be missing again and again, where nothing in the model shifts the clock."""
-        looked_for = any(isinstance(effect, DroppedFrames) for effect in self.catalogue)
+        if not any(isinstance(effect, DroppedFrames) for effect in self.catalogue):
+            return []
         shifted = any(effect.overrides("measured_times") for effect in trial.fit.model.effects)
-        return dropped_frames(trial.fit.tracks) if looked_for and not shifted else []
+        return [] if shifted else dropped_frames(trial.fit.tracks)
 
     def _hidden(self, trial: Trial, found: Sequence[Trial], kicks: CauseScore) -> list[Trial]:
         """Fits with something unseen in the place of kicks."""

@@ -10,6 +10,7 @@ from vrdp_prob.discovery.candidates.dropped_frames import SIGNIFICANT, Dropped
 from vrdp_prob.discovery.checks.clock import LateFrames
 from vrdp_prob.discovery.residuals.residual_model import ResidualModel
 from vrdp_prob.discovery.selection.trials import FIRST, Trial
+from vrdp_prob.inference.several_videos.ascent import ImpossibleStartError
 from vrdp_prob.inference.several_videos.fitting import SharedFit, fit_together
 from vrdp_prob.models.effects.dropped_frames import DROPPED_AFTER, FRAME_TIME, MOST_DROPPED, DroppedFrames
 from vrdp_prob.models.unknowns import Held
@@ -70,12 +71,17 @@ def _taken(
     changed = [k for k, (more, less) in enumerate(zip(further, known, strict=True)) if more != less]
     if not changed:
         return None
-    found = fit.under(fit.model, held=_held(fit, further), effort=FIRST, model_error=False)
+    try:
+        found = fit.under(fit.model, held=_held(fit, further), effort=FIRST, model_error=False)
+    except ImpossibleStartError:  # a video has no world with its further frame
+        return None
     found = found.mended([k for k in changed if not _explains_better(found, fit, k)], seed=seed)
     better = [k for k in changed if _explains_better(found, fit, k)]
+    if not better:
+        return None
     taken = [more if k in better else less for k, (more, less) in enumerate(zip(further, known, strict=True))]
     if len(better) < len(changed):
-        found = fit.under(fit.model, held=_held(fit, taken), effort=FIRST, model_error=False)
+        found = fit.with_courses_of(found, better)
     choices = sum(
         (len(taken[k].after) - len(known[k].after)) * math.log(len(tracks.times)) for k, tracks in enumerate(fit.tracks)
     )

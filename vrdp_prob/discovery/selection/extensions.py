@@ -138,17 +138,13 @@ class Extensions:
 
         None where videos have no world in common.
         """
-        known = list(dropped)
-
-        def fitted() -> SharedFit:
-            fit, known[:] = fit_with_dropped_frames(trial, dropped, seed=self.seed)
-            return fit
-
-        found = self._began_anew(trial, [effect := DroppedFrames()], fitted)
+        effect = DroppedFrames()
+        found = self._began_anew(trial, [effect], partial(fit_with_dropped_frames, trial, dropped, seed=self.seed))
         if found is None:
             return None
         places = [
-            len(one.after) * math.log(len(video.times) - 1) for one, video in zip(known, trial.fit.tracks, strict=True)
+            sum(name in effect.stepwise for name, _ in structure.held) * math.log(len(tracks.times) - 1)
+            for structure, tracks in zip(found.fit.structures, trial.fit.tracks, strict=True)
         ]
         return replace(found, choices={**found.choices, effect.name: np.array(places)})
 

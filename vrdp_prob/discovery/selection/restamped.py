@@ -22,7 +22,7 @@ LEAST = 0.2
 unknowns take up of it is much, as long as a frame is missing."""
 
 
-def fit_with_dropped_frames(trial: Trial, dropped: Sequence[Dropped], *, seed: int) -> tuple[SharedFit, list[Dropped]]:
+def fit_with_dropped_frames(trial: Trial, dropped: Sequence[Dropped], *, seed: int) -> SharedFit:
     """Fit a model with the frames that tracks show to be missing, and those that it shows itself by then.
 
     Parameters
@@ -33,10 +33,6 @@ def fit_with_dropped_frames(trial: Trial, dropped: Sequence[Dropped], *, seed: i
         The frames that each video lacks.
     seed
         Of the searches.
-
-    Returns
-    -------
-    The fit, and the frames that each video lacks in it.
 
     Raises
     ------
@@ -58,7 +54,7 @@ def fit_with_dropped_frames(trial: Trial, dropped: Sequence[Dropped], *, seed: i
         if more is None:
             break
         found, known = more
-    return found, known
+    return found
 
 
 def _taken(

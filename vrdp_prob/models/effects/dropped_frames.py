@@ -5,13 +5,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import ClassVar
 
-import numpy as np
 import torch
 from jaxtyping import Float
 from torch import Tensor
 
 from vrdp_prob.models.effects.clock_error import ClockError
 from vrdp_prob.models.effects.effect import Effect
+from vrdp_prob.models.effects.places import usual_interval
 from vrdp_prob.models.parameters import Parameter, Prior, Scope, Transform
 from vrdp_prob.scene import Tracks
 
@@ -63,7 +63,7 @@ class DroppedFrames(Effect):
 
     def expected(self, videos: Sequence[Tracks]) -> Mapping[str, Parameter]:
         """A dropped frame lasts as long as the time between two stamps."""
-        interval = float(np.median(np.concatenate([np.diff(one.times) for one in videos])))
+        interval = usual_interval(videos)
         prior = Prior(math.log(interval), FRAME_TIME_SD)
         return {FRAME_TIME.name: replace(FRAME_TIME, prior=prior, default=interval)}
 

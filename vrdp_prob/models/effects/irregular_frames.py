@@ -5,12 +5,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import ClassVar
 
-import numpy as np
 from jaxtyping import Float
 from torch import Tensor
 
 from vrdp_prob.models.effects.clock_error import ClockError
 from vrdp_prob.models.effects.effect import Effect
+from vrdp_prob.models.effects.places import usual_interval
 from vrdp_prob.models.parameters import FRAME_JITTER, Parameter
 from vrdp_prob.scene import Tracks
 
@@ -37,7 +37,7 @@ class IrregularFrames(Effect):
 
     def expected(self, videos: Sequence[Tracks]) -> Mapping[str, Parameter]:
         """A tenth of the time between two frames."""
-        interval = float(np.median(np.concatenate([np.diff(one.times) for one in videos])))
+        interval = usual_interval(videos)
         usual = EXPECTED_SHARE * interval
         prior = replace(FRAME_JITTER.prior, mean=math.log(usual))
         return {FRAME_JITTER.name: replace(FRAME_JITTER, prior=prior, default=usual)}

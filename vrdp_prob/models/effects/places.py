@@ -82,6 +82,11 @@ def expected_time(videos: Sequence[Tracks], time: Parameter) -> dict[str, Parame
     return {time.name: _moved(time, float(first + last) / 2, REACH_IN_TIME * float(last - first) / 2)}
 
 
+def usual_interval(videos: Sequence[Tracks]) -> float:
+    """Time in s between two frames, the one in the middle."""
+    return float(np.median(np.concatenate([np.diff(one.times) for one in videos])))
+
+
 def _moved(parameter: Parameter, middle: float, width: float) -> Parameter:
     """A parameter that is its own coordinate, around another middle, with at least so wide a prior."""
     prior = replace(parameter.prior, mean=middle, sd=max(parameter.prior.sd, width))

@@ -10,7 +10,7 @@ from vrdp_prob.discovery.selection.estimates import widened
 from vrdp_prob.discovery.selection.reach import reaches
 from vrdp_prob.discovery.selection.trials import Trial
 from vrdp_prob.inference.several_videos.learned import believing
-from vrdp_prob.inference.several_videos.population import with_learned_population
+from vrdp_prob.inference.several_videos.population import shared_sd, with_learned_population
 from vrdp_prob.models.physics import PhysicsModel
 
 
@@ -28,7 +28,7 @@ def extended_model(trial: Trial, overdispersion: Float[np.ndarray, "video"]) -> 
         Factor of each video by which variances are larger than what the likelihood says.
     """
     gaussian = trial.fit.joint.gaussian
-    mean, wide = gaussian.mean.copy(), widened(gaussian.sd, overdispersion, trial.unexplained)
+    mean, wide = gaussian.mean.copy(), widened(shared_sd(trial.fit), overdispersion, trial.unexplained)
     of_causes = {parameter.name for cause in trial.causes for parameter in cause.parameters}
     for place, far in reaches(trial.fit, of_causes, wide).items():
         mean[place], sd = far.moments(np.asarray)

@@ -12,6 +12,7 @@ from vrdp_prob.discovery.finding import Estimate, UpperBound
 from vrdp_prob.discovery.residuals.unexplained import Unexplained
 from vrdp_prob.discovery.selection.reach import Reach, reaches
 from vrdp_prob.inference.several_videos.fitting import SharedFit
+from vrdp_prob.inference.several_videos.population import shared_sd
 from vrdp_prob.models.effects.effect import Effect
 from vrdp_prob.models.parameters import Transform, group_words
 from vrdp_prob.scene import Tracks
@@ -46,15 +47,15 @@ def estimates(
         their mean; 1 where None.
     """
     factors = np.ones(len(fit.videos)) if overdispersion is None else overdispersion
-    shared_sd = widened(fit.joint.gaussian.sd, factors, unexplained)
+    wide = widened(shared_sd(fit), factors, unexplained)
     units = {parameter.name: parameter for parameter in effect.parameters}
     found: dict[str, Estimate] = {}
-    joint, farther = fit.joint, reaches(fit, units, shared_sd)
+    joint, farther = fit.joint, reaches(fit, units, wide)
     for place, key in enumerate(joint.numbers.keys):
         if key[0] in units:
             words = group_words(key[1])
             name = f"{key[0]}[{words}]" if words else key[0]
-            mean, sd = float(joint.gaussian.mean[place]), float(shared_sd[place])
+            mean, sd = float(joint.gaussian.mean[place]), float(wide[place])
             transform, unit = units[key[0]].transform, units[key[0]].unit
             far = farther.get(place)
             gaussian = _estimate(transform, mean, sd, unit)
@@ -111,7 +112,7 @@ def may_vanish(
     ]
     if not strengths or any(transform is Transform.LOG and not value for _, transform, value in strengths):
         return False
-    sd = widened(joint.gaussian.sd, overdispersion, unexplained)
+    sd = widened(shared_sd(fit), overdispersion, unexplained)
     places = [place for place, *_ in strengths]
     telling = telling_rows([joint.numbers.keys[place][0] for place in places], effect)
     if not len(telling):

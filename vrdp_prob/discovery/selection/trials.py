@@ -347,11 +347,14 @@ def with_own_population(fit: SharedFit) -> SharedFit:
     What a model lacks shows as differences between them, and a cause that explains these away is worth that they are
     less. And no cause is worth that it shifts all restitutions to where they are believed to be.
     """
-    for _ in range(SPREAD_ROUNDS):
+    for number in range(SPREAD_ROUNDS):
         model = with_learned_population(fit)
         if not _believes_otherwise(model, fit.model):
             break
-        fit = fit.under(model, effort=FIRST, model_error=False)
+        other = fit.under(model, effort=FIRST, model_error=False)
+        if number and other.joint.log_evidence < fit.joint.log_evidence:
+            break
+        fit = other
     return fit
 
 

@@ -53,23 +53,36 @@ def with_learned_spread(fit: SharedFit, parameter: Parameter, *, mean: bool = Fa
     mean
         Whether the middle of the bodies is learned, too.
     """
-    told = [one for index in range(len(fit.joint.videos)) if (one := _Told.of(fit, index, parameter)) is not None]
+    told = _told(fit, parameter)
     believed = fit.model.believed(parameter)
-    prior = believed.prior
-    if sum(one.count for one in told) < FEWEST:
+    if not told:
         return believed
 
     def cost(log_sd: float) -> float:
-        middle = _middle(told, log_sd, prior) if mean else None
+        middle = _middle(told, log_sd, parameter.prior) if mean else None
         return -sum(one.log_evidence(middle, float(np.exp(log_sd))) for one in told)
 
     bounds = (float(np.log(SMALLEST * parameter.prior.sd)), float(np.log(LARGEST * parameter.prior.sd)))
     log_sd = float(minimize_scalar(cost, bounds=bounds, method="bounded").x)
-    learned = replace(prior, sd=float(np.exp(log_sd)))
+    learned = replace(believed.prior, sd=float(np.exp(log_sd)))
     if not mean:
         return replace(believed, prior=learned)
-    middle = _middle(told, log_sd, prior)
+    middle = float(_with_middle(fit, told, learned.sd, parameter.prior).mean[-1])
     return replace(believed, prior=replace(learned, mean=middle), default=parameter.transform.to_value(middle))
+
+
+def shared_sd(fit: SharedFit) -> Float[np.ndarray, "shared"]:
+    """Standard deviation of each number that videos share, where the middle of restitutions is unknown, too.
+
+    A fit takes it to be what it has learned. What makes all bodies rebound more, or less, is known no better than it.
+    """
+    parameter = next(one for one in own_parameters(fit.model) if one.name == RESTITUTION.name)
+    told = _told(fit, parameter)
+    if not told:
+        return fit.joint.gaussian.sd
+    covariance = _with_middle(fit, told, fit.model.believed(parameter).prior.sd, parameter.prior).covariance
+    moving = fit.joint.gaussian.root
+    return np.sqrt(np.einsum("ij,jk,ik->i", moving, covariance[:-1, :-1], moving))
 
 
 @dataclass(frozen=True)
@@ -79,9 +92,11 @@ class _Told:
     Parameters
     ----------
     precision, pull
-        The log likelihood of values v is -v' precision v / 2 + pull' v.
-    expected
-        What the prior expects of each.
+        Given the shared numbers, the log likelihood of values v is -v' precision v / 2 + pull' v.
+    expected, believed
+        What the prior of the fit expects of each, and with what precision.
+    centre, slope
+        Where the fit has them, and how that moves with standard normal coordinates of the shared numbers.
     count
         Number of combinations of bodies of which the tracks tell something.
     """
@@ -89,6 +104,9 @@ class _Told:
     precision: Float[np.ndarray, "body body"]
     pull: Float[np.ndarray, "body"]
     expected: Float[np.ndarray, "body"]
+    believed: Float[np.ndarray, "body"]
+    centre: Float[np.ndarray, "body"]
+    slope: Float[np.ndarray, "body shared"]
     count: int
 
     @classmethod
@@ -107,7 +125,9 @@ class _Told:
         values, vectors = np.linalg.eigh(both - np.diag(believed))
         alone = (vectors * np.maximum(values, 0.0)) @ vectors.T
         count = int((values > (1 / TELLING - 1) / parameter.prior.sd**2).sum())
-        return cls(alone, both @ local.centre[chosen] - believed * expected, expected, count)
+        pull = both @ local.centre[chosen] - believed * expected
+        slope = local.slope[chosen] @ fit.joint.gaussian.root
+        return cls(alone, pull, expected, believed, local.centre[chosen], slope, count)
 
     def log_evidence(self, middle: float | None, sd: float) -> float:
         """Log probability (nats, up to a constant) of the tracks where values spread by `sd` around a middle."""
@@ -116,6 +136,12 @@ class _Told:
         pull = self.pull + expected / sd**2
         squares = float(expected @ expected) / sd**2 - float(pull @ np.linalg.solve(both, pull))
         return -len(expected) * float(np.log(sd)) - float(np.linalg.slogdet(both)[1]) / 2 - squares / 2
+
+
+def _told(fit: SharedFit, parameter: Parameter) -> list[_Told]:
+    """What each video tells of its bodies; nothing where too few bodies are told of."""
+    told = [one for index in range(len(fit.joint.videos)) if (one := _Told.of(fit, index, parameter)) is not None]
+    return told if sum(one.count for one in told) >= FEWEST else []
 
 
 def _middle(told: Sequence[_Told], log_sd: float, prior: Prior) -> float:
@@ -129,3 +155,43 @@ def _middle(told: Sequence[_Told], log_sd: float, prior: Prior) -> float:
         weight += len(ones) - float(ones @ shares[:, 0]) / variance
         pull += float(ones @ shares[:, 1])
     return pull / weight
+
+
+@dataclass(frozen=True)
+class _Joint:
+    """The Gaussian of the shared numbers, as standard normal coordinates of the fit, and of a middle of bodies, last.
+
+    Parameters
+    ----------
+    mean, covariance
+        Its mean and covariance.
+    """
+
+    mean: Float[np.ndarray, "number"]
+    covariance: Float[np.ndarray, "number number"]
+
+
+def _with_middle(fit: SharedFit, told: Sequence[_Told], sd: float, prior: Prior) -> _Joint:
+    """Shared numbers and the middle of bodies that spread by a standard deviation around it, all bodies integrated out.
+
+    What all bodies share may do what the middle does: a restitution that falls from a higher speed on is a higher
+    restitution. Given one the other is known far too well, and turn by turn they do not come to where both are best.
+    """
+    count = len(fit.joint.gaussian.mean)
+    precision = np.diag(np.append(np.ones(count), prior.sd**-2))
+    pull = np.append(np.zeros(count), prior.mean / prior.sd**2)
+    for one in told:
+        # A quadratic in the values, whose prior of the fit is replaced; written without differences of large numbers.
+        ones, width = np.ones(len(one.pull)), np.eye(len(one.pull)) / sd**2
+        narrower = width - np.diag(one.believed)
+        whole = one.precision + width
+        moved = np.linalg.solve(whole, (one.precision + np.diag(one.believed)) @ one.slope)
+        cross = -moved.T @ ones / sd**2
+        precision[:-1, :-1] += one.slope.T @ narrower @ moved
+        precision[:-1, -1] += cross
+        precision[-1, :-1] += cross
+        precision[-1, -1] += ones @ np.linalg.solve(whole, one.precision @ ones) / sd**2
+        pull[:-1] -= moved.T @ (narrower @ one.centre + one.believed * one.expected)
+        pull[-1] += ones @ np.linalg.solve(whole, one.pull) / sd**2
+    covariance = np.linalg.inv(precision)
+    return _Joint(covariance @ pull, covariance)

@@ -32,4 +32,5 @@ def refits_with(needed: float = 0.0) -> refits.Refits:
 def without_tracks(monkeypatch: pytest.MonkeyPatch) -> None:
     """No refit has tracks to look at, nor fits of videos that could be explained or not."""
     monkeypatch.setattr(refits.Refits, "_placed", lambda _self, _trial: [])
+    monkeypatch.setattr(refits.Refits, "_dropped", lambda _self, _trial: [])
     monkeypatch.setattr(refits, "trusted", lambda _fits: np.ones(4, dtype=bool))

@@ -87,9 +87,27 @@ def test_where_walls_that_tracks_show_are_plain_nothing_else_is_tried(
     monkeypatch.setattr(refits.Refits, "_placed", lambda _self, _trial: [Mock(seen=Mock(turns=turns))])
     monkeypatch.setattr(Extensions, "with_surfaces", lambda _self, _trial, _placed: walls)
     monkeypatch.setattr(refits.Refits, "_new", lambda _self, _trial: [drag])
-    monkeypatch.setattr(Leavings, "of", Mock())
+    monkeypatch.setattr(Leavings, "of", lambda _self, _trial: Mock(scores=[]))
     monkeypatch.setattr(refits.Refits, "doubted", lambda *_given: doubted)
     assert refits_with(needed=6.0).of(plain) == ([walls] if alone else [walls, drag])
+
+
+@pytest.mark.parametrize("leaves_nothing", [True, False])
+def test_beside_a_disc_that_tracks_show_and_that_leaves_nothing_only_what_else_was_met_is_tried(
+    *, leaves_nothing: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    nothing, disc, kicked, wall, drag = (
+        refit_with(*one) for one in (("", 0.0), ("disc", 20.0), ("kicks", 9.0), ("wall", 8.0), ("drag", 5.0))
+    )
+    kicks = Mock(spec=CauseScore, effect=ExternalImpulse(), sites=["somewhere"])
+    monkeypatch.setattr(refits.Refits, "_placed", lambda _self, _trial: [Mock(seen=Mock(turns=2))])
+    monkeypatch.setattr(Extensions, "with_surfaces", lambda _self, _trial, _placed: disc)
+    monkeypatch.setattr(Extensions, "made_of", lambda _self, _trial, scores: [kicked] if scores == [kicks] else [])
+    monkeypatch.setattr(refits.Refits, "_hidden", lambda _self, _trial, _found, _kicks: [wall])
+    monkeypatch.setattr(refits.Refits, "_new", lambda _self, _trial: [drag])
+    monkeypatch.setattr(refits.Refits, "settled", lambda _self, _trial, found: leaves_nothing and found == [disc])
+    monkeypatch.setattr(Leavings, "of", lambda _self, _trial: Mock(scores=[kicks]))
+    assert refits_with(needed=6.0).of(nothing) == ([disc, kicked, wall] if leaves_nothing else [disc, drag])
 
 
 @pytest.mark.parametrize(("turns", "on"), [(6, True), (2, False)], ids=["plain", "of few turns"])
@@ -104,7 +122,7 @@ def test_walls_that_tracks_show_plainly_are_gone_on_from_whatever_they_leave(
     monkeypatch.setattr(Extensions, "with_surfaces", lambda _self, _trial, _placed: floor)
     monkeypatch.setattr(refits.Refits, "_new", lambda _self, _trial: [])
     monkeypatch.setattr(refits.Refits, "doubted", lambda *_given: True)
-    monkeypatch.setattr(Leavings, "of", Mock())
+    monkeypatch.setattr(Leavings, "of", lambda _self, _trial: Mock(scores=[]))
     monkeypatch.setattr(extensions, "mends_any_course", lambda _cause: False)
     monkeypatch.setattr(refits, "happens_once", lambda _cause: False)
     made = refits_with(needed=6.0)

@@ -126,6 +126,15 @@ def test_a_pillar_is_seen_as_a_circle_and_not_as_walls() -> None:
     assert (found[0].x, found[0].y, found[0].radius) == pytest.approx((PILLAR.x, PILLAR.y, PILLAR.radius), abs=0.02)
 
 
+def test_a_pillar_that_is_met_twice_is_seen() -> None:
+    once = [one for one in table(hidden=False, discs=(PILLAR,), count=6) if len(sudden_turns([one])) == 1]
+    (found,) = seen_surfaces(once[:2])
+    assert found.turns == 2
+    assert isinstance(found.surface, Circle)
+    assert found.surface.values == pytest.approx((PILLAR.x, PILLAR.y, PILLAR.radius), abs=0.03)
+    assert seen_surfaces(once[:1]) == []
+
+
 def test_a_floor_is_seen_where_bodies_fall_on_it() -> None:
     (found,) = seen_surfaces(floor())
     line = found.surface

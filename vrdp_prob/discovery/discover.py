@@ -7,6 +7,8 @@ from pathlib import Path
 import numpy as np
 
 from vrdp_prob.datasets.folder import some
+from vrdp_prob.discovery.candidates.dropped_frames import frames_unknown_to
+from vrdp_prob.discovery.candidates.surfaces import surfaces_unknown_to
 from vrdp_prob.discovery.checking import FEWEST_VIDEOS, check_video_count
 from vrdp_prob.discovery.describe import describe
 from vrdp_prob.discovery.finding import Finding, FoundCause, UpperBound, Verdict
@@ -103,7 +105,7 @@ def discover(
     timed = videos if _reads_stamps((*physics.effects, *looked_for)) else _from_first_frames(videos)
     with several_processes(processes), journal(own):
         fit = fit_together(timed, model=physics, seed=seed, model_error=False, progress=progress)
-        if loses_single_videos(fit.fits):
+        if loses_single_videos(fit.fits) and not _tracks_show_why(fit, looked_for):
             with (progress or SilentProgress()).stage("Searching lost videos anew"):
                 fit = fit.with_lost_courses(seed=seed)
         outcome = _of_better_courses(
@@ -142,6 +144,11 @@ def discover(
         tried=tuple(tried),
         gain=outcome.gain,
     )
+
+
+def _tracks_show_why(fit: SharedFit, catalogue: Sequence[Effect]) -> bool:
+    """Whether tracks themselves show what videos are lost for, so that the model explains them on no course."""
+    return bool(surfaces_unknown_to(fit, catalogue) or frames_unknown_to(fit, catalogue))
 
 
 def _of_better_courses(

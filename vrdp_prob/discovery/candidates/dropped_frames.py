@@ -9,7 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from vrdp_prob.models.effects.dropped_frames import MOST_DROPPED
+from vrdp_prob.inference.several_videos.fitting import SharedFit
+from vrdp_prob.models.effects.dropped_frames import MOST_DROPPED, DroppedFrames
+from vrdp_prob.models.effects.effect import Effect
 from vrdp_prob.models.roughness import noise_scale
 from vrdp_prob.scene import Tracks
 
@@ -48,6 +50,16 @@ class Dropped:
         """The tracks at the times at which they were taken."""
         late = np.searchsorted(np.array(self.after), tracks.times) * self.frame_time
         return tracks.at_times(tracks.times + late)
+
+
+def frames_unknown_to(fit: SharedFit, catalogue: Sequence[Effect]) -> list[Dropped]:
+    """Frames that tracks show to be missing again and again, where nothing in the model of a fit shifts the clock.
+
+    None where they are not looked for.
+    """
+    looked_for = any(isinstance(effect, DroppedFrames) for effect in catalogue)
+    shifted = any(effect.overrides("measured_times") for effect in fit.model.effects)
+    return dropped_frames(fit.tracks) if looked_for and not shifted else []
 
 
 def dropped_frames(videos: Sequence[Tracks]) -> list[Dropped]:

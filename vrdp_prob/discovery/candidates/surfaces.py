@@ -12,6 +12,7 @@ from scipy.optimize import least_squares
 from scipy.spatial.distance import pdist
 
 from vrdp_prob.discovery.candidates.turns import Turn, sudden_turns
+from vrdp_prob.inference.several_videos.fitting import SharedFit
 from vrdp_prob.models.effects.effect import Effect
 from vrdp_prob.models.effects.hidden_obstacle import HiddenObstacle
 from vrdp_prob.models.effects.places import Region, paths_of_bodies
@@ -21,8 +22,8 @@ from vrdp_prob.models.roughness import noise_scale
 from vrdp_prob.scene import Tracks
 from vrdp_prob.scene import Wall as SceneWall
 
-FEWEST_AT_WALL, FEWEST_AT_DISC = 2, 3
-"""Turns that a wall, and a disc, must explain: a single one has any number of either."""
+FEWEST = 2
+"""Turns that a wall or a disc must explain: a single one has any number of either."""
 MOST_TURNS = 200
 """Turns, the plainest first, that are looked at."""
 MOST_OF_THEM = 2 / 3
@@ -137,13 +138,12 @@ class Seen:
 def seen_surfaces(videos: Sequence[Tracks]) -> list[Seen]:
     """What bodies bounce off, that which explains most turns first."""
     seen = sudden_turns(videos)[:MOST_TURNS]
-    if len(seen) < FEWEST_AT_WALL:
+    if len(seen) < FEWEST:
         return []
     paths, edges, largest = paths_of_bodies(videos), _Edges.of(seen), Region.of(videos).half_width
     # Sorting is stable: of those that explain equally many a wall comes before a disc, which has more parameters.
     candidates: list[Surface] = [*_lines(seen), *_circles(seen, largest)]
     met = np.array([edges.met(one) for one in candidates])
-    fewest = np.array([FEWEST_AT_WALL if isinstance(one, Line) else FEWEST_AT_DISC for one in candidates])
     left, found = np.ones(len(seen), dtype=bool), list[Seen]()
 
     @cache
@@ -152,7 +152,7 @@ def seen_surfaces(videos: Sequence[Tracks]) -> list[Seen]:
 
     while True:
         counts = (met & left).sum(axis=1)
-        ranked = [k for k in np.argsort(-counts, kind="stable").tolist() if counts[k] >= fewest[k]]
+        ranked = [k for k in np.argsort(-counts, kind="stable").tolist() if counts[k] >= FEWEST]
         chosen = next((k for k in ranked if not crossed(k)), None)
         if chosen is None:
             return found
@@ -199,6 +199,13 @@ class Placed:
         """The same as beliefs, with which a search begins."""
         numbers = zip(self.effect.parameters[:-1], self.seen.surface.values, self.seen.spread, strict=True)
         return {one.name: _around(one, value, sd) for one, value, sd in numbers}
+
+
+def surfaces_unknown_to(fit: SharedFit, catalogue: Sequence[Effect]) -> list[Placed]:
+    """Walls and discs of a catalogue that the tracks show, where nothing unseen is in the model of a fit."""
+    if any(effect.overrides("obstacles") for effect in fit.model.effects):
+        return []
+    return placed_surfaces(fit.tracks, catalogue)
 
 
 def placed_surfaces(videos: Sequence[Tracks], catalogue: Sequence[Effect]) -> list[Placed]:

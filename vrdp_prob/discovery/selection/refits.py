@@ -7,10 +7,10 @@ from functools import cached_property, partial
 import numpy as np
 from jaxtyping import Float
 
-from vrdp_prob.discovery.candidates.dropped_frames import Dropped, dropped_frames
+from vrdp_prob.discovery.candidates.dropped_frames import Dropped, frames_unknown_to
 from vrdp_prob.discovery.candidates.scores import CauseScore, happens_once, mends_any_course
 from vrdp_prob.discovery.candidates.single_videos import causes_of_lost_videos
-from vrdp_prob.discovery.candidates.surfaces import Placed, placed_surfaces
+from vrdp_prob.discovery.candidates.surfaces import Placed, surfaces_unknown_to
 from vrdp_prob.discovery.selection.courses import Courses
 from vrdp_prob.discovery.selection.doubts import HELD_BY_BODIES, causes_with_own_check_failing
 from vrdp_prob.discovery.selection.extensions import Extensions, explaining
@@ -25,7 +25,6 @@ from vrdp_prob.inference.several_videos.second_look import (
     outweigh,
     trusted,
 )
-from vrdp_prob.models.effects.dropped_frames import DroppedFrames
 from vrdp_prob.models.effects.effect import Effect
 from vrdp_prob.models.effects.external_impulse import ExternalImpulse
 from vrdp_prob.progress import Advance
@@ -97,8 +96,7 @@ class Refits:
             found = [one for one in (taken, met) if one is not None]
             plain = sum(one.seen.turns for one in placed) >= PLAIN_TURNS
             self._shown[trial] = [one.effect for one in placed] if plain else []
-            alone = plain and met is not None and not self.doubted(met, trial, self.leavings.of(met).overdispersion)
-            self._keep(trial, found if alone else [*found, *self._new(trial)])
+            self._keep(trial, [*found, *(self._new(trial) if met is None else self._beside(met, trial, plain=plain))])
         return self._made[trial]
 
     def made(self, trial: Trial) -> list[Trial]:
@@ -134,10 +132,23 @@ class Refits:
             found += self.extensions.made_of(trial, [one for one in likely if one not in close], beside=found)
             found.sort(key=merit, reverse=True)
         found = self._with_traced(trial, found)
-        kicks = next((one for one in scores if _kicks(one) and one.sites), None)
+        kicks = _kicks_among(scores)
         if kicks is not None and (not found or found[0].causes[-1].name == kicks.effect.name):
             found += self._hidden(trial, found, kicks)
         return found
+
+    def _beside(self, met: Trial, trial: Trial, *, plain: bool) -> list[Trial]:
+        """Refits beside walls and discs that the tracks show: none where these are plain.
+
+        Where they leave nothing, no law does what they do, but what else bodies may have met there.
+        """
+        if plain and not self.doubted(met, trial, self.leavings.of(met).overdispersion):
+            return []
+        kicks = _kicks_among(self.leavings.of(trial).scores)
+        if kicks is None or not self.settled(trial, [met]):
+            return self._new(trial)
+        kicked = self.extensions.made_of(trial, [kicks])
+        return [*kicked, *self._hidden(trial, kicked, kicks)]
 
     def _with_traced(self, trial: Trial, found: Sequence[Trial]) -> list[Trial]:
         """Refits, the best first; where none explains enough, with causes, too, for whose own traces a check fails.
@@ -320,17 +331,12 @@ class Refits:
         return bool(further) and all(trial.may_vanish(cause, divisor) for cause in further)
 
     def _placed(self, trial: Trial) -> list[Placed]:
-        """Walls and discs that the tracks show, before any cause was found, where nothing unseen is in the model."""
-        if trial.causes or any(effect.overrides("obstacles") for effect in trial.fit.model.effects):
-            return []
-        return placed_surfaces([part.clues.tracks for part in trial.fit.fits], self.catalogue)
+        """Walls and discs that the tracks show, before any cause was found."""
+        return [] if trial.causes else surfaces_unknown_to(trial.fit, self.catalogue)
 
     def _dropped(self, trial: Trial) -> list[Dropped]:
-        """Frames that tracks show to be missing again and again, where nothing in the model shifts the clock."""
-        if not any(isinstance(effect, DroppedFrames) for effect in self.catalogue):
-            return []
-        shifted = any(effect.overrides("measured_times") for effect in trial.fit.model.effects)
-        return [] if shifted else dropped_frames(trial.fit.tracks)
+        """Frames that the tracks show to be missing again and again."""
+        return frames_unknown_to(trial.fit, self.catalogue)
 
     def _hidden(self, trial: Trial, found: Sequence[Trial], kicks: CauseScore) -> list[Trial]:
         """Fits with something unseen in the place of kicks."""
@@ -348,6 +354,11 @@ def _mends_several(trial: Trial) -> bool:
     """Whether the last cause of a model mends any course, and does so in several videos."""
     cause = trial.causes[-1]
     return mends_any_course(cause) and len(trial.acting(cause)) > 1
+
+
+def _kicks_among(scores: Sequence[CauseScore]) -> CauseScore | None:
+    """The score of kicks that have places."""
+    return next((one for one in scores if _kicks(one) and one.sites), None)
 
 
 def _kicks(score: CauseScore) -> bool:

@@ -102,6 +102,17 @@ def test_among_all_causes_of_the_catalogue_dropped_frames_are_named(tmp_path: Pa
     assert interval.q025 < 1 / truth.videos[0].frame_rate < interval.q975
 
 
+def test_restitution_by_speed_is_named_from_six_contacts(tmp_path: Path) -> None:
+    """What it does is nearly what the middle of restitutions does, which is learned from the same contacts."""
+    truth, finding = finding_of(
+        tmp_path, ["speed_dependent_restitution"], seed=2, effect_size=3.0, setting=Setting(videos=6, bodies=2)
+    )
+    assert [cause.name for cause in finding.causes if cause.named] == ["speed_dependent_restitution"]
+    exponent = finding.causes[0].parameters["restitution_exponent"]
+    assert exponent.q025 < truth.causes[0].strength < exponent.q975
+    assert exponent.q975 - exponent.q025 > 0.3  # it is known by no more than six contacts tell
+
+
 def test_a_check_shows_it(tilted: tuple[Truth, Finding]) -> None:
     _, finding = tilted
     assert next(check for check in finding.checks if check.name == "push in one direction").significant

@@ -92,14 +92,20 @@ def test_where_walls_that_tracks_show_are_plain_nothing_else_is_tried(
     assert refits_with(needed=6.0).of(plain) == ([walls] if alone else [walls, drag])
 
 
-@pytest.mark.parametrize("leaves_nothing", [True, False])
-def test_beside_a_disc_that_tracks_show_and_that_leaves_nothing_only_what_else_was_met_is_tried(
-    *, leaves_nothing: bool, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize(
+    ("lost", "still_lost", "leaves_nothing", "is_enough"),
+    [([], [], True, True), ([1], [], False, True), ([1], [1], False, False), ([], [], False, False)],
+    ids=["leaves nothing", "finds lost videos", "does not", "none was lost"],
+)
+def test_beside_a_disc_that_tracks_show_and_that_does_what_no_law_does_only_what_else_was_met_is_tried(
+    lost: list[int], still_lost: list[int], *, leaves_nothing: bool, is_enough: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     nothing, disc, kicked, wall, drag = (
         refit_with(*one) for one in (("", 0.0), ("disc", 20.0), ("kicks", 9.0), ("wall", 8.0), ("drag", 5.0))
     )
     kicks = Mock(spec=CauseScore, effect=ExternalImpulse(), sites=["somewhere"])
+    nothing.fit.fits, disc.fit.fits = lost, still_lost
+    monkeypatch.setattr(refits, "lost_videos", lambda fits: fits)
     monkeypatch.setattr(refits.Refits, "_placed", lambda _self, _trial: [Mock(seen=Mock(turns=2))])
     monkeypatch.setattr(Extensions, "with_surfaces", lambda _self, _trial, _placed: disc)
     monkeypatch.setattr(Extensions, "made_of", lambda _self, _trial, scores: [kicked] if scores == [kicks] else [])
@@ -107,7 +113,7 @@ def test_beside_a_disc_that_tracks_show_and_that_leaves_nothing_only_what_else_w
     monkeypatch.setattr(refits.Refits, "_new", lambda _self, _trial: [drag])
     monkeypatch.setattr(refits.Refits, "settled", lambda _self, _trial, found: leaves_nothing and found == [disc])
     monkeypatch.setattr(Leavings, "of", lambda _self, _trial: Mock(scores=[kicks]))
-    assert refits_with(needed=6.0).of(nothing) == ([disc, kicked, wall] if leaves_nothing else [disc, drag])
+    assert refits_with(needed=6.0).of(nothing) == ([disc, kicked, wall] if is_enough else [disc, drag])
 
 
 @pytest.mark.parametrize(("turns", "on"), [(6, True), (2, False)], ids=["plain", "of few turns"])

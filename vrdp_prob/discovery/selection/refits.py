@@ -140,12 +140,14 @@ class Refits:
     def _beside(self, met: Trial, trial: Trial, *, plain: bool) -> list[Trial]:
         """Refits beside walls and discs that the tracks show: none where these are plain.
 
-        Where they leave nothing, no law does what they do, but what else bodies may have met there.
+        Where they leave nothing, or no video lost that was, no law does what they do, but what else bodies may have met
+        there. What laws do beside them is asked of the model that has them.
         """
         if plain and not self.doubted(met, trial, self.leavings.of(met).overdispersion):
             return []
         kicks = _kicks_among(self.leavings.of(trial).scores)
-        if kicks is None or not self.settled(trial, [met]):
+        found_again = bool(lost_videos(trial.fit.fits)) and not lost_videos(met.fit.fits)
+        if kicks is None or not (found_again or self.settled(trial, [met])):
             return self._new(trial)
         kicked = self.extensions.made_of(trial, [kicks])
         return [*kicked, *self._hidden(trial, kicked, kicks)]

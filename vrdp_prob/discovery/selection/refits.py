@@ -146,8 +146,7 @@ class Refits:
         if plain and not self.doubted(met, trial, self.leavings.of(met).overdispersion):
             return []
         kicks = _kicks_among(self.leavings.of(trial).scores)
-        found_again = bool(lost_videos(trial.fit.fits)) and not lost_videos(met.fit.fits)
-        if kicks is None or not (found_again or self.settled(trial, [met])):
+        if kicks is None or not (_finds_lost_videos(met, trial) or self.settled(trial, [met])):
             return self._new(trial)
         kicked = self.extensions.made_of(trial, [kicks])
         return [*kicked, *self._hidden(trial, kicked, kicks)]
@@ -356,6 +355,11 @@ def _mends_several(trial: Trial) -> bool:
     """Whether the last cause of a model mends any course, and does so in several videos."""
     cause = trial.causes[-1]
     return mends_any_course(cause) and len(trial.acting(cause)) > 1
+
+
+def _finds_lost_videos(one: Trial, trial: Trial) -> bool:
+    """Whether a model has lost videos, and one with more has none."""
+    return bool(lost_videos(trial.fit.fits)) and not lost_videos(one.fit.fits)
 
 
 def _kicks_among(scores: Sequence[CauseScore]) -> CauseScore | None:

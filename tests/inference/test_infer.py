@@ -21,9 +21,10 @@ from vrdp_prob.inference import (
     identified,
     infer,
 )
+from vrdp_prob.inference.several_videos import fit_together
 from vrdp_prob.models.parameters import RESTITUTION
 from vrdp_prob.models.simulator.rollout import simulate
-from vrdp_prob.scene import Shape, Tracks
+from vrdp_prob.scene import Body, Shape, Tracks, Wall
 
 
 def chain() -> Scene:
@@ -304,3 +305,17 @@ def test_groups_say_what_collisions_determine_and_survive_a_file(tmp_path: Path)
     assert not determined["mass scale of objects 0, 1 and 2"]
     posterior.write(tmp_path / "posterior.nc")
     assert Posterior.read(tmp_path / "posterior.nc").groups == posterior.groups
+
+
+def test_bodies_that_begin_in_a_wall_are_told_of_where_no_world_begins_so() -> None:
+    """By a share of its radius that may be wrong, and by far more than the noise."""
+    seconds = np.arange(40) / 25
+    noise = 0.0003 * np.random.default_rng(0).standard_normal((40, 1, 2))
+    places = np.stack([0.84 - 0.5 * seconds + 0.05 * seconds**2, 0.1 * seconds], axis=1)[:, None] + noise
+    tracks = Tracks.from_arrays(
+        "near", (Body("a", Shape.SPHERE, 0.2),), seconds, places, walls=(Wall(1.0, -2.0, 1.0, 2.0),)
+    )
+    with pytest.raises(InputError, match=r"near: no world .* object a overlaps the wall .* leave the video out"):
+        infer(tracks)
+    with pytest.raises(InputError, match=r"near: no world .* object a overlaps the wall"):
+        fit_together([tracks], model=default_model())

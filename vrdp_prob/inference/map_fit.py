@@ -51,6 +51,10 @@ MAY_CATCH_UP = 15.0
 """Nats that a start may gain on the best one after the first turn of a refinement."""
 
 
+class NoWorldError(InputError):
+    """No world of the model is like the tracks, whatever its numbers."""
+
+
 @dataclass(frozen=True)
 class MapFit:
     """The most probable values and the Gaussian around them.
@@ -154,6 +158,8 @@ def fit_map(
     ------
     InputError
         If no object moves.
+    NoWorldError
+        If no world begins as the tracks do, in which bodies overlap, say; that is an `InputError`, too.
     """
     clues = Clues.of(tracks)
     if not clues.show_motion:
@@ -168,7 +174,7 @@ def fit_map(
     structure = structure_at(everything, starts, known)
     likelihood = Likelihood(tracks, model, unknowns(tracks, model, structure, family), family)
     refined = partial(_refined, plan=stages)
-    found = refined(everything, starts, likelihood)
+    found = _possible(tracks, refined(everything, starts, likelihood))
     evaluations = sum(one.evaluations for one in attempts) + sum(one.evaluations for one in found)
     if stages.alternatives and stages.yaws:
         turned = with_other_yaws(
@@ -212,6 +218,17 @@ def fit_map(
     converged = at_the_top(found, climbed)
     search = ModeSearch(stages.alternatives, len(attempts), not _in_doubt(attempts), all_orders)
     return MapFit(likelihood, modes, converged, search, clues, misfit, evaluations, believed_at_rest)
+
+
+def _possible(tracks: Tracks, found: list[Refined]) -> list[Refined]:
+    """What was found of some tracks, if any of it is possible."""
+    if np.isfinite(found[0].log_density):
+        return found
+    overlaps = tracks.overlaps()
+    why = f"{'; '.join(overlaps)}; check positions and radii" if overlaps else "check positions, radii and walls"
+    raise NoWorldError(
+        f"{tracks.video}: no world of the model begins as its bodies are first seen: {why}, or leave the video out."
+    )
 
 
 def _refined(

@@ -1,5 +1,6 @@
 """Measured positions of the objects of one video."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -67,7 +68,6 @@ class Tracks:
         self._check_values()
         self._check_angles()
         self._check_overlap()
-        self._check_walls()
 
     @classmethod
     def from_arrays(
@@ -289,7 +289,20 @@ class Tracks:
         differences = np.einsum("wf,wfa->wa", third_difference(self.times[windows]), self.positions[windows, body])
         return float(np.median(np.abs(differences), axis=0).max()) / NORMAL_MAD
 
+    def overlaps(self) -> list[str]:
+        """What overlaps where bodies are first seen, each in words: bodies with one another, and with walls."""
+        return [one.words for one in (*self._closest_bodies(), *self._closest_walls()) if one.missing(0.0) > 0]
+
     def _check_overlap(self) -> None:
+        kinds = {"positions and radii": self._closest_bodies(), "positions, radii and walls": self._closest_walls()}
+        for kind, some in kinds.items():
+            for one in some:
+                missing = one.missing(OVERLAP_TOLERANCE)
+                if missing > 0 and missing > OVERLAP_NOISE * one.noise:
+                    raise InputError(f"{self.video}: {one.words}; check {kind}.")
+
+    def _closest_bodies(self) -> Iterator["_Closeness"]:
+        """How close each two bodies are where both are first seen."""
         seen, positions = self.seen, self.positions
         for i, first in enumerate(self.bodies):
             for j in range(i + 1, len(self.bodies)):
@@ -299,28 +312,41 @@ class Tracks:
                     continue
                 frame = int(together.argmax())
                 distance = float(np.linalg.norm(positions[frame, i] - positions[frame, j]))
-                missing = (1 - OVERLAP_TOLERANCE) * (first.radius + second.radius) - distance
-                if missing > 0 and missing > OVERLAP_NOISE * np.hypot(self._noise(i), self._noise(j)):
-                    raise InputError(
-                        f"{self.video}: objects {first.id} and {second.id} overlap at {self.times[frame]:g} s "
-                        f"(centres {distance:.3g} m apart, radii {first.radius:g} and {second.radius:g} m); "
-                        "check positions and radii."
-                    )
+                words = (
+                    f"objects {first.id} and {second.id} overlap at {self.times[frame]:g} s "
+                    f"(centres {distance:.3g} m apart, radii {first.radius:g} and {second.radius:g} m)"
+                )
+                noise = float(np.hypot(self._noise(i), self._noise(j)))
+                yield _Closeness(distance, first.radius + second.radius, noise, words)
 
-    def _check_walls(self) -> None:
+    def _closest_walls(self) -> Iterator["_Closeness"]:
+        """How close each body is to each wall where it is first seen."""
         for index, body in enumerate(self.bodies):
             if body.radius is None:
                 continue
             frame = int(self.seen[:, index].argmax())
             for wall in self.walls:
                 distance = wall.distance(self.positions[frame, index])
-                missing = (1 - OVERLAP_TOLERANCE) * body.radius - distance
-                if missing > 0 and missing > OVERLAP_NOISE * self._noise(index):
-                    raise InputError(
-                        f"{self.video}: object {body.id} overlaps the wall from ({wall.x1:g}, {wall.y1:g}) to "
-                        f"({wall.x2:g}, {wall.y2:g}) m at {self.times[frame]:g} s (centre {distance:.3g} m from "
-                        f"it, radius {body.radius:g} m); check positions, radii and walls."
-                    )
+                words = (
+                    f"object {body.id} overlaps the wall from ({wall.x1:g}, {wall.y1:g}) to "
+                    f"({wall.x2:g}, {wall.y2:g}) m at {self.times[frame]:g} s (centre {distance:.3g} m from it, "
+                    f"radius {body.radius:g} m)"
+                )
+                yield _Closeness(distance, body.radius, self._noise(index), words)
+
+
+@dataclass(frozen=True)
+class _Closeness:
+    """How close two things are, whose radii add up to `reach` (m), with which noise, and all of it in words."""
+
+    distance: float
+    reach: float
+    noise: float
+    words: str
+
+    def missing(self, tolerance: float) -> float:
+        """Distance in m that is missing to their touching, if a share of the reach may be wrong."""
+        return (1 - tolerance) * self.reach - self.distance
 
 
 def _mean_variance(covariance: Float[np.ndarray, "time body 2 2"]) -> Float[np.ndarray, "time body"]:

@@ -10,7 +10,7 @@ import numpy as np
 
 from vrdp_prob.errors import InputError
 from vrdp_prob.inference.draws.mode import Mode
-from vrdp_prob.inference.map_fit import MapFit
+from vrdp_prob.inference.map_fit import MapFit, NoWorldError
 from vrdp_prob.inference.runs.journal import kept
 from vrdp_prob.inference.runs.parallel import in_processes
 from vrdp_prob.inference.search.clues import Clues
@@ -330,7 +330,10 @@ def fit_together(
         plan = FitPlan() if model_error else IN_DOUBT
     with (progress or SilentProgress()).stage("Fitting each video (MAP)", total=len(videos)) as advance:
         fitted = partial(fit_alone, model=model, seed=seed, plan=plan, model_error=model_error)
-        alone = in_processes(fitted, videos, advance=advance)
+        try:
+            alone = in_processes(fitted, videos, advance=advance)
+        except NoWorldError as error:
+            raise NoCommonWorldError(str(error)) from error
         try:
             fits, joint = joined(alone, model, shared, seed=seed, plan=plan)
         except ImpossibleStartError as error:

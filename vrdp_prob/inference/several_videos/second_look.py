@@ -10,7 +10,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from jaxtyping import Bool
 
-from vrdp_prob.inference.map_fit import MapFit, fit_map
+from vrdp_prob.inference.map_fit import MapFit, NoWorldError, fit_map
 from vrdp_prob.inference.runs.parallel import in_processes
 from vrdp_prob.inference.search.plan import IN_DOUBT, TURNING, FitPlan, Optimiser
 from vrdp_prob.inference.several_videos.agreement import consensus
@@ -273,7 +273,10 @@ class _Look:
         tracks = doubted.fit.clues.tracks
         generator = stream(self.seed, f"{tracks.video} {look}")
         model = self.told if believing else self.model
-        return fit_map(tracks, model, generator, plan=plan, model_error=False, held=doubted.held)
+        try:
+            return fit_map(tracks, model, generator, plan=plan, model_error=False, held=doubted.held)
+        except NoWorldError:  # the others say what this video cannot be
+            return doubted.fit
 
     def _take(self, one: "_Looked") -> None:
         """Take what was made of a video, in the order of the looks, as far as that is known."""

@@ -10,7 +10,7 @@ import pytest
 from tests.discovery.data_set import draw
 from tests.inference.several_videos.videos import colliding, sliding
 from vrdp_prob.inference.infer import default_model
-from vrdp_prob.inference.map_fit import MapFit, fit_map
+from vrdp_prob.inference.map_fit import MapFit, NoWorldError, fit_map
 from vrdp_prob.inference.runs.parallel import several_processes
 from vrdp_prob.inference.search.plan import IN_DOUBT, TURNING, FitPlan
 from vrdp_prob.inference.several_videos import second_look
@@ -24,6 +24,7 @@ from vrdp_prob.models.likelihood import Likelihood
 from vrdp_prob.models.parameters import SLIDING_FRICTION, Prior, Transform
 from vrdp_prob.models.physics import PhysicsModel
 from vrdp_prob.models.unknowns import Held
+from vrdp_prob.scene import Tracks
 
 SHARPNESS = 1e5
 """One over the standard deviation of the direction that is known best."""
@@ -127,6 +128,26 @@ def test_cubes_of_a_video_that_was_lost_are_turned_on_where_it_is_explained(
     with several_processes(1):
         look_again(fits, [0], default_model(), None, seed=0, thorough=True)
     assert [plan.like_noise for plan in made if plan.yaws] == [like_noise]
+
+
+def test_a_look_at_a_video_that_no_world_is_like_leaves_its_fit(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A wall that is tried may stand where a body begins."""
+    fits = [
+        fit_map(one, default_model(), stream(0, one.video), plan=IN_DOUBT, model_error=False)
+        for one in (colliding(0), sliding(1))
+    ]
+    fits[0] = replace(fits[0], misfit=replace(fits[0].misfit, residual_sd=3 * fits[0].misfit.residual_sd))
+    looks: list[str] = []
+
+    def impossible(tracks: Tracks, *_given: object, **_how: object) -> MapFit:
+        looks.append(tracks.video)
+        raise NoWorldError("no world")
+
+    monkeypatch.setattr(second_look, "fit_map", impossible)
+    with several_processes(1):
+        found = look_again(fits, [0], default_model(), None, seed=0)
+    assert looks
+    assert found[0] is fits[0]
 
 
 @pytest.mark.parametrize(

@@ -1,5 +1,6 @@
 """Measured positions of the objects of one video."""
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
@@ -298,7 +299,7 @@ class Tracks:
         for kind, some in kinds.items():
             for one in some:
                 missing = one.missing(OVERLAP_TOLERANCE)
-                if missing > 0 and missing > OVERLAP_NOISE * one.noise:
+                if missing > 0 and missing > OVERLAP_NOISE * math.hypot(*map(self._noise, one.bodies)):
                     raise InputError(f"{self.video}: {one.words}; check {kind}.")
 
     def _closest_bodies(self) -> Iterator["_Closeness"]:
@@ -316,8 +317,7 @@ class Tracks:
                     f"objects {first.id} and {second.id} overlap at {self.times[frame]:g} s "
                     f"(centres {distance:.3g} m apart, radii {first.radius:g} and {second.radius:g} m)"
                 )
-                noise = float(np.hypot(self._noise(i), self._noise(j)))
-                yield _Closeness(distance, first.radius + second.radius, noise, words)
+                yield _Closeness((i, j), distance, first.radius + second.radius, words)
 
     def _closest_walls(self) -> Iterator["_Closeness"]:
         """How close each body is to each wall where it is first seen."""
@@ -332,16 +332,16 @@ class Tracks:
                     f"({wall.x2:g}, {wall.y2:g}) m at {self.times[frame]:g} s (centre {distance:.3g} m from it, "
                     f"radius {body.radius:g} m)"
                 )
-                yield _Closeness(distance, body.radius, self._noise(index), words)
+                yield _Closeness((index,), distance, body.radius, words)
 
 
 @dataclass(frozen=True)
 class _Closeness:
-    """How close two things are, whose radii add up to `reach` (m), with which noise, and all of it in words."""
+    """How close two things are, whose radii add up to `reach` (m), which of them are bodies, and all of it in words."""
 
+    bodies: tuple[int, ...]
     distance: float
     reach: float
-    noise: float
     words: str
 
     def missing(self, tolerance: float) -> float:

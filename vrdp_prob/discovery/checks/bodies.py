@@ -37,20 +37,24 @@ def body_checks(fit: SharedFit, model: ResidualModel) -> Iterator[Check]:
 
 
 def _restitution_check(rebounds: Rebounds) -> Iterator[Check]:
-    speed = np.log(rebounds.closing_speed)
+    if not len(rebounds.closing_speed):
+        return
+    # Below the usual speed a fall ends in the laws of impact; and how fast the slowest met is known least of all.
+    usual = float(np.median(rebounds.closing_speed))
+    speed = np.log1p(rebounds.closing_speed / usual)
     known = np.ones((len(speed), 1))
     found = dependence(rebounds.logarithm, rebounds.covariance, rebounds.owners, known, speed[:, None])
     if found is None:
         return
     slope, sd = float(found.slope[0]), float(found.sd[0])
-    slow, fast = np.exp(np.quantile(speed, [0.1, 0.9]))
-    middle = float(np.exp(np.average(rebounds.logarithm)))
-    low, high = (middle * (v / np.exp(speed.mean())) ** slope for v in (slow, fast))
+    slow, fast = np.quantile(rebounds.closing_speed, [0.1, 0.9]).tolist()
+    middle = float(rebounds.logarithm.mean())
+    low, high = (float(np.exp(middle + slope * (np.log1p(v / usual) - speed.mean()))) for v in (slow, fast))
     sentence = (
         f"Restitution {opposite(slope, 'falls', 'grows')} with the approach speed: {number(low)} at {number(slow)} "
         f"m/s, {number(high)} at {number(fast)} m/s."
         if found.p_value < SEEN
-        else f"Nothing seen; a power of {number(NORMAL_95 * sd)} of the approach speed would have shown."
+        else f"Nothing seen; a power of {number(NORMAL_95 * sd)} of speeds beyond {number(usual)} m/s would have shown."
     )
     yield Check(REBOUND, slope, found.p_value, False, sentence)
 

@@ -59,8 +59,9 @@ def with_learned_spread(fit: SharedFit, parameter: Parameter, *, mean: bool = Fa
         return believed
 
     def cost(log_sd: float) -> float:
-        middle = _middle(told, log_sd, parameter.prior) if mean else None
-        return -sum(one.log_evidence(middle, float(np.exp(log_sd))) for one in told)
+        sd = float(np.exp(log_sd))
+        middle = _middle(told, sd, parameter.prior) if mean else None
+        return -sum(one.log_evidence(middle, sd) for one in told)
 
     bounds = (float(np.log(SMALLEST * parameter.prior.sd)), float(np.log(LARGEST * parameter.prior.sd)))
     log_sd = float(minimize_scalar(cost, bounds=bounds, method="bounded").x)
@@ -137,6 +138,13 @@ class _Told:
         squares = float(expected @ expected) / sd**2 - float(pull @ np.linalg.solve(both, pull))
         return -len(expected) * float(np.log(sd)) - float(np.linalg.slogdet(both)[1]) / 2 - squares / 2
 
+    def of_middle(self, sd: float) -> tuple[float, float]:
+        """Precision and pull of the middle around which values spread by `sd`, given the shared numbers."""
+        ones = np.ones(len(self.pull))
+        both = self.precision + np.eye(len(ones)) / sd**2
+        precision, pull = ones @ np.linalg.solve(both, np.stack([self.precision @ ones, self.pull], axis=1)) / sd**2
+        return float(precision), float(pull)
+
 
 def _told(fit: SharedFit, parameter: Parameter) -> list[_Told]:
     """What each video tells of its bodies; nothing where too few bodies are told of."""
@@ -144,17 +152,10 @@ def _told(fit: SharedFit, parameter: Parameter) -> list[_Told]:
     return told if sum(one.count for one in told) >= FEWEST else []
 
 
-def _middle(told: Sequence[_Told], log_sd: float, prior: Prior) -> float:
-    """Most probable middle of bodies that spread by a standard deviation around it."""
-    variance = float(np.exp(2 * log_sd))
-    weight = variance / prior.sd**2
-    pull = weight * prior.mean
-    for one in told:
-        ones = np.ones(len(one.pull))
-        shares = np.linalg.solve(one.precision + np.eye(len(ones)) / variance, np.stack([ones, one.pull], axis=1))
-        weight += len(ones) - float(ones @ shares[:, 0]) / variance
-        pull += float(ones @ shares[:, 1])
-    return pull / weight
+def _middle(told: Sequence[_Told], sd: float, prior: Prior) -> float:
+    """Most probable middle of bodies that spread by a standard deviation around it, given the shared numbers."""
+    tells = [(prior.sd**-2, prior.mean / prior.sd**2), *(one.of_middle(sd) for one in told)]
+    return sum(pull for _, pull in tells) / sum(precision for precision, _ in tells)
 
 
 @dataclass(frozen=True)
@@ -182,16 +183,15 @@ def _with_middle(fit: SharedFit, told: Sequence[_Told], sd: float, prior: Prior)
     pull = np.append(np.zeros(count), prior.mean / prior.sd**2)
     for one in told:
         # A quadratic in the values, whose prior of the fit is replaced; written without differences of large numbers.
-        ones, width = np.ones(len(one.pull)), np.eye(len(one.pull)) / sd**2
+        width, alone = np.eye(len(one.pull)) / sd**2, one.of_middle(sd)
         narrower = width - np.diag(one.believed)
-        whole = one.precision + width
-        moved = np.linalg.solve(whole, (one.precision + np.diag(one.believed)) @ one.slope)
-        cross = -moved.T @ ones / sd**2
+        moved = np.linalg.solve(one.precision + width, (one.precision + np.diag(one.believed)) @ one.slope)
+        cross = -moved.sum(axis=0) / sd**2
         precision[:-1, :-1] += one.slope.T @ narrower @ moved
         precision[:-1, -1] += cross
         precision[-1, :-1] += cross
-        precision[-1, -1] += ones @ np.linalg.solve(whole, one.precision @ ones) / sd**2
+        precision[-1, -1] += alone[0]
         pull[:-1] -= moved.T @ (narrower @ one.centre + one.believed * one.expected)
-        pull[-1] += ones @ np.linalg.solve(whole, one.pull) / sd**2
+        pull[-1] += alone[1]
     covariance = np.linalg.inv(precision)
     return _Joint(covariance @ pull, covariance)

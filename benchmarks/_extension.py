@@ -39,14 +39,20 @@ def learned_base(training: Sequence[Tracks], folder: Path) -> Learned:
     return Learned(fit, learned_model(fit))
 
 
-def learned_extension(training: Sequence[Tracks], folder: Path) -> Learned:
-    """The default model extended by what discovery finds on some videos.
+def learned_extension(training: Sequence[Tracks], folder: Path, *, searched: int | None) -> Learned:
+    """The default model extended by what discovery finds on some videos, of which so many are searched for causes.
 
     The finding is kept in a folder, and on the way to it what is done.
     """
 
     def found() -> SharedFit:
-        finding = discover(training, seed=0, progress=progress_display(quiet=False), checkpoint=folder / "steps")
+        finding = discover(
+            training,
+            seed=0,
+            searched=searched,
+            progress=progress_display(quiet=False),
+            checkpoint=folder / "steps",
+        )
         write_finding(finding, folder)
         keep_figures(finding, folder)
         assert finding.fit is not None

@@ -1,6 +1,7 @@
 """What discovery finds on a billiard table, and how much better the extended model predicts shots it has not seen.
 
-    python benchmarks/billiards.py [--json FILE] [--docs docs] [--train 62] [--results FOLDER]
+    python benchmarks/billiards.py [--json FILE] [--docs docs] [--train 62] [--searched 12]
+        [--results FOLDER]
 
 Tracks of ../shared/data/billiards_three_cushion, as in the real-world table of VRDP (Ding et al., NeurIPS 2021): the
 model and what all shots share are learned on frames 0 to 39 of the training videos; of each test video frames 0 to 19
@@ -72,7 +73,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     compile_model(default_model())
     found = {
         BASE: learned_base(training, options.results),
-        EXTENDED: learned_extension(training, options.results / "finding"),
+        EXTENDED: learned_extension(training, options.results / "finding", searched=options.searched),
     }
     questions = {_video(one): tuple(one["questions"]) for one in asked}
     tasks = [
@@ -99,6 +100,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _parser() -> argparse.ArgumentParser:
     parser = page_parser(__doc__, RESULTS)
     parser.add_argument("--train", type=int, default=62, help="how many of the training videos, from the first")
+    parser.add_argument("--searched", type=int, help="how many of these are searched for causes; all by default")
     return parser
 
 

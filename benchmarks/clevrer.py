@@ -1,6 +1,7 @@
 """What the planar model misses in scenes of a 3D engine, and whether the model that discovery extends answers better.
 
-    python benchmarks/clevrer.py [--json FILE] [--docs docs] [--train 30] [--test 30] [--results FOLDER]
+    python benchmarks/clevrer.py [--json FILE] [--docs docs] [--train 30] [--searched 6] [--test 30]
+        [--results FOLDER]
 
 Tracks of ../shared/data/clevrer_bullet. Discovery, and what the scenes share, see the even scenes; the odd ones are
 never seen by either. Of each of these the first 60 % of the frames are fitted and the positions in the rest are
@@ -71,7 +72,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     models = {
         PLAIN: default_model(),
         BASE: learned_base(training, options.results).model,
-        EXTENDED: learned_extension(training, options.results / "finding").model,
+        EXTENDED: learned_extension(training, options.results / "finding", searched=options.searched).model,
     }
     compile_model(models[EXTENDED])
     tasks = [
@@ -97,6 +98,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _parser() -> argparse.ArgumentParser:
     parser = page_parser(__doc__, RESULTS)
     parser.add_argument("--train", type=int, default=30, help="how many of the even scenes, from the first")
+    parser.add_argument("--searched", type=int, help="how many of these are searched for causes; all by default")
     parser.add_argument("--test", type=int, default=30, help="how many of the odd scenes, from the first")
     return parser
 

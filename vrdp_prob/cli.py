@@ -39,7 +39,7 @@ from vrdp_prob.command_options import (
     Words,
 )
 from vrdp_prob.datasets import load, load_all, pictures, video_names
-from vrdp_prob.discovery.checking import check_video_count
+from vrdp_prob.discovery.checking import check_searched, check_video_count
 from vrdp_prob.discovery.discover import discover
 from vrdp_prob.discovery.page.document import to_document as finding_document
 from vrdp_prob.discovery.page.document import write_finding
@@ -228,6 +228,12 @@ def discover_causes(
     questions: Annotated[
         Path | None, typer.Option(metavar="FILE", help="CLEVRER question file: which answers does the finding change?")
     ] = None,
+    searched: Annotated[
+        int | None,
+        typer.Option(
+            "--search-videos", metavar="N", help="Look for causes in so many videos, and ask all for those found there."
+        ),
+    ] = None,
     out: Annotated[Path, typer.Option(metavar="DIR", help="Folder of the finding.")] = Path("vrdp-prob-finding"),
     as_json: Annotated[bool, typer.Option("--json", help="One JSON document on standard output.")] = False,
     camera: CameraOption = None,
@@ -252,11 +258,20 @@ def discover_causes(
     physics = model_at(model)
     names, words = video_names(folder), words_at(word)
     check_video_count(names, source=folder)
+    check_searched(searched, source="--search-videos")
     asked = {} if questions is None else questions_about(questions, names, words)
     videos = load_all(folder, camera=camera, progress=progress)
     for tracks in videos:
         check_questions(asked.get(tracks.video, ()), tracks=tracks, words=words)
-    finding = discover(videos, model=physics, seed=seed, processes=processes, progress=progress, checkpoint=checkpoint)
+    finding = discover(
+        videos,
+        model=physics,
+        seed=seed,
+        searched=searched,
+        processes=processes,
+        progress=progress,
+        checkpoint=checkpoint,
+    )
     if asked:
         finding = with_answers(finding, videos, asked, words=words, seed=seed, processes=processes, progress=progress)
     if sampler != SAMPLER_OF_FITS:

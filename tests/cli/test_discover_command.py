@@ -2,6 +2,7 @@
 
 import errno
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import jsonschema
@@ -136,10 +137,11 @@ def test_options_reach_the_search(videos: Path, tmp_path: Path, monkeypatch: pyt
     PhysicsModel.base().write(tmp_path / "base.toml")
     monkeypatch.chdir(tmp_path)
     command = ["discover", str(videos), "--model", "base.toml", "--seed", "7", "--sampler", "nuts", "--quiet"]
-    assert cli.run(command) == 0
+    assert cli.run([*command, "--search-videos", "3"]) == 0
     assert [tracks.video for tracks in given["videos"]] == ["a", "b", "c"]
     assert given["model"].name == "base"
     assert given["seed"] == 7
+    assert given["searched"] == 3
     notes = json.loads(Path("vrdp-prob-finding/finding.json").read_text())["notes"]
     assert notes == ["Causes are compared by fits, without draws: --sampler nuts changed nothing."]
     assert sorted(path.name for path in (tmp_path / "vrdp-prob-finding").iterdir()) == FILES
@@ -156,7 +158,7 @@ def asked_in(path: Path, video: str, program: list[str]) -> Path:
 def test_questions_are_answered_with_both_models(
     videos: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    let_find(monkeypatch, named())
+    let_find(monkeypatch, replace(named(), videos=("a", "b", "c")))
     questions = asked_in(tmp_path / "questions.json", "b", ["objects", "count"])
     command = ["discover", str(videos), "--questions", str(questions), "--processes", "1", "--out", str(tmp_path)]
     assert cli.run(command) == 0
@@ -203,6 +205,7 @@ def test_too_few_videos_are_refused(
         (["--out", "{folder}/tracks.csv"], "tracks.csv"),
         (["--camera", "{folder}/none.json"], "none.json"),
         (["--seed", "-1"], "--seed"),
+        (["--search-videos", "2"], "--search-videos: 2 is no number of videos in which causes can be looked for"),
     ],
 )
 def test_options_are_refused_before_the_search(

@@ -8,11 +8,12 @@ import numpy as np
 import pytest
 
 from tests.discovery.findings import TILT, WIND
-from vrdp_prob.discovery import outcome
+from vrdp_prob.discovery import outcome, stages
 from vrdp_prob.discovery.finding import Check, Verdict
 from vrdp_prob.discovery.selection import tried
 from vrdp_prob.discovery.selection.search import Search
 from vrdp_prob.discovery.selection.trials import Trial
+from vrdp_prob.inference import default_model
 from vrdp_prob.inference.several_videos.fitting import SharedFit
 from vrdp_prob.models.effects.effect import Effect
 
@@ -100,10 +101,10 @@ def test_all_videos_are_searched_anew_where_no_cause_explains_what_is_left(
     better.with_other_courses.return_value = better
     before, anew = (create_autospec(outcome.Outcome, instance=True) for _ in range(2))
     before.verdict, before.found = verdict, _search(causes)
-    monkeypatch.setattr(discover, "explained", lambda _fits: explains)
-    monkeypatch.setattr(discover, "with_other_spins", lambda _given, *, seed: better if better_by == "spins" else fit)
-    monkeypatch.setattr(discover, "outcome_of", lambda given, *_given, **_named: {better: anew}[given])
-    found = discover._of_better_courses(fit, before, [], seed=0, progress=None)
+    monkeypatch.setattr(stages, "explained", lambda _fits: explains)
+    monkeypatch.setattr(stages, "with_other_spins", lambda _given, *, seed: better if better_by == "spins" else fit)
+    monkeypatch.setattr(stages, "outcome_of", lambda given, *_given, **_named: {better: anew}[given])
+    found = stages.Stages(default_model(), (), 0, None)._of_better_courses(fit, before, [])
     assert found is {"anew": anew, "before": before}[taken]
 
 

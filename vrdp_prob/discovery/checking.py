@@ -31,3 +31,27 @@ def check_video_count(videos: Collection[object], *, source: Path | str = "disco
             f"{source}: there {there_are}; what a cause is worth is measured by leaving out whole videos, so give at "
             f"least {FEWEST_VIDEOS} of the same table."
         )
+
+
+def check_searched(searched: int | None, *, source: str = "searched") -> None:
+    """Refuse to look for causes in too few videos.
+
+    Parameters
+    ----------
+    searched
+        The number of videos; all where None.
+    source
+        What it was given as, for the message.
+
+    Raises
+    ------
+    InputError
+        If it is no whole number, or less than three.
+    """
+    if searched is None:
+        return
+    if not isinstance(searched, int) or isinstance(searched, bool) or searched < FEWEST_VIDEOS:
+        raise InputError(
+            f"{source}: {searched!r} is no number of videos in which causes can be looked for; give at least "
+            f"{FEWEST_VIDEOS}, or nothing for all."
+        )

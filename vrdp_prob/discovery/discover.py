@@ -7,12 +7,9 @@ from pathlib import Path
 import numpy as np
 
 from vrdp_prob.datasets.folder import some
-from vrdp_prob.discovery.candidates.dropped_frames import frames_unknown_to
-from vrdp_prob.discovery.candidates.surfaces import surfaces_unknown_to
-from vrdp_prob.discovery.checking import FEWEST_VIDEOS, check_video_count
+from vrdp_prob.discovery.checking import FEWEST_VIDEOS, check_searched, check_video_count
 from vrdp_prob.discovery.describe import describe
 from vrdp_prob.discovery.finding import Finding, FoundCause, UpperBound, Verdict
-from vrdp_prob.discovery.outcome import Outcome, outcome_of
 from vrdp_prob.discovery.page.figures import residual_figures
 from vrdp_prob.discovery.residuals.free_flight import NORMAL_95
 from vrdp_prob.discovery.selection.believed import extended_model, models_of_the_others
@@ -21,6 +18,7 @@ from vrdp_prob.discovery.selection.estimates import mass_scale_notes, upper_boun
 from vrdp_prob.discovery.selection.mimics import Unlisted
 from vrdp_prob.discovery.selection.search import Search
 from vrdp_prob.discovery.selection.tried import tried_causes
+from vrdp_prob.discovery.stages import Stages
 from vrdp_prob.discovery.words import title
 from vrdp_prob.inference import default_model
 from vrdp_prob.inference.assembly import limits_of_tracks
@@ -36,14 +34,12 @@ from vrdp_prob.inference.runs.checkpoint import (
 from vrdp_prob.inference.runs.journal import journal
 from vrdp_prob.inference.runs.parallel import linear_algebra_in_one_thread, several_processes
 from vrdp_prob.inference.search.clues import Clues
-from vrdp_prob.inference.several_videos.fitting import SharedFit, check_videos, fit_together
-from vrdp_prob.inference.several_videos.second_look import explained, loses_single_videos
-from vrdp_prob.inference.several_videos.spin_islands import with_other_spins
+from vrdp_prob.inference.several_videos.fitting import check_videos
 from vrdp_prob.models.effects.effect import Effect
 from vrdp_prob.models.model_file import known_effects
 from vrdp_prob.models.physics import PhysicsModel
 from vrdp_prob.models.simulator.rollout import compile_model
-from vrdp_prob.progress import ProgressDisplay, SilentProgress
+from vrdp_prob.progress import ProgressDisplay
 from vrdp_prob.report.wording import counted, listed
 from vrdp_prob.scene import Shape, Tracks
 
@@ -61,6 +57,7 @@ def discover(
     model: PhysicsModel | None = None,
     seed: int = 0,
     catalogue: Sequence[Effect] | None = None,
+    searched: int | None = None,
     processes: int | None = None,
     progress: ProgressDisplay | None = None,
     checkpoint: Path | str | None = None,
@@ -77,6 +74,10 @@ def discover(
         Seed of all randomness: the same seed gives the same finding.
     catalogue
         Causes that are looked for; all that the package knows and the model has not where None.
+    searched
+        Number of videos, spread evenly over all, in which all of these are looked for; in all where None. What is found
+        in fewer, or could be seen with all, is then asked of all videos, from which everything that is told comes. A
+        cause that acts in others alone is left to the checks.
     processes
         Number of processes that fit videos and try causes side by side; as many as there are cores where None.
     progress
@@ -88,11 +89,12 @@ def discover(
     Raises
     ------
     InputError
-        If there are fewer than three videos that show motion, two have one name, the model is none, the videos
-        have no common world, the checkpoint belongs to another run, or one is asked for with an effect whose class
-        other processes cannot import.
+        If there are fewer than three videos that show motion, or are to be searched, two have one name, the model is
+        none, the videos have no common world, the checkpoint belongs to another run, or one is asked for with an effect
+        whose class other processes cannot import.
     """
     check_video_count(videos)
+    check_searched(searched)
     check_model(model)
     check_videos(videos)
     videos, still = _in_motion(videos)
@@ -100,19 +102,17 @@ def discover(
     looked_for = _catalogue(physics, catalogue)
     if checkpoint is not None:
         check_importable((*physics.effects, *looked_for))
-    own = None if checkpoint is None else Checkpoint(checkpoint, _facts(videos, physics, looked_for, seed))
+    own = None if checkpoint is None else Checkpoint(checkpoint, _facts(videos, physics, looked_for, seed, searched))
     compile_model(physics)
     timed = videos if _reads_stamps((*physics.effects, *looked_for)) else _from_first_frames(videos)
     with several_processes(processes), journal(own):
-        fit = fit_together(timed, model=physics, seed=seed, model_error=False, progress=progress)
-        if loses_single_videos(fit.fits) and not _tracks_show_why(fit, looked_for):
-            with (progress or SilentProgress()).stage("Searching lost videos anew"):
-                fit = fit.with_lost_courses(seed=seed)
-        outcome = _of_better_courses(
-            fit, outcome_of(fit, looked_for, seed=seed, progress=progress), looked_for, seed=seed, progress=progress
-        )
+        stages = Stages(physics, tuple(looked_for), seed, progress)
+        asked = None if searched is None or searched >= len(timed) else stages.asked_of_all(timed, searched)
+        outcome = stages.outcome(timed, asked)
         found, causes = outcome.found, outcome.causes
         tried = tried_causes(found, _names_of(found, causes), seed=seed)
+        found = found if asked is None else found.asking(looked_for)
+        beside = [] if asked is None else asked.sentences(found)
     doubtful, bounds = outcome.verdict is Verdict.UNKNOWN, _bounds(found, causes)
     return Finding(
         verdict=outcome.verdict,
@@ -129,6 +129,7 @@ def discover(
             *details_left(found.best.causes, outcome.after),
             *rivals_outside((cause.effect for cause in causes if cause.named), outcome.checks),
             *mass_scale_notes(_told(found, causes), videos),
+            *beside,
             *_limits(videos),
             *_not_asked(videos),
             *([] if timed is videos else [COUNTED_ANEW]),
@@ -144,25 +145,6 @@ def discover(
         tried=tuple(tried),
         gain=outcome.gain,
     )
-
-
-def _tracks_show_why(fit: SharedFit, catalogue: Sequence[Effect]) -> bool:
-    """Whether tracks themselves show what videos are lost for, so that the model explains them on no course."""
-    return bool(surfaces_unknown_to(fit, catalogue) or frames_unknown_to(fit, catalogue))
-
-
-def _of_better_courses(
-    fit: SharedFit, outcome: Outcome, catalogue: Sequence[Effect], *, seed: int, progress: ProgressDisplay | None
-) -> Outcome:
-    """What is found where all videos are searched anew, if something is left that no cause explains.
-
-    The outcome stays where the model does not explain most videos, or where the searches find nothing better.
-    """
-    if outcome.verdict is not Verdict.UNKNOWN or outcome.found.best.causes or not explained(fit.fits):
-        return outcome
-    with (progress or SilentProgress()).stage("Searching all videos anew"):
-        better = with_other_spins(fit, seed=seed).with_other_courses(seed=seed)
-    return outcome if better is fit else outcome_of(better, catalogue, seed=seed, progress=progress)
 
 
 def _not_asked(videos: Sequence[Tracks]) -> list[str]:
@@ -227,11 +209,13 @@ def _in_motion(videos: Sequence[Tracks]) -> tuple[Sequence[Tracks], list[str]]:
     return moving, [tracks.video for tracks, one in zip(videos, moves, strict=True) if not one]
 
 
-def _facts(videos: Sequence[Tracks], model: PhysicsModel, catalogue: Sequence[Effect], seed: int) -> dict[str, str]:
+def _facts(
+    videos: Sequence[Tracks], model: PhysicsModel, catalogue: Sequence[Effect], seed: int, searched: int | None
+) -> dict[str, str]:
     """What a search depends on, in short texts by name."""
     names = ", ".join(sorted(effect.name for effect in catalogue))
     code = {**model_facts(model), **effects_facts(catalogue)}
-    return {**videos_facts(videos), **code, **program_facts(seed=seed, catalogue=names)}
+    return {**videos_facts(videos), **code, **program_facts(seed=seed, catalogue=names, searched=searched)}
 
 
 def _catalogue(model: PhysicsModel, catalogue: Sequence[Effect] | None) -> list[Effect]:

@@ -59,9 +59,11 @@ class Outcome:
     unlisted: tuple[Unlisted, ...]
 
 
-def outcome_of(fit: SharedFit, catalogue: Sequence[Effect], *, seed: int, progress: ProgressDisplay | None) -> Outcome:
-    """Search for causes, and put those that are found in doubt."""
-    found = search(fit, catalogue, seed=seed, progress=progress)
+def outcome_of(
+    fit: SharedFit, catalogue: Sequence[Effect], needed: float, *, seed: int, progress: ProgressDisplay | None
+) -> Outcome:
+    """Search for causes, and put those that are found in doubt; parameters as in `search`."""
+    found = search(fit, catalogue, needed, seed=seed, progress=progress)
     checks = found.refits.leavings.checks(found.base)
     found, after, unlisted = _without_mimics(found, seed=seed, progress=progress)
     not_named: list[FoundCause] = []

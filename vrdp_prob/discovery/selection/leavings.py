@@ -75,5 +75,9 @@ class Leavings:
 
     def something(self, trial: Trial) -> bool:
         """Whether a model leaves what chance explains less well than some cause may."""
+        return bool(self.called_for(trial))
+
+    def called_for(self, trial: Trial) -> list[Effect]:
+        """Causes that may explain better than chance what a model leaves, the least probable by chance first."""
         left = self.of(trial).beside_chance
-        return any(one.p_value * len(left) <= SHORTLIST_LEVEL for one in left)
+        return [one.effect for one in left if one.p_value * len(left) <= SHORTLIST_LEVEL]

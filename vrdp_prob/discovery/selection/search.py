@@ -100,6 +100,10 @@ class Search:
         """Factor of each video by which gains are divided."""
         return self.left.overdispersion
 
+    def asking(self, catalogue: Sequence[Effect]) -> "Search":
+        """The search with what the best model leaves asked for the traces of other causes; none of them is tried."""
+        return replace(self, refits=replace(self.refits, catalogue=tuple(catalogue)))
+
     def without(self, causes: Sequence[Effect]) -> "Search":
         """The search with a best model that lacks some of its causes, and those that bring too little without these."""
         if not causes:
@@ -138,7 +142,12 @@ def gain_needed(causes: int) -> float:
 
 
 def search(
-    fit: SharedFit, catalogue: Sequence[Effect], *, seed: int, progress: ProgressDisplay | None = None
+    fit: SharedFit,
+    catalogue: Sequence[Effect],
+    needed: float,
+    *,
+    seed: int,
+    progress: ProgressDisplay | None = None,
 ) -> Search:
     """Look for causes that a model lacks, one after the other.
 
@@ -148,12 +157,13 @@ def search(
         Fit of the model to all videos.
     catalogue
         Causes that are looked for.
+    needed
+        Gain (nats) in the predictive density that a cause must bring.
     seed
         Of the null distributions.
     progress
         Told how far the work is.
     """
-    needed = gain_needed(sum(effect.follows is None for effect in catalogue))
     with (progress or SilentProgress()).stage("Trying causes", total=None) as advance:
         searcher = _Searcher(Refits(tuple(catalogue), seed, needed, advance))
         base = Trial((), with_own_population(fit), stated=fit.model.beliefs).continued()

@@ -1,0 +1,149 @@
+"""The stages of a discovery: fits, the search for causes, courses that were missed, and some videos before all."""
+
+from collections.abc import Sequence
+from contextlib import AbstractContextManager
+from dataclasses import dataclass
+
+import numpy as np
+
+from vrdp_prob.discovery.candidates.dropped_frames import frames_unknown_to
+from vrdp_prob.discovery.candidates.surfaces import surfaces_unknown_to
+from vrdp_prob.discovery.finding import Verdict
+from vrdp_prob.discovery.outcome import Outcome, outcome_of
+from vrdp_prob.discovery.selection.search import Search, gain_needed
+from vrdp_prob.discovery.selection.tried import tried_causes
+from vrdp_prob.discovery.words import title
+from vrdp_prob.inference.several_videos.fitting import SharedFit, fit_together
+from vrdp_prob.inference.several_videos.second_look import explained, loses_single_videos
+from vrdp_prob.inference.several_videos.spin_islands import with_other_spins
+from vrdp_prob.models.effects.effect import Effect
+from vrdp_prob.models.physics import PhysicsModel
+from vrdp_prob.progress import Advance, ProgressDisplay, SilentProgress
+from vrdp_prob.report.wording import listed
+from vrdp_prob.scene import Tracks
+
+
+@dataclass(frozen=True)
+class Asked:
+    """What is asked of all videos, where causes were looked for in some of them.
+
+    Parameters
+    ----------
+    causes
+        Effects that were found there, or could be seen in all.
+    searched, videos
+        Numbers of the videos in which all causes were looked for, and of all.
+    """
+
+    causes: tuple[Effect, ...]
+    searched: int
+    videos: int
+
+    def sentences(self, found: Search) -> list[str]:
+        """What was asked where, and what the best model leaves that calls for something else.
+
+        Parameters
+        ----------
+        found
+            The search in all videos, asking the whole catalogue.
+        """
+        asked = "none of them shows there, so that none was asked of all"
+        if self.causes:
+            asked = f"only {_names(self.causes)} {'was' if len(self.causes) == 1 else 'were'} asked of all"
+        sentences = [f"Causes were looked for in {self.searched} of the {self.videos} videos; {asked}."]
+        known, calling = _cause_names(self.causes), found.refits.leavings.called_for(found.best)
+        if further := [effect for effect in calling if effect.cause_name() not in known]:
+            sentences.append(
+                f"What is left in all videos may be {_names(further)}, for which the searched ones did not call: look "
+                "for causes in more videos."
+            )
+        return sentences
+
+
+@dataclass(frozen=True)
+class Stages:
+    """What is done with some videos, from their fit to what is believed of it.
+
+    Parameters
+    ----------
+    model
+        The physics that is put to the test.
+    catalogue
+        Causes that are looked for.
+    seed
+        Of all randomness.
+    progress
+        Told how far the work is.
+    """
+
+    model: PhysicsModel
+    catalogue: tuple[Effect, ...]
+    seed: int
+    progress: ProgressDisplay | None
+
+    def asked_of_all(self, videos: Sequence[Tracks], searched: int) -> Asked:
+        """What is asked of all videos after causes were looked for in some, which are spread evenly over them.
+
+        These are the causes that are told of, and others that would bring enough in all videos if they brought as much
+        in each.
+        """
+        some = [videos[index] for index in np.linspace(0, len(videos) - 1, searched).round().astype(int)]
+        outcome = self.outcome(some)
+        told = {cause.name for cause in outcome.causes}
+        further = {
+            one.name
+            for one in tried_causes(outcome.found, told, seed=self.seed)
+            if one.gain * len(videos) / len(some) >= one.gain_needed
+        }
+        causes = tuple(effect for effect in self.catalogue if effect.cause_name() in told | further)
+        return Asked(causes, searched, len(videos))
+
+    def outcome(self, videos: Sequence[Tracks], asked: Asked | None = None) -> Outcome:
+        """What is found in videos, and what is believed of it.
+
+        Parameters
+        ----------
+        videos
+            The videos.
+        asked
+            What is asked of them; the whole catalogue where None.
+        """
+        causes = self.catalogue if asked is None else asked.causes
+        fit = fit_together(videos, model=self.model, seed=self.seed, model_error=False, progress=self.progress)
+        if loses_single_videos(fit.fits) and not _tracks_show_why(fit, causes):
+            with self._stage("Searching lost videos anew"):
+                fit = fit.with_lost_courses(seed=self.seed)
+        return self._of_better_courses(fit, self._outcome_of(fit, causes), causes)
+
+    def _of_better_courses(self, fit: SharedFit, outcome: Outcome, causes: Sequence[Effect]) -> Outcome:
+        """What is found where all videos are searched anew, if something is left that no cause explains.
+
+        The outcome stays where the model does not explain most videos, or where the searches find nothing better.
+        """
+        if outcome.verdict is not Verdict.UNKNOWN or outcome.found.best.causes or not explained(fit.fits):
+            return outcome
+        with self._stage("Searching all videos anew"):
+            better = with_other_spins(fit, seed=self.seed).with_other_courses(seed=self.seed)
+        return outcome if better is fit else self._outcome_of(better, causes)
+
+    def _outcome_of(self, fit: SharedFit, causes: Sequence[Effect]) -> Outcome:
+        """What is found under a fit; a cause must bring what it must where all are asked of these videos."""
+        needed = gain_needed(sum(effect.follows is None for effect in self.catalogue))
+        return outcome_of(fit, causes, needed, seed=self.seed, progress=self.progress)
+
+    def _stage(self, description: str) -> AbstractContextManager[Advance]:
+        return (self.progress or SilentProgress()).stage(description)
+
+
+def _tracks_show_why(fit: SharedFit, catalogue: Sequence[Effect]) -> bool:
+    """Whether tracks themselves show what videos are lost for, so that the model explains them on no course."""
+    return bool(surfaces_unknown_to(fit, catalogue) or frames_unknown_to(fit, catalogue))
+
+
+def _names(causes: Sequence[Effect]) -> str:
+    """Causes as a list in a sentence."""
+    return listed(f"'{title(name)}'" for name in _cause_names(causes))
+
+
+def _cause_names(causes: Sequence[Effect]) -> list[str]:
+    return list(dict.fromkeys(effect.cause_name() for effect in causes))

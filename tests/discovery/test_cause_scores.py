@@ -73,6 +73,31 @@ def test_a_hidden_slope_has_the_largest_score_and_the_right_size() -> None:
     assert slope == pytest.approx(data.truth.causes[0].strength, rel=0.5)
 
 
+def test_what_videos_have_of_a_score_adds_up_and_a_slope_is_called_for_in_most() -> None:
+    slope = scored("surface_tilt", seed=1)["surface_tilt"]
+    assert sum(slope.by_video) == pytest.approx(slope.chi_square)
+    assert min(slope.by_video) > 0
+    assert len(slope.few_videos(1e-3)) > len(slope.by_video) / 2
+
+
+@pytest.mark.parametrize(
+    ("by_video", "p_value", "few"),
+    [
+        ((1.0, 22.0, 1.0, 2.0), 1e-6, [1]),
+        ((16.0, 2.0, 0.0, 15.0), 1e-7, [0, 3]),
+        ((14.0, 15.0, 16.0, 13.0), 1e-12, [2, 1, 0]),
+        ((-3.0, 40.0, -2.0, -4.0), 1e-7, [1]),
+        ((300.0, 900.0, 300.0, 300.0), 0.0, [1, 0, 2, 3]),
+    ],
+    ids=["one", "two", "all alike", "one against the others", "beyond numbers"],
+)
+def test_few_videos_are_those_without_which_a_cause_is_not_called_for(
+    by_video: tuple[float, ...], p_value: float, few: list[int]
+) -> None:
+    one = CauseScore(SurfaceTilt(), {}, (), sum(by_video), 2, p_value, {}, by_video=by_video)
+    assert one.few_videos(1e-3) == few
+
+
 def test_a_strength_that_cannot_be_negative_is_tested_on_one_side() -> None:
     found = scored(None, seed=1, names=("linear_drag", "contact_friction"))
     for one in found.values():

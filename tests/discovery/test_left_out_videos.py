@@ -218,7 +218,7 @@ def test_videos_with_kicks_keep_the_course_on_which_these_were_found(
     monkeypatch.setattr(SharedFit, "with_other_courses", lambda _fit, **_how: better)
     trial = Trial((cause,), fit)
     assert (trial.mended([1], seed=0) is trial) is keeps
-    assert (trial.with_other_courses(seed=0) is trial) is keeps
+    assert (trial.with_other_courses([1], seed=0) is trial) is keeps
 
 
 @pytest.mark.parametrize(

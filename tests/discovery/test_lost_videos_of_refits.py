@@ -151,30 +151,43 @@ def test_a_cause_has_its_few_lost_videos_searched_anew(
 
 
 @pytest.mark.parametrize(
-    ("p_value", "promised", "explains", "loses", "taken"),
+    ("p_value", "promised", "few", "explains", "loses", "taken"),
     [
-        (1e-5, 30.0, True, False, "all searched anew"),
-        (1e-50, 300.0, True, False, "tilt"),
-        (1e-5, 30.0, True, True, "tilt"),
-        (1e-5, 30.0, False, False, "tilt"),
-        (0.2, 5.0, True, False, "tilt"),
+        (1e-5, 30.0, [3], True, False, "searched anew"),
+        (1e-5, 30.0, [3, 1], True, False, "searched anew"),
+        (1e-5, 30.0, [3, 1, 0], True, False, "tilt"),
+        (1e-50, 300.0, [3], True, False, "tilt"),
+        (1e-5, 30.0, [3], True, True, "tilt"),
+        (1e-5, 30.0, [3], False, False, "tilt"),
+        (0.2, 5.0, [3], True, False, "tilt"),
     ],
     ids=[
-        "something is left",
+        "something is left in one",
+        "something is left in two",
+        "something is left in most",
         "a law is called for",
         "a video is lost with it",
         "most videos are not explained",
         "nothing is left",
     ],
 )
-def test_where_a_cause_leaves_something_all_videos_are_searched_anew(
-    p_value: float, promised: float, taken: str, *, explains: bool, loses: bool, monkeypatch: pytest.MonkeyPatch
+def test_where_a_cause_leaves_something_the_few_videos_that_call_for_it_are_searched_anew(
+    p_value: float,
+    promised: float,
+    few: list[int],
+    taken: str,
+    *,
+    explains: bool,
+    loses: bool,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    nothing, tilt, anew = refit_with("", 0.0), refit_with("tilt", 5.0), refit_with("all searched anew", 9.0)
+    nothing, tilt, anew = refit_with("", 0.0), refit_with("tilt", 5.0), refit_with("searched anew", 9.0)
     anew.loses_videos_of.return_value = loses
-    tilt.fit = Mock(fits=[""] * 4)
+    tilt.fit = Mock(fits=[""] * 4, videos=[""] * 4)
     tilt.with_other_courses.return_value = anew
-    left = Mock(scores=[], beside_chance=[Mock(p_value=p_value, size=2 * promised)])
+    calling = Mock(p_value=p_value, size=2 * promised)
+    calling.few_videos.return_value = few
+    left = Mock(scores=[], beside_chance=[calling])
     monkeypatch.setattr(refits, "happens_once", lambda _cause: False)
     monkeypatch.setattr(refits, "lost_videos", lambda _fit: [])
     monkeypatch.setattr(refits, "explained", lambda _fits: explains)
@@ -184,6 +197,8 @@ def test_where_a_cause_leaves_something_all_videos_are_searched_anew(
     found = refits_with(needed=2.0)
     assert found.with_lost_found(nothing, tilt).causes == (taken,)
     assert [one.causes[0] for one in found.of(nothing)] == [taken]
+    if taken == "searched anew":
+        tilt.with_other_courses.assert_called_once_with(few, seed=found.seed)
 
 
 @pytest.mark.parametrize(

@@ -21,15 +21,16 @@ def _fit(log_density: float) -> SharedFit:
 
 
 @pytest.mark.parametrize(("gained", "is_taken"), [(20.0, True), (1.0, False)], ids=["better", "hardly better"])
+@pytest.mark.parametrize(("among", "odd"), [(None, [1, 3]), ([0, 2, 3], [3])], ids=["all", "some"])
 def test_other_courses_are_looked_for_in_halves_of_the_videos(
-    gained: float, *, is_taken: bool, monkeypatch: pytest.MonkeyPatch
+    gained: float, among: list[int] | None, odd: list[int], *, is_taken: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     first, half, both = _fit(100.0), _fit(100.0), _fit(100.0 + gained)
     first.mended.return_value, half.mended.return_value = half, both
     monkeypatch.setattr(fitting, "may_take_another_course", lambda fit: fit != "one course only")
-    assert SharedFit.with_other_courses(first, seed=3) is (both if is_taken else first)
+    assert SharedFit.with_other_courses(first, seed=3, among=among) is (both if is_taken else first)
     first.mended.assert_called_once_with([2], seed=3, thorough=True)
-    half.mended.assert_called_once_with([1, 3], seed=3, thorough=True)
+    half.mended.assert_called_once_with(odd, seed=3, thorough=True)
 
 
 def test_where_nobody_is_trusted_nothing_is_told(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -105,6 +105,8 @@ class CauseScore:
         of each body or video that it may belong to.
     places
         Number of bodies or videos among which the sites were chosen.
+    by_video
+        What each video has of the statistic, if videos share the strength; empty where that is not told apart.
     """
 
     effect: Effect
@@ -115,6 +117,23 @@ class CauseScore:
     p_value: float
     largest: Mapping[str, Largest]
     places: int = 1
+    by_video: tuple[float, ...] = ()
+
+    def few_videos(self, level: float) -> list[int]:
+        """The fewest videos without which chance makes as large a statistic as is left more often than at a level.
+
+        A wrong course of events calls for a cause in its video, a law in most of them. Where a cause has happened
+        once, these are the videos in which it did.
+        """
+        if not self.by_video:
+            return list(dict.fromkeys(site.video for site in self.sites))
+        alone = float(chi2.sf(self.chi_square, self.degrees))
+        least = float(chi2.isf(min(1.0, level * alone / self.p_value), self.degrees)) if self.p_value else 0.0
+        parts = np.array(self.by_video)
+        order = np.argsort(-parts, kind="stable")
+        left = self.chi_square - np.cumsum(parts[order])
+        enough = np.flatnonzero(left < least)
+        return order[: int(enough[0]) + 1 if len(enough) else len(order)].tolist()
 
     @property
     def size(self) -> float:
@@ -205,7 +224,8 @@ def _scan_shared(
     estimate = dict(zip(names, scores[best].estimate.tolist(), strict=True))
     start = dict(points[best]) | (_starting(effect, estimate) if len(estimate) == len(names) else {})
     largest = _largest([zip(names, score.estimate, score.sd, strict=True) for score in scores], effect)
-    return CauseScore(effect, start, (), float(statistics[best]), degrees, p_value, largest)
+    by_video = tuple((model.linear.gradients([one[:, best] for one in directions]) @ scores[best].estimate).tolist())
+    return CauseScore(effect, start, (), float(statistics[best]), degrees, p_value, largest, by_video=by_video)
 
 
 def _scan_frames(model: ResidualModel, effect: Effect) -> CauseScore | None:

@@ -1,5 +1,6 @@
 """What models leave, and which further causes may be behind it."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -11,6 +12,7 @@ from vrdp_prob.discovery.finding import Check
 from vrdp_prob.discovery.residuals.overdispersion import overdispersion
 from vrdp_prob.discovery.selection.shortlist import SHORTLIST_LEVEL
 from vrdp_prob.discovery.selection.trials import Trial
+from vrdp_prob.inference.several_videos.second_look import MOST
 from vrdp_prob.models.effects.effect import Effect
 
 
@@ -75,9 +77,19 @@ class Leavings:
 
     def something(self, trial: Trial) -> bool:
         """Whether a model leaves what chance explains less well than some cause may."""
-        return bool(self.called_for(trial))
+        return any(True for _ in self._calling(trial))
 
     def called_for(self, trial: Trial) -> list[Effect]:
         """Causes that may explain better than chance what a model leaves, the least probable by chance first."""
+        return [one.effect for one in self._calling(trial)]
+
+    def suspects(self, trial: Trial) -> list[int]:
+        """Videos that may have taken a wrong course of events: few, in which alone some cause is called for."""
+        level, most = SHORTLIST_LEVEL / max(len(self.of(trial).beside_chance), 1), len(trial.fit.videos) // MOST
+        few = [one.few_videos(level) for one in self._calling(trial)]
+        return list(dict.fromkeys(video for some in few if len(some) <= most for video in some))
+
+    def _calling(self, trial: Trial) -> Iterator[CauseScore]:
+        """Scores that chance makes as large too rarely, where it had as many causes to do so."""
         left = self.of(trial).beside_chance
-        return [one.effect for one in left if one.p_value * len(left) <= SHORTLIST_LEVEL]
+        return (one for one in left if one.p_value * len(left) <= SHORTLIST_LEVEL)

@@ -229,7 +229,8 @@ class Refits:
 
         What one lost video leaves calls for many causes, of which each costs more to try than the search. Where most
         are lost, the model is fitted from the beginning if that explains them. Where most are explained and something
-        is left still, all of them are searched, unless that calls for a law loudly, which is tried instead.
+        is left still that a few videos call for, these are searched, unless it calls for a law loudly, which is tried
+        instead.
         """
         found = one if explained(one.fit.fits) else self._from_the_beginning(trial, one)
         for _ in range(SEARCHES):
@@ -239,8 +240,9 @@ class Refits:
             found = self.courses.searched_anew(found, videos) if few else found
             if found is before:
                 break
-        if self.leavings.something(found) and explained(found.fit.fits) and not self._calls_for_a_law(found):
-            other = found.with_other_courses(seed=self.seed)
+        suspects = self.leavings.suspects(found) if explained(found.fit.fits) else []
+        if suspects and not self._calls_for_a_law(found):
+            other = found.with_other_courses(suspects, seed=self.seed)
             found = found if other.loses_videos_of(found) else other
         if found is not one:
             self._keep(trial, [found if old is one else old for old in self.of(trial)])

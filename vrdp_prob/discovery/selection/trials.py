@@ -1,7 +1,7 @@
 """A model that is tried on all videos: its fit, and how well it predicts each video from the others."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -307,11 +307,11 @@ class Trial:
                 return replace(self, fit=fit)
         return self
 
-    def with_other_courses(self, *, seed: int) -> "Trial":
-        """The fit with all videos searched anew; itself where that finds nothing much better, or with kicks."""
+    def with_other_courses(self, among: Collection[int], *, seed: int) -> "Trial":
+        """The fit with some videos searched anew; itself where that finds nothing much better, or with kicks."""
         if any(mends_any_course(cause) for cause in self.causes):
             return self
-        fit = self.fit.with_other_courses(seed=seed)
+        fit = self.fit.with_other_courses(seed=seed, among=among)
         return self if fit is self.fit else replace(self, fit=fit)
 
     def without(self, *causes: Effect) -> "Trial":

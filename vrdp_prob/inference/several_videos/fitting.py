@@ -1,7 +1,7 @@
 """The joint fit of several videos: each by itself first, then all together, then what the model leaves unexplained."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -265,15 +265,23 @@ class SharedFit:
                 break
         return found
 
-    def with_other_courses(self, *, seed: int) -> "SharedFit":
-        """The fit with all videos searched anew, one half given what the other says; itself where little is gained.
+    def with_other_courses(self, *, seed: int, among: Collection[int] | None = None) -> "SharedFit":
+        """The fit with videos searched anew, one half given what the other says; itself where little is gained.
 
         A single video on a wrong course of events, whose residuals look like noise still, can call for causes.
+
+        Parameters
+        ----------
+        seed
+            Seed of the searches.
+        among
+            The videos; all where None.
         """
+        possible = [index for index, fit in enumerate(self.fits) if may_take_another_course(fit)]
+        chosen = possible if among is None else [index for index in possible if index in among]
         found = self
-        for first in (0, 1):
-            some = [index for index in range(first, len(self.fits), 2) if may_take_another_course(self.fits[index])]
-            found = found.mended(some, seed=seed, thorough=True)
+        for half in (0, 1):
+            found = found.mended([index for index in chosen if index % 2 == half], seed=seed, thorough=True)
         return found if found.joint.log_density > self.joint.log_density + NEWS else self
 
     def vanishing(self, effects: Sequence[Effect]) -> dict[str, float]:

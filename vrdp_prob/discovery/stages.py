@@ -10,7 +10,9 @@ from vrdp_prob.discovery.candidates.dropped_frames import frames_unknown_to
 from vrdp_prob.discovery.candidates.surfaces import surfaces_unknown_to
 from vrdp_prob.discovery.finding import Verdict
 from vrdp_prob.discovery.outcome import Outcome, outcome_of
+from vrdp_prob.discovery.selection.leavings import Leavings
 from vrdp_prob.discovery.selection.search import Search, gain_needed
+from vrdp_prob.discovery.selection.trials import Trial
 from vrdp_prob.discovery.selection.tried import tried_causes
 from vrdp_prob.discovery.words import title
 from vrdp_prob.inference.several_videos.fitting import SharedFit, fit_together
@@ -110,7 +112,7 @@ class Stages:
         """
         causes = self.catalogue if asked is None else asked.causes
         fit = fit_together(videos, model=self.model, seed=self.seed, model_error=False, progress=self.progress)
-        if loses_single_videos(fit.fits) and not _tracks_show_why(fit, causes):
+        if loses_single_videos(fit.fits) and not self._lacks_something(fit, causes):
             with self._stage("Searching lost videos anew"):
                 fit = fit.with_lost_courses(seed=self.seed)
         return self._of_better_courses(fit, self._outcome_of(fit, causes), causes)
@@ -126,6 +128,12 @@ class Stages:
             better = with_other_spins(fit, seed=self.seed).with_other_courses(seed=self.seed)
         return outcome if better is fit else self._outcome_of(better, causes)
 
+    def _lacks_something(self, fit: SharedFit, causes: Sequence[Effect]) -> bool:
+        """Whether tracks show what videos are lost for, or most videos call for a law: no course is to blame then."""
+        if surfaces_unknown_to(fit, causes) or frames_unknown_to(fit, causes):
+            return True
+        return Leavings(tuple(causes), self.seed).most_call_for_a_law(Trial((), fit))
+
     def _outcome_of(self, fit: SharedFit, causes: Sequence[Effect]) -> Outcome:
         """What is found under a fit; a cause must bring what it must where all are asked of these videos."""
         needed = gain_needed(sum(effect.follows is None for effect in self.catalogue))
@@ -133,11 +141,6 @@ class Stages:
 
     def _stage(self, description: str) -> AbstractContextManager[Advance]:
         return (self.progress or SilentProgress()).stage(description)
-
-
-def _tracks_show_why(fit: SharedFit, catalogue: Sequence[Effect]) -> bool:
-    """Whether tracks themselves show what videos are lost for, so that the model explains them on no course."""
-    return bool(surfaces_unknown_to(fit, catalogue) or frames_unknown_to(fit, catalogue))
 
 
 def _names(causes: Sequence[Effect]) -> str:

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from jaxtyping import Float
 
-from vrdp_prob.discovery.candidates.scores import CauseScore, score_causes
+from vrdp_prob.discovery.candidates.scores import CauseScore, happens_once, score_causes
 from vrdp_prob.discovery.checks.battery import run_checks
 from vrdp_prob.discovery.finding import Check
 from vrdp_prob.discovery.residuals.overdispersion import overdispersion
@@ -85,11 +85,25 @@ class Leavings:
 
     def suspects(self, trial: Trial) -> list[int]:
         """Videos that may have taken a wrong course of events: few, in which alone some cause is called for."""
-        level, most = SHORTLIST_LEVEL / max(len(self.of(trial).beside_chance), 1), len(trial.fit.videos) // MOST
-        few = [one.few_videos(level) for one in self._calling(trial)]
-        return list(dict.fromkeys(video for some in few if len(some) <= most for video in some))
+        few = [some for _, some in self._called_for_in(trial) if len(some) <= _half(trial)]
+        return list(dict.fromkeys(video for some in few for video in some))
+
+    def most_call_for_a_law(self, trial: Trial) -> bool:
+        """Whether a law is called for in most videos, so that no wrong course of single ones does."""
+        called = self._called_for_in(trial)
+        return any(len(some) > _half(trial) and not happens_once(effect) for effect, some in called)
+
+    def _called_for_in(self, trial: Trial) -> Iterator[tuple[Effect, list[int]]]:
+        """Causes that are called for, and the fewest videos without which they are not."""
+        level = SHORTLIST_LEVEL / max(len(self.of(trial).beside_chance), 1)
+        return ((one.effect, one.few_videos(level)) for one in self._calling(trial))
 
     def _calling(self, trial: Trial) -> Iterator[CauseScore]:
         """Scores that chance makes as large too rarely, where it had as many causes to do so."""
         left = self.of(trial).beside_chance
         return (one for one in left if one.p_value * len(left) <= SHORTLIST_LEVEL)
+
+
+def _half(trial: Trial) -> int:
+    """Number of videos of which no more than so many may be on wrong courses by themselves."""
+    return len(trial.fit.videos) // MOST

@@ -92,7 +92,7 @@ def test_lost_videos_are_searched_once_and_refits_made_only_where_that_leaves_so
     monkeypatch.setattr(refits.Refits, "_new", lambda _self, _trial: [drag])
     monkeypatch.setattr(refits.Refits, "settled", lambda _self, _trial, found: enough and found[:1] == [lost])
     monkeypatch.setattr(refits.Refits, "_lost", searched)
-    monkeypatch.setattr(refits.Refits, "_calls_for_a_law", lambda _self, _trial: calls)
+    monkeypatch.setattr(Leavings, "laws", lambda _self, _trial, _needed: [SurfaceTilt()] if calls else [])
     found = refits_with()
     if refitted:
         found.of(tilt)
@@ -185,10 +185,9 @@ def test_where_a_cause_leaves_something_the_few_videos_that_call_for_it_are_sear
     anew.loses_videos_of.return_value = loses
     tilt.fit = Mock(fits=[""] * 4, videos=[""] * 4)
     tilt.with_other_courses.return_value = anew
-    calling = Mock(p_value=p_value, size=2 * promised)
+    calling = Mock(effect=SurfaceTilt(), p_value=p_value, size=2 * promised)
     calling.few_videos.return_value = few
     left = Mock(scores=[], beside_chance=[calling])
-    monkeypatch.setattr(refits, "happens_once", lambda _cause: False)
     monkeypatch.setattr(refits, "lost_videos", lambda _fit: [])
     monkeypatch.setattr(refits, "explained", lambda _fits: explains)
     monkeypatch.setattr(refits.Refits, "_from_the_beginning", lambda _self, _trial, one: one)

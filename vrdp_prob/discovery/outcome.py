@@ -23,7 +23,7 @@ MIMIC = 0.5
 EXPLAINED, MENDED = 0.5, 0.6
 """Share of what the model left unexplained beyond the noise, and of the checks that failed, that the named causes must
 explain for them to be the verdict where something is left."""
-LEFT_LEVEL = 0.02
+LEFT_LEVEL = 0.005
 """Probability, over all checks, with which a model that explains everything is taken to leave something."""
 LEAST_SHARE = 0.01
 """Probability from which a cause is told of that could take the place of a named one."""

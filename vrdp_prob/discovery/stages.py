@@ -132,12 +132,16 @@ class Stages:
         """Whether tracks show what videos are lost for, or most videos call for a law: no course is to blame then."""
         if surfaces_unknown_to(fit, causes) or frames_unknown_to(fit, causes):
             return True
-        return Leavings(tuple(causes), self.seed).most_call_for_a_law(Trial((), fit))
+        return Leavings(tuple(causes), self.seed).most_call_for_a_law(Trial((), fit), self._needed)
 
     def _outcome_of(self, fit: SharedFit, causes: Sequence[Effect]) -> Outcome:
-        """What is found under a fit; a cause must bring what it must where all are asked of these videos."""
-        needed = gain_needed(sum(effect.follows is None for effect in self.catalogue))
-        return outcome_of(fit, causes, needed, seed=self.seed, progress=self.progress)
+        """What is found under a fit."""
+        return outcome_of(fit, causes, self._needed, seed=self.seed, progress=self.progress)
+
+    @property
+    def _needed(self) -> float:
+        """Gain (nats) that a cause must bring, which is that where all are asked of these videos."""
+        return gain_needed(sum(effect.follows is None for effect in self.catalogue))
 
     def _stage(self, description: str) -> AbstractContextManager[Advance]:
         return (self.progress or SilentProgress()).stage(description)

@@ -15,6 +15,10 @@ from vrdp_prob.discovery.selection.trials import Trial
 from vrdp_prob.inference.several_videos.second_look import MOST
 from vrdp_prob.models.effects.effect import Effect
 
+LOUD = 20.0
+"""Gain beside chance, in those that are needed, from which a law is tried before videos are searched anew; few videos
+on wrong courses promise as much."""
+
 
 @dataclass(frozen=True)
 class Left:
@@ -88,10 +92,23 @@ class Leavings:
         few = [some for _, some in self._called_for_in(trial) if len(some) <= _half(trial)]
         return list(dict.fromkeys(video for some in few for video in some))
 
-    def most_call_for_a_law(self, trial: Trial) -> bool:
-        """Whether a law is called for in most videos, so that no wrong course of single ones does."""
-        called = self._called_for_in(trial)
-        return any(len(some) > _half(trial) and not happens_once(effect) for effect, some in called)
+    def most_call_for_a_law(self, trial: Trial, needed: float) -> bool:
+        """Whether a law is called for in most videos, and loudly (see `laws`): no wrong course of single ones does."""
+        called = {effect for effect, some in self._called_for_in(trial) if len(some) > _half(trial)}
+        return any(law in called for law in self.laws(trial, needed))
+
+    def laws(self, trial: Trial, needed: float) -> list[Effect]:
+        """Laws that what a model leaves beside chance calls for louder than a few wrong courses do.
+
+        Parameters
+        ----------
+        trial
+            The model.
+        needed
+            Gain (nats) in the predictive density that a cause must bring.
+        """
+        left = self.of(trial).beside_chance
+        return [one.effect for one in left if one.size > 2 * LOUD * needed and not happens_once(one.effect)]
 
     def _called_for_in(self, trial: Trial) -> Iterator[tuple[Effect, list[int]]]:
         """Causes that are called for, and the fewest videos without which they are not."""

@@ -39,9 +39,6 @@ PLAIN_TURNS = 4
 """Turns from which walls and discs that explain them need no comparison with what else may have been there."""
 SEARCHES = 3
 """How often the lost videos of a cause are searched anew, as long as that finds something."""
-LOUD = 20.0
-"""Gain beside chance, in those that are needed, from which a law is tried before videos are searched anew; few videos
-on wrong courses promise as much."""
 
 
 @dataclass(frozen=True)
@@ -214,7 +211,7 @@ class Refits:
         for many causes, each of which costs more than the search for the one that explains such a video; unless one law
         is called for beside these.
         """
-        if trial not in self._made and self._calls_for_a_law(trial):
+        if trial not in self._made and self.leavings.laws(trial, self.needed):
             self.of(trial)
         refitted, found = trial in self._made, self.made(trial)
         if trial not in self._searched and not self.settled(trial, found):
@@ -241,7 +238,7 @@ class Refits:
             if found is before:
                 break
         suspects = self.leavings.suspects(found) if explained(found.fit.fits) else []
-        if suspects and not self._calls_for_a_law(found):
+        if suspects and not self.leavings.laws(found, self.needed):
             other = found.with_other_courses(suspects, seed=self.seed)
             found = found if other.loses_videos_of(found) else other
         if found is not one:
@@ -286,11 +283,6 @@ class Refits:
     def _is_shown(self, trial: Trial, one: Trial) -> bool:
         """Whether a refit has a wall or a disc that the tracks show plainly."""
         return any(cause in self._shown.get(trial, []) for cause in one.beyond(trial))
-
-    def _calls_for_a_law(self, trial: Trial) -> bool:
-        """Whether what a model leaves beside chance calls for a law louder than a few wrong courses do."""
-        laws = (one for one in self.leavings.of(trial).beside_chance if not happens_once(one.effect))
-        return any(one.size > 2 * LOUD * self.needed for one in laws)
 
     def settled(self, trial: Trial, found: Sequence[Trial]) -> bool:
         """Whether the best cause leaves nothing to explain, and is not a kick in each of several videos."""

@@ -17,6 +17,7 @@ from vrdp_prob.discovery.selection import estimates, trials
 from vrdp_prob.discovery.selection.estimates import may_vanish
 from vrdp_prob.discovery.selection.forecast import SEEN_SHARE, _forecast, error_ratios, held_out
 from vrdp_prob.discovery.selection.trials import Trial, gain, gains, weights
+from vrdp_prob.inference import default_model
 from vrdp_prob.inference.map_fit import MapFit
 from vrdp_prob.inference.several_videos import fitting
 from vrdp_prob.inference.several_videos.agreement import following_ones
@@ -402,7 +403,7 @@ def test_what_bodies_are_like_is_learned_anew_at_the_end_of_a_fit(
     evidence: float, taken: str, *, kicks: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     begun, arrived, learned = (create_autospec(SharedFit, instance=True) for _ in range(3))
-    begun.joint, begun.under.return_value = Mock(converged=False), arrived
+    begun.joint, begun.model, begun.under.return_value = Mock(converged=False), default_model(), arrived
     arrived.joint, learned.joint = Mock(converged=True, log_evidence=10.0), Mock(converged=True, log_evidence=evidence)
     monkeypatch.setattr(trials, "with_own_population", lambda fit: learned if fit is arrived else fit)
     trial = Trial((), begun, choices={"external_impulse": np.zeros(3)} if kicks else {})

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import astuple, replace
 from typing import Any
-from unittest.mock import Mock, create_autospec
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -17,7 +17,6 @@ from vrdp_prob.discovery.selection import estimates, trials
 from vrdp_prob.discovery.selection.estimates import may_vanish
 from vrdp_prob.discovery.selection.forecast import SEEN_SHARE, _forecast, error_ratios, held_out
 from vrdp_prob.discovery.selection.trials import Trial, gain, gains, weights
-from vrdp_prob.inference import default_model
 from vrdp_prob.inference.map_fit import MapFit
 from vrdp_prob.inference.several_videos import fitting
 from vrdp_prob.inference.several_videos.agreement import following_ones
@@ -392,20 +391,3 @@ def test_a_video_searched_anew_may_share_a_number_that_no_other_one_has(
     found = lacking.mended([1], seed=0)
     assert found.joint.log_density >= lacking.joint.log_density
     assert found is lacking or ANGULAR_DRAG.name in found.joint.numbers.names
-
-
-@pytest.mark.parametrize(
-    ("evidence", "kicks", "taken"),
-    [(12.0, False, "learned"), (8.0, False, "arrived"), (12.0, True, "arrived")],
-    ids=["better with it", "worse with it", "beside kicks"],
-)
-def test_what_bodies_are_like_is_learned_anew_at_the_end_of_a_fit(
-    evidence: float, taken: str, *, kicks: bool, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    begun, arrived, learned = (create_autospec(SharedFit, instance=True) for _ in range(3))
-    begun.joint, begun.model, begun.under.return_value = Mock(converged=False), default_model(), arrived
-    arrived.joint, learned.joint = Mock(converged=True, log_evidence=10.0), Mock(converged=True, log_evidence=evidence)
-    monkeypatch.setattr(trials, "with_own_population", lambda fit: learned if fit is arrived else fit)
-    trial = Trial((), begun, choices={"external_impulse": np.zeros(3)} if kicks else {})
-    assert trial.continued().fit is {"learned": learned, "arrived": arrived}[taken]
-    assert (again := replace(trial, fit=learned)).continued() is again

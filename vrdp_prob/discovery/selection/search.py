@@ -339,7 +339,7 @@ class _Searcher:
 
         A cause that was found first may fit worse than another once a further one has joined; then they are swapped.
         """
-        best = chain[-1].continued()
+        best = chain[-1]
         known = [one for one in chain[-2:-1] if one.causes == best.causes[:-1]]
         divisor = steps[-1].left.overdispersion
         lesser = (*self._lesser(best, best.causes[: len(best.causes) - len(known)], divisor), *known)

@@ -250,15 +250,10 @@ class Trial:
         return replace(self, causes=(*self.causes, effect), fit=fit, choices=choices)
 
     def continued(self) -> "Trial":
-        """The fit after as many steps as it needs, and with what bodies are like at its end, if it is better with that.
-
-        What bodies are like was learned on the way, where a cause had not yet explained what makes them differ.
-        """
-        found = _to_the_end(self.fit)
-        if not self.choices and (learned := with_own_population(found)) is not found:
-            learned = _to_the_end(learned)
-            found = learned if learned.joint.log_evidence > found.joint.log_evidence else found
-        return self if found is self.fit else replace(self, fit=found)
+        """The fit after as many steps as it needs."""
+        if self.fit.joint.converged:
+            return self
+        return replace(self, fit=self.fit.under(self.fit.model, model_error=False))
 
     def acting(self, cause: Effect) -> list[int]:
         """Videos on which a cause acts that happens once."""
@@ -344,11 +339,6 @@ class Trial:
         own = {one.name for one in own_parameters(model)}
         learned = {name: one for name, one in model.beliefs.items() if name not in own}
         return replace(model, beliefs=learned | {name: one for name, one in self.stated.items() if name in own})
-
-
-def _to_the_end(fit: SharedFit) -> SharedFit:
-    """A fit after as many steps as it needs."""
-    return fit if fit.joint.converged else fit.under(fit.model, model_error=False)
 
 
 def with_own_population(fit: SharedFit) -> SharedFit:

@@ -49,11 +49,11 @@ class Asked:
         found
             The search in all videos, asking the whole catalogue.
         """
-        asked = "none of them shows there, so that none was asked of all"
-        if self.causes:
-            asked = f"only {_names(self.causes)} {'was' if len(self.causes) == 1 else 'were'} asked of all"
+        asked, known = "none of them shows there, so that none was asked of all", _cause_names(self.causes)
+        if known:
+            asked = f"only {_names(self.causes)} {'was' if len(known) == 1 else 'were'} asked of all"
         sentences = [f"Causes were looked for in {self.searched} of the {self.videos} videos; {asked}."]
-        known, calling = _cause_names(self.causes), found.refits.leavings.called_for(found.best)
+        calling = found.refits.leavings.called_for(found.best)
         if further := [effect for effect in calling if effect.cause_name() not in known]:
             sentences.append(
                 f"What is left in all videos may be {_names(further)}, for which the searched ones did not call: look "
@@ -94,7 +94,7 @@ class Stages:
         told = {cause.name for cause in outcome.causes}
         further = {
             one.name
-            for one in tried_causes(outcome.found, told, seed=self.seed)
+            for one in tried_causes(outcome.found, (), seed=self.seed)
             if one.gain * len(videos) / len(some) >= one.gain_needed
         }
         causes = tuple(effect for effect in self.catalogue if effect.cause_name() in told | further)

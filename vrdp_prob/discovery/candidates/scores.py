@@ -224,7 +224,10 @@ def _scan_shared(
     estimate = dict(zip(names, scores[best].estimate.tolist(), strict=True))
     start = dict(points[best]) | (_starting(effect, estimate) if len(estimate) == len(names) else {})
     largest = _largest([zip(names, score.estimate, score.sd, strict=True) for score in scores], effect)
-    by_video = tuple((model.linear.gradients([one[:, best] for one in directions]) @ scores[best].estimate).tolist())
+    strengths = scores[best].estimate
+    by_video = tuple(
+        -float(left @ block[:, best] @ strengths) for left, block in zip(model.linear.left, blocks, strict=True)
+    )
     return CauseScore(effect, start, (), float(statistics[best]), degrees, p_value, largest, by_video=by_video)
 
 

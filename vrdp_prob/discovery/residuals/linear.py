@@ -363,11 +363,6 @@ class LinearFit:
         information = sum(reduced.T @ reduced for _, reduced, _ in pairs) - cross.T @ self._step(cross)
         return Score(np.asarray(gradient), np.asarray((information + information.T) / 2))
 
-    def gradients(self, directions: Sequence[Float[np.ndarray, "_ strength"]]) -> Float[np.ndarray, "video strength"]:
-        """What each video has of the gradient of a score, see `score`."""
-        pairs = zip(self.videos, directions, self.left, strict=True)
-        return np.stack([-(video.without_own(video.padded(one)).T @ left) for video, one, left in pairs])
-
     def scores_in(
         self, index: int, directions: Float[np.ndarray, "data place strength"]
     ) -> tuple[list[Score], Float[np.ndarray, "residual place strength"]]:

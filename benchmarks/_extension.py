@@ -29,6 +29,20 @@ class Learned:
     model: PhysicsModel
 
 
+def base_model(training: Sequence[Tracks], folder: Path) -> PhysicsModel:
+    """The default model with what some videos tell; the file `base.toml` of a folder, which is made where it lacks."""
+    path = folder / "base.toml"
+    if not path.exists():
+        learned_base(training, folder).model.write(path)
+    return PhysicsModel.read(path)
+
+
+def extended_model(training: Sequence[Tracks], folder: Path, *, searched: int | None) -> PhysicsModel:
+    """The model of a finding: `model.toml` of its folder, for which discovery looks where it lacks."""
+    path = folder / "model.toml"
+    return PhysicsModel.read(path) if path.exists() else learned_extension(training, folder, searched=searched).model
+
+
 def learned_base(training: Sequence[Tracks], folder: Path) -> Learned:
     """What some videos tell under the default model; the fit is kept in a folder."""
 

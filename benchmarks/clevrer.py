@@ -6,8 +6,9 @@
 Tracks of ../shared/data/clevrer_bullet. Discovery, and what the scenes share, see the even scenes; the odd ones are
 never seen by either. Of each of these the first 60 % of the frames are fitted and the positions in the rest are
 predicted by the best fit; its questions are answered from the whole video by posterior draws. The finding, the learned
-models and each scene's results are kept in `--results` as they come, so that a run that was interrupted goes on; delete
-that folder after a change of the code. `--docs` writes the tables into `clevrer.md` there, and figures beside it.
+models (`base.toml`, `finding/model.toml`) and each scene's results are kept in `--results` as they come, so that a run
+that was interrupted goes on; delete that folder after a change of the code. `--docs` writes the tables into
+`clevrer.md` there, and figures beside it.
 """
 
 import argparse
@@ -22,7 +23,7 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 import numpy as np
 import torch
 from _answer_goals import GOALS, title
-from _extension import forecast, learned_base, learned_extension
+from _extension import base_model, extended_model, forecast
 from _finding_figures import copy_figures
 from _page import page_parser, publish, table_row
 from _resumable import Result, measured
@@ -71,8 +72,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     compile_model(default_model())
     models = {
         PLAIN: default_model(),
-        BASE: learned_base(training, options.results).model,
-        EXTENDED: learned_extension(training, options.results / "finding", searched=options.searched).model,
+        BASE: base_model(training, options.results),
+        EXTENDED: extended_model(training, options.results / "finding", searched=options.searched),
     }
     compile_model(models[EXTENDED])
     tasks = [

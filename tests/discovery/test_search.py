@@ -1,5 +1,6 @@
 """In which order the search tries causes."""
 
+from itertools import pairwise
 from unittest.mock import Mock
 
 import numpy as np
@@ -266,10 +267,11 @@ def test_a_course_found_beside_causes_is_handed_back_and_causes_are_looked_for_o
     monkeypatch.setattr(search._Searcher, "chosen", lambda _self, trial, _step: chosen[trial])
     monkeypatch.setattr(search._Searcher, "_left_out", lambda _self, trial, *_causes: left_out[trial])
     monkeypatch.setattr(Leavings, "of", lambda _self, _trial: Left((), (), np.ones(3)))
-    chain, steps = _searcher(needed=6.0).forward(plain)
+    chain, steps, limit = _searcher(needed=6.0).forward(plain)
     assert chain == ([mended] if needs_it else [mended, again])
     assert asked == [plain, friction, both, *chain]
     assert len(steps) == len(chain)
+    assert not limit
 
 
 def test_a_course_that_gains_nothing_without_the_cause_is_not_handed_back(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -299,9 +301,37 @@ def test_causes_are_not_tried_anew_for_a_course_that_brings_a_trifle_of_what_a_m
     asked = _asked(monkeypatch)
     monkeypatch.setattr(search._Searcher, "chosen", lambda _self, _trial, _step: (better, None))
     monkeypatch.setattr(Leavings, "of", lambda _self, _trial: Left((), (), np.ones(3)))
-    chain, _ = _searcher(needed=6.0).forward(plain)
+    chain, _, limit = _searcher(needed=6.0).forward(plain)
     assert chain == [better]
     assert len(asked) == times
+    assert not limit
+
+
+def test_a_search_ends_though_each_round_finds_a_better_course(monkeypatch: pytest.MonkeyPatch) -> None:
+    plain, *better = (refit_with("", 10.0 * number) for number in range(search.MOST_ROUNDS + 2))
+    for one in (plain, *better):
+        one.lacking, one.causes = 0.0, ()
+    following = dict(pairwise([plain, *better]))
+    asked = _asked(monkeypatch)
+    monkeypatch.setattr(search._Searcher, "chosen", lambda _self, trial, _step: (following[trial], None))
+    monkeypatch.setattr(Leavings, "of", lambda _self, _trial: Left((), (), np.ones(3)))
+    chain, _, limit = _searcher(needed=6.0).forward(plain)
+    assert chain == better[-1:]
+    assert asked == [plain, *better[:-1]]
+    assert limit == search.COURSES_LEFT
+
+
+def test_a_search_ends_at_five_causes_and_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
+    models = [refit_with("+".join("abcde"[:count]), 10.0 * count) for count in range(search.MOST_CAUSES + 1)]
+    following = dict(pairwise(models))
+    asked = _asked(monkeypatch)
+    monkeypatch.setattr(search._Searcher, "chosen", lambda _self, trial, _step: (trial, following[trial]))
+    monkeypatch.setattr(Leavings, "of", lambda _self, _trial: Left((), (), np.ones(3)))
+    chain, steps, limit = _searcher(needed=6.0).forward(models[0])
+    assert chain == models
+    assert asked == models[:-1]
+    assert len(steps) == len(chain)
+    assert limit == search.CAUSES_LEFT
 
 
 @pytest.mark.parametrize(
@@ -345,7 +375,7 @@ def test_what_a_better_course_leaves_is_scored_though_the_cause_remains(monkeypa
     monkeypatch.setattr(search._Searcher, "_left_out", lambda _self, _trial, *_causes: better)
     left = {one: Left((), (), np.full(3, float(number))) for number, one in enumerate((plain, tilt, again, better))}
     monkeypatch.setattr(Leavings, "of", lambda _self, trial: left[trial])
-    chain, steps = _searcher(needed=6.0).forward(plain)
+    chain, steps, _ = _searcher(needed=6.0).forward(plain)
     assert chain == [better, again]
     assert [step.left for step in steps] == [left[better], left[again]]
 

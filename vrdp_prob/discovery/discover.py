@@ -126,6 +126,7 @@ def discover(
         description=describe(found.best.fit, outcome.after) if doubtful else None,
         notes=(
             *_notes(found, causes, outcome.reasons, outcome.unlisted, doubtful=doubtful),
+            *([found.limit] if found.limit else []),
             *details_left(found.best.causes, outcome.after),
             *rivals_outside((cause.effect for cause in causes if cause.named), outcome.checks),
             *mass_scale_notes(_told(found, causes), videos),

@@ -21,7 +21,14 @@ from vrdp_prob.progress import ProgressDisplay, SilentProgress
 
 MOST_RIVALS = 2
 MOST_CAUSES = 5
-MOST_SWAPS, MOST_ROUNDS = 3, 3
+CAUSES_LEFT = f"The search ended after {MOST_CAUSES} causes, the most that are looked for; there may be more."
+MOST_SWAPS = 3
+MOST_ROUNDS = 3
+"""How often causes are looked for once more since a better course of events was found."""
+COURSES_LEFT = (
+    f"Better courses of events were found more than {MOST_ROUNDS} times while causes were looked for; beside the last "
+    "of them no cause was."
+)
 TRIFLING = 0.1
 """Share of what a model lacks that a better course must bring for causes to be looked for once more."""
 OUT_OF_REACH = 2.0
@@ -76,6 +83,8 @@ class Search:
         For each cause of `best`: models in which another cause takes its place, as far as any came close.
     refits
         What every model leaves, and the refits of it.
+    limit
+        The limit that ended the search, in a sentence; empty where it ended since nothing more was found.
     """
 
     base: Trial
@@ -84,6 +93,7 @@ class Search:
     lesser: tuple[Trial, ...]
     rivals: tuple[tuple[Trial, ...], ...]
     refits: Refits
+    limit: str = ""
 
     @property
     def needed(self) -> float:
@@ -167,7 +177,7 @@ def search(
     with (progress or SilentProgress()).stage("Trying causes", total=None) as advance:
         searcher = _Searcher(Refits(tuple(catalogue), seed, needed, advance))
         base = Trial((), with_own_population(fit), stated=fit.model.beliefs).continued()
-        chain, steps = searcher.forward(base)
+        chain, steps, limit = searcher.forward(base)
         best = searcher.unpatched(chain[-1])
         if best is not chain[-1]:
             chain.append(best)
@@ -175,7 +185,7 @@ def search(
         best, lesser, rivals = searcher.compared(chain, steps)
         if not best.causes:  # what was tried, and what is told, is of the model that was given
             best = chain[0]
-    return Search(chain[0], best, tuple(steps), lesser, rivals, searcher.refits)
+    return Search(chain[0], best, tuple(steps), lesser, rivals, searcher.refits, limit)
 
 
 @dataclass(frozen=True)
@@ -196,8 +206,11 @@ class _Searcher:
     def leavings(self) -> Leavings:
         return self.refits.leavings
 
-    def forward(self, base: Trial) -> tuple[list[Trial], list[Step]]:
-        """The models that follow one another, each with a cause more, and the step from each; the last adds nothing."""
+    def forward(self, base: Trial) -> tuple[list[Trial], list[Step], str]:
+        """The models that follow one another, each with a cause more, the step from each, and what limit ended them.
+
+        The last step adds nothing.
+        """
         chain, steps, rounds = [base], [self.untried(base)], 0
         while len(chain) <= MOST_CAUSES:
             step = steps[-1] = self.tried(chain[-1])
@@ -218,8 +231,12 @@ class _Searcher:
                 chain.append(winner)
                 steps.append(self.untried(winner))
             elif is_exhausted:
-                break
-        return chain, steps
+                return chain, steps, ""
+            elif rounds == MOST_ROUNDS:
+                return chain, steps, COURSES_LEFT
+            else:
+                rounds += 1
+        return chain, steps, CAUSES_LEFT
 
     def untried(self, trial: Trial) -> Step:
         """A step in which nothing was tried yet."""

@@ -89,6 +89,7 @@ def test_lost_videos_are_searched_before_causes_unless_something_shows_what_they
     monkeypatch.setattr(stages, "loses_single_videos", lambda _fits: lost)
     monkeypatch.setattr(stages, "surfaces_unknown_to", lambda *_given: ["wall"] if shown else [])
     monkeypatch.setattr(stages, "frames_unknown_to", lambda *_given: [])
+    monkeypatch.setattr(stages, "search", lambda one, *_given, **_how: one)
     monkeypatch.setattr(stages, "outcome_of", lambda one, *_given, **_how: given.append(one) or outcome)
     assert stages.Stages(default_model(), (), 0, None).outcome([]) is outcome
     assert given == [better if searched else fit]

@@ -12,9 +12,8 @@ from vrdp_prob.discovery.selection.doubts import Doubt, doubts, with_doubts
 from vrdp_prob.discovery.selection.estimates import cause_sentence, estimates
 from vrdp_prob.discovery.selection.forecast import error_ratios
 from vrdp_prob.discovery.selection.mimics import Unlisted, laws_of, without_mimics
-from vrdp_prob.discovery.selection.search import Search, search
+from vrdp_prob.discovery.selection.search import Search
 from vrdp_prob.discovery.selection.trials import Trial, gain, gains, weights
-from vrdp_prob.inference.several_videos.fitting import SharedFit
 from vrdp_prob.models.effects.effect import Effect
 from vrdp_prob.progress import ProgressDisplay
 
@@ -59,11 +58,18 @@ class Outcome:
     unlisted: tuple[Unlisted, ...]
 
 
-def outcome_of(
-    fit: SharedFit, catalogue: Sequence[Effect], needed: float, *, seed: int, progress: ProgressDisplay | None
-) -> Outcome:
-    """Search for causes, and put those that are found in doubt; parameters as in `search`."""
-    found = search(fit, catalogue, needed, seed=seed, progress=progress)
+def outcome_of(found: Search, *, seed: int, progress: ProgressDisplay | None) -> Outcome:
+    """Put the causes that a search has found in doubt, and say what is believed of them.
+
+    Parameters
+    ----------
+    found
+        The search.
+    seed
+        Seed of all randomness.
+    progress
+        Told how far the work is.
+    """
     checks = found.refits.leavings.checks(found.base)
     found, after, unlisted = _without_mimics(found, seed=seed, progress=progress)
     not_named: list[FoundCause] = []

@@ -7,11 +7,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from vrdp_prob.discovery.candidates.dropped_frames import frames_unknown_to
+from vrdp_prob.discovery.candidates.scores import happens_once
 from vrdp_prob.discovery.candidates.surfaces import surfaces_unknown_to
 from vrdp_prob.discovery.finding import Verdict
 from vrdp_prob.discovery.outcome import Outcome, outcome_of
+from vrdp_prob.discovery.selection.beginning import Beginning
+from vrdp_prob.discovery.selection.believed import extended_model
 from vrdp_prob.discovery.selection.leavings import Leavings
-from vrdp_prob.discovery.selection.search import Search, gain_needed
+from vrdp_prob.discovery.selection.search import Search, gain_needed, search
 from vrdp_prob.discovery.selection.trials import Trial
 from vrdp_prob.discovery.selection.tried import tried_causes
 from vrdp_prob.discovery.words import title
@@ -35,11 +38,14 @@ class Asked:
         Effects that were found there, or could be seen in all.
     searched, videos
         Numbers of the videos in which all causes were looked for, and of all.
+    beginning
+        What the search in all goes on from; None where nothing was found that acts in all.
     """
 
     causes: tuple[Effect, ...]
     searched: int
     videos: int
+    beginning: Beginning | None
 
     def sentences(self, found: Search) -> list[str]:
         """What was asked where, and what the best model leaves that calls for something else.
@@ -86,19 +92,23 @@ class Stages:
     def asked_of_all(self, videos: Sequence[Tracks], searched: int) -> Asked:
         """What is asked of all videos after causes were looked for in some, which are spread evenly over them.
 
-        These are the causes that are told of, and others that would bring enough in all videos if they brought as much
-        in each.
+        These are the causes that were found or come near to one of these, and others that would bring enough in all
+        videos if they brought as much in each. Whether they are to be doubted is asked of all videos.
         """
         some = [videos[index] for index in np.linspace(0, len(videos) - 1, searched).round().astype(int)]
-        outcome = self.outcome(some)
-        told = {cause.name for cause in outcome.causes}
+        fit = self._fit(some, self.catalogue)
+        found = self._search(fit, self.catalogue)
+        if not found.best.causes:
+            found = self._of_better_courses(fit, self._believed(found), self.catalogue).found
+        near = {one.causes[-1].cause_name() for rivals in found.rivals for one in rivals if found.comes_near(one)}
         further = {
             one.name
-            for one in tried_causes(outcome.found, (), seed=self.seed)
+            for one in tried_causes(found, (), seed=self.seed)
             if one.gain * len(videos) / len(some) >= one.gain_needed
         }
-        causes = tuple(effect for effect in self.catalogue if effect.cause_name() in told | further)
-        return Asked(causes, searched, len(videos))
+        asked = {cause.cause_name() for cause in found.best.causes} | near | further
+        causes = tuple(effect for effect in self.catalogue if effect.cause_name() in asked)
+        return Asked(causes, searched, len(videos), _beginning(found))
 
     def outcome(self, videos: Sequence[Tracks], asked: Asked | None = None) -> Outcome:
         """What is found in videos, and what is believed of it.
@@ -110,12 +120,18 @@ class Stages:
         asked
             What is asked of them; the whole catalogue where None.
         """
-        causes = self.catalogue if asked is None else asked.causes
+        causes, beginning = (self.catalogue, None) if asked is None else (asked.causes, asked.beginning)
+        fit = self._fit(videos, causes)
+        outcome = self._believed(self._search(fit, causes, beginning))
+        return self._of_better_courses(fit, outcome, causes)
+
+    def _fit(self, videos: Sequence[Tracks], causes: Sequence[Effect]) -> SharedFit:
+        """The fit of the model; single lost videos are searched anew, unless it lacks something."""
         fit = fit_together(videos, model=self.model, seed=self.seed, model_error=False, progress=self.progress)
         if loses_single_videos(fit.fits) and not self._lacks_something(fit, causes):
             with self._stage("Searching lost videos anew"):
                 fit = fit.with_lost_courses(seed=self.seed)
-        return self._of_better_courses(fit, self._outcome_of(fit, causes), causes)
+        return fit
 
     def _of_better_courses(self, fit: SharedFit, outcome: Outcome, causes: Sequence[Effect]) -> Outcome:
         """What is found where all videos are searched anew, if something is left that no cause explains.
@@ -126,7 +142,7 @@ class Stages:
             return outcome
         with self._stage("Searching all videos anew"):
             better = with_other_spins(fit, seed=self.seed).with_other_courses(seed=self.seed)
-        return outcome if better is fit else self._outcome_of(better, causes)
+        return outcome if better is fit else self._believed(self._search(better, causes))
 
     def _lacks_something(self, fit: SharedFit, causes: Sequence[Effect]) -> bool:
         """Whether tracks show what videos are lost for, or most videos call for a law: no course is to blame then."""
@@ -134,9 +150,13 @@ class Stages:
             return True
         return Leavings(tuple(causes), self.seed).most_call_for_a_law(Trial((), fit), self._needed)
 
-    def _outcome_of(self, fit: SharedFit, causes: Sequence[Effect]) -> Outcome:
+    def _search(self, fit: SharedFit, causes: Sequence[Effect], beginning: Beginning | None = None) -> Search:
         """What is found under a fit."""
-        return outcome_of(fit, causes, self._needed, seed=self.seed, progress=self.progress)
+        return search(fit, causes, self._needed, seed=self.seed, progress=self.progress, beginning=beginning)
+
+    def _believed(self, found: Search) -> Outcome:
+        """What is believed of what is found."""
+        return outcome_of(found, seed=self.seed, progress=self.progress)
 
     @property
     def _needed(self) -> float:
@@ -145,6 +165,18 @@ class Stages:
 
     def _stage(self, description: str) -> AbstractContextManager[Advance]:
         return (self.progress or SilentProgress()).stage(description)
+
+
+def _beginning(found: Search) -> Beginning | None:
+    """What a search in some videos has told; None where nothing was found that acts in all of them."""
+    causes = tuple(cause for cause in found.best.causes if not happens_once(cause))
+    if not causes:
+        return None
+    rivals = {
+        cause.name: frozenset(one.causes[-1].name for one in others if found.comes_near(one))
+        for cause, others in zip(found.best.causes, found.rivals, strict=True)
+    }
+    return Beginning(causes, extended_model(found.best, found.overdispersion), rivals)
 
 
 def _names(causes: Sequence[Effect]) -> str:

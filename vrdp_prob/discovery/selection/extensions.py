@@ -21,6 +21,7 @@ from vrdp_prob.inference.several_videos.fitting import SharedFit, fit_together
 from vrdp_prob.inference.several_videos.second_look import explained
 from vrdp_prob.models.effects.dropped_frames import DroppedFrames
 from vrdp_prob.models.effects.effect import Effect
+from vrdp_prob.models.physics import PhysicsModel
 from vrdp_prob.progress import Advance
 
 SHORT, MENDINGS = 0.5, 3
@@ -106,14 +107,28 @@ class Extensions:
     def _all(self, refit: Callable[[CauseScore], Trial | None], scores: Sequence[CauseScore]) -> list[Trial]:
         return [one for one in in_processes(refit, scores, advance=self.advance) if one is not None]
 
-    def from_the_beginning(self, trial: Trial, causes: Sequence[Effect]) -> Trial | None:
-        """The fit from the beginning with further causes; None where videos have no world in common."""
+    def from_the_beginning(
+        self, trial: Trial, causes: Sequence[Effect], believed: PhysicsModel | None = None
+    ) -> Trial | None:
+        """The fit from the beginning with further causes; None where videos have no world in common.
+
+        Parameters
+        ----------
+        trial
+            The model that lacks them.
+        causes
+            The causes.
+        believed
+            The model with them that believes what other fits have told, under which the videos are fitted first: from
+            there the fit goes on without that belief.
+        """
+        model = trial.fit.extended(*causes)
 
         def fitted() -> SharedFit:
             tracks = [part.clues.tracks for part in trial.fit.fits]
-            return fit_together(
-                tracks, model=trial.fit.extended(*causes), shared=trial.fit.shared, seed=self.seed, model_error=False
-            )
+            first = believed or model
+            fit = fit_together(tracks, model=first, shared=trial.fit.shared, seed=self.seed, model_error=False)
+            return fit if believed is None else fit.under(model, model_error=False)
 
         return self._began_anew(trial, causes, fitted)
 

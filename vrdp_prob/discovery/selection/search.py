@@ -8,6 +8,7 @@ import numpy as np
 from jaxtyping import Float
 
 from vrdp_prob.discovery.candidates.scores import mends_any_course
+from vrdp_prob.discovery.selection.beginning import Beginning
 from vrdp_prob.discovery.selection.leavings import Leavings, Left
 from vrdp_prob.discovery.selection.refits import Refits
 from vrdp_prob.discovery.selection.shortlist import HOPEFUL
@@ -114,6 +115,10 @@ class Search:
         """The search with what the best model leaves asked for the traces of other causes; none of them is tried."""
         return replace(self, refits=replace(self.refits, catalogue=tuple(catalogue)))
 
+    def comes_near(self, rival: Trial) -> bool:
+        """Whether a model with another cause in the place of one of the best model's may be as probable as that."""
+        return gain(self.best, rival, self.overdispersion)[0] < OUT_OF_REACH * self.needed
+
     def without(self, causes: Sequence[Effect]) -> "Search":
         """The search with a best model that lacks some of its causes, and those that bring too little without these."""
         if not causes:
@@ -158,6 +163,7 @@ def search(
     *,
     seed: int,
     progress: ProgressDisplay | None = None,
+    beginning: Beginning | None = None,
 ) -> Search:
     """Look for causes that a model lacks, one after the other.
 
@@ -173,9 +179,11 @@ def search(
         Of the null distributions.
     progress
         Told how far the work is.
+    beginning
+        What the search goes on from; from the model alone where None, or where these causes bring too little.
     """
     with (progress or SilentProgress()).stage("Trying causes", total=None) as advance:
-        searcher = _Searcher(Refits(tuple(catalogue), seed, needed, advance))
+        searcher = _Searcher(Refits(tuple(catalogue), seed, needed, advance), beginning)
         base = Trial((), with_own_population(fit), stated=fit.model.beliefs).continued()
         chain, steps, limit = searcher.forward(base)
         best = searcher.unpatched(chain[-1])
@@ -190,9 +198,18 @@ def search(
 
 @dataclass(frozen=True)
 class _Searcher:
-    """What is looked for."""
+    """What is looked for.
+
+    Parameters
+    ----------
+    refits
+        What makes the refits.
+    beginning
+        What the search goes on from, beside the model that is given.
+    """
 
     refits: Refits
+    beginning: Beginning | None = None
 
     @property
     def seed(self) -> int:
@@ -206,12 +223,18 @@ class _Searcher:
     def leavings(self) -> Leavings:
         return self.refits.leavings
 
+    def _near(self, cause: Effect) -> frozenset[str]:
+        """Names of effects that could take the place of a cause in the videos that the search begins with."""
+        return frozenset() if self.beginning is None else self.beginning.rivals.get(cause.name, frozenset())
+
     def forward(self, base: Trial) -> tuple[list[Trial], list[Step], str]:
         """The models that follow one another, each with a cause more, the step from each, and what limit ended them.
 
-        The last step adds nothing.
+        The last step adds nothing. Where some causes are known to begin with, the second model has these.
         """
-        chain, steps, rounds = [base], [self.untried(base)], 0
+        begun = None if self.beginning is None else self.beginning.fitted(base, self.refits)
+        chain = [base] if begun is None else [base, begun]
+        steps, rounds = [self.untried(one) for one in chain], 0
         while len(chain) <= MOST_CAUSES:
             step = steps[-1] = self.tried(chain[-1])
             found, winner = self.chosen(chain[-1], step)
@@ -429,7 +452,10 @@ class _Searcher:
         for cause, without in zip(best.causes, lesser, strict=True):
             step = _tried_at(cause, steps)
             others = [one for one in step.tried if one.causes[-1].name not in best.names]
-            if len(best.causes) > 1 or step is not steps[0]:
+            if near := self._near(cause) - {*best.names}:
+                again = [one for one in self.leavings.of(without).scores if one.effect.name in near][:MOST_RIVALS]
+                others = self.refits.extensions.made_of(without, again)
+            elif step.tried and (len(best.causes) > 1 or step is not steps[0]):
                 least = HOPEFUL * max(gain(one, step.base)[0] for one in step.tried)
                 close = {
                     one.causes[-1].name

@@ -10,6 +10,7 @@ from vrdp_prob.discovery.candidates.scores import CauseScore, Site
 from vrdp_prob.discovery.finding import Verdict
 from vrdp_prob.discovery.outcome import Outcome
 from vrdp_prob.discovery.selection.leavings import Leavings, Left
+from vrdp_prob.discovery.selection.search import Search
 from vrdp_prob.discovery.selection.trials import Trial
 from vrdp_prob.inference import default_model
 from vrdp_prob.inference.several_videos.fitting import SharedFit
@@ -89,7 +90,8 @@ def test_lost_videos_are_searched_before_causes_unless_something_shows_what_they
     monkeypatch.setattr(stages, "loses_single_videos", lambda _fits: lost)
     monkeypatch.setattr(stages, "surfaces_unknown_to", lambda *_given: ["wall"] if shown else [])
     monkeypatch.setattr(stages, "frames_unknown_to", lambda *_given: [])
-    monkeypatch.setattr(stages, "search", lambda one, *_given, **_how: one)
-    monkeypatch.setattr(stages, "outcome_of", lambda one, *_given, **_how: given.append(one) or outcome)
+    found = create_autospec(Search, instance=True)
+    monkeypatch.setattr(stages, "search", lambda one, *_given, **_how: given.append(one) or found)
+    monkeypatch.setattr(stages, "outcome_of", lambda _found, **_how: outcome)
     assert stages.Stages(default_model(), (), 0, None).outcome([]) is outcome
     assert given == [better if searched else fit]

@@ -103,8 +103,9 @@ def test_all_videos_are_searched_anew_where_no_cause_explains_what_is_left(
     before.verdict, before.found = verdict, _search(causes)
     monkeypatch.setattr(stages, "explained", lambda _fits: explains)
     monkeypatch.setattr(stages, "with_other_spins", lambda _given, *, seed: better if better_by == "spins" else fit)
-    monkeypatch.setattr(stages, "search", lambda given, *_given, **_named: given)
-    monkeypatch.setattr(stages, "outcome_of", lambda given, *_given, **_named: {better: anew}[given])
+    further = create_autospec(Search, instance=True)
+    monkeypatch.setattr(stages, "search", lambda given, *_given, **_named: {better: further}[given])
+    monkeypatch.setattr(stages, "outcome_of", lambda given, **_named: {further: anew}[given])
     found = stages.Stages(default_model(), (), 0, None)._of_better_courses(fit, before, [])
     assert found is {"anew": anew, "before": before}[taken]
 

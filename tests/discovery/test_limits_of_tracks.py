@@ -4,7 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from vrdp_prob.discovery.discover import _from_first_frames, _in_motion, _limits, _not_asked
+from vrdp_prob.discovery.discover import _from_first_frames, _in_motion, _limits, _not_asked, _not_explained
+from vrdp_prob.inference import default_model
+from vrdp_prob.inference.map_fit import MapFit, fit_map
 from vrdp_prob.scene import Body, Shape, Tracks
 
 
@@ -51,6 +53,26 @@ def test_times_of_clips_of_one_recording_are_counted_from_their_first_frames() -
     assert _from_first_frames(clips) is clips
     for one in _from_first_frames([*clips, _tracks("x", 0.04, start=60.0)]):
         np.testing.assert_allclose(one.times, 0.04 * np.arange(40.0), atol=1e-9)
+
+
+def _fit(video: str, residual_sd: float) -> MapFit:
+    """A fit that is off by so much (m), where the noise is 1 mm."""
+    fit = fit_map(_tracks(video, 0.04), default_model(), np.random.default_rng(0))
+    return replace(fit, misfit=replace(fit.misfit, residual_sd=residual_sd, noise_sd=1e-3))
+
+
+def test_videos_that_are_not_explained_are_told_of() -> None:
+    fine, off, worst = _fit("u", 1.2e-3), _fit("v", 4e-3), _fit("w", 0.25)
+    assert _not_explained([fine]) == []
+    (sentence,) = _not_explained([fine, off])
+    assert sentence.startswith(
+        "What is seen in v is not explained: after the best fit positions are off by 0.004 m, 4 "
+    )
+    (sentence,) = _not_explained([fine, off, worst])
+    assert sentence.startswith(
+        "What is seen in 2 of the 3 videos is not explained: after the best fit positions are off "
+    )
+    assert "by 0.25 m in w, the worst, 250 times the noise." in sentence
 
 
 def test_what_only_some_videos_tell_is_not_asked_and_that_is_told() -> None:

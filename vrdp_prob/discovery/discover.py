@@ -23,6 +23,7 @@ from vrdp_prob.discovery.words import title
 from vrdp_prob.inference import default_model
 from vrdp_prob.inference.assembly import limits_of_tracks
 from vrdp_prob.inference.infer import check_model
+from vrdp_prob.inference.map_fit import MapFit
 from vrdp_prob.inference.runs.checkpoint import (
     Checkpoint,
     check_importable,
@@ -273,6 +274,7 @@ def _notes(
             "probabilities count."
         )
     notes += [_unlisted_note(one) for one in unlisted]
+    notes += _not_explained(found.best.fit.fits)
     if not found.best.fit.joint.converged:
         notes.append(
             "The joint fit ended before it had converged: some video is at the edge between two courses of events."
@@ -301,6 +303,22 @@ def _notes(
             "How strong other causes can be at most is not told: what no cause explains may be hiding any of them."
         )
     return notes
+
+
+def _not_explained(fits: Sequence[MapFit]) -> list[str]:
+    """What is said of videos whose residuals are far larger than noise."""
+    lost = sorted((fit for fit in fits if fit.misfit.large), key=lambda fit: -fit.misfit.ratio)
+    if not lost:
+        return []
+    worst, name = lost[0].misfit, lost[0].clues.tracks.video
+    videos, where = (
+        (name, "") if len(lost) == 1 else (f"{len(lost)} of the {len(fits)} videos", f" in {name}, the worst")
+    )
+    return [
+        f"What is seen in {videos} is not explained: after the best fit positions are off by {worst.residual_sd:.2g} m"
+        f"{where}, {worst.ratio:.3g} times the noise. What happened there may not have been found, or something acts "
+        "that no cause says."
+    ]
 
 
 def _unlisted_note(unlisted: Unlisted) -> str:

@@ -71,6 +71,29 @@ def test_two_causes_at_contacts_are_told_where_none_explains_a_video_alone(
 
 
 @pytest.mark.parametrize(
+    ("explained", "told"), [(0, ["contact_friction", "slip_to_roll"]), (1, ["pair_force"])], ids=["second", "third"]
+)
+def test_two_causes_may_explain_the_second_worst_video_alone(
+    explained: int, told: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The worst one may be too hard to search even with both."""
+
+    def searched(
+        _self: object, video: int, candidates: list[tuple[Effect, ...]]
+    ) -> list[tuple[tuple[Effect, ...], single_videos._Found]]:
+        gained = [GAINS.get(tuple(cause.name for cause in causes), 0.0) for causes in candidates]
+        explains = [video == explained and len(causes) == 2 and gains > 0 for causes, gains in zip(candidates, gained)]
+        return [(causes, single_videos._Found(*one)) for causes, *one in zip(candidates, gained, explains)]
+
+    monkeypatch.setattr(single_videos._Searches, "with_causes", searched)
+    effects = [ContactFriction(), SlipToRoll(), PairForce()]
+    found = causes_of_lost_videos(create_autospec(SharedFit, instance=True), [2, 0, 1], effects, set(), 6.0, seed=0)
+    (causes, gained), *_ = found
+    assert [cause.name for cause in causes] == told
+    assert gained == (400.0 if len(told) == 2 else 90.0)
+
+
+@pytest.mark.parametrize(
     ("explains", "told"),
     [([("slip_to_roll",)], ["slip_to_roll"]), ([], ["pair_force"])],
     ids=["one explains videos", "none does"],

@@ -118,14 +118,19 @@ def causes_of_lost_videos(
 
 
 def _together(searches: "_Searches", lost: Sequence[int], effects: Sequence[Effect]) -> tuple[Causes, float] | None:
-    """Two causes that together explain the worst video, and what they gain (nats) in some; None where no two do."""
+    """Two causes that together explain one of some videos, and what they gain (nats) in all; None where no two do.
+
+    In the worst video a search may lose its way even with both.
+    """
     cheap = [effect for effect in effects if not effect.overrides("pair_force")]
-    found = searches.with_causes(lost[0], list(combinations(cheap, 2)))
-    explaining = [(causes, one.gain) for causes, one in found if one.explains]
-    if not explaining:
-        return None
-    best, gained = max(explaining, key=lambda pair: pair[1])
-    return best, gained + sum(one.gain for video in lost[1:] for _, one in searches.with_causes(video, [best]))
+    pairs = list(combinations(cheap, 2))
+    for video in lost:
+        explaining = [(causes, one.gain) for causes, one in searches.with_causes(video, pairs) if one.explains]
+        if explaining:
+            best, gained = max(explaining, key=lambda pair: pair[1])
+            others = [other for other in lost if other != video]
+            return best, gained + sum(one.gain for other in others for _, one in searches.with_causes(other, [best]))
+    return None
 
 
 class _Found(NamedTuple):

@@ -82,8 +82,11 @@ def test_two_causes_may_explain_the_second_worst_video_alone(
         _self: object, video: int, candidates: list[tuple[Effect, ...]]
     ) -> list[tuple[tuple[Effect, ...], single_videos._Found]]:
         gained = [GAINS.get(tuple(cause.name for cause in causes), 0.0) for causes in candidates]
-        explains = [video == explained and len(causes) == 2 and gains > 0 for causes, gains in zip(candidates, gained)]
-        return [(causes, single_videos._Found(*one)) for causes, *one in zip(candidates, gained, explains)]
+        explains = [
+            video == explained and len(causes) == 2 and gains > 0
+            for causes, gains in zip(candidates, gained, strict=True)
+        ]
+        return [(causes, single_videos._Found(*one)) for causes, *one in zip(candidates, gained, explains, strict=True)]
 
     monkeypatch.setattr(single_videos._Searches, "with_causes", searched)
     effects = [ContactFriction(), SlipToRoll(), PairForce()]

@@ -64,8 +64,18 @@ def test_the_verdict(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     found = _search(causes)
+    monkeypatch.setattr(outcome, "_loses_any", lambda _trial: False)
     monkeypatch.setattr(outcome, "_excess", lambda trial: excess if trial is found.best else 3.0)
     assert outcome._verdict(found, _checks(12), after) is verdict
+
+
+@pytest.mark.parametrize(("large", "verdict"), [(True, Verdict.UNKNOWN), (False, Verdict.NONE)])
+def test_a_model_that_does_not_explain_a_video_is_not_said_to_lack_nothing(*, large: bool, verdict: Verdict) -> None:
+    """Though no check fails: they count as chance what it leaves."""
+    found = _search(())
+    found.base = create_autospec(Trial, instance=True)
+    found.base.fit = Mock(fits=[Mock(misfit=Mock(large=one)) for one in (False, large)])
+    assert outcome._verdict(found, _checks(12), _checks(0)) is verdict
 
 
 @pytest.mark.parametrize(

@@ -146,10 +146,15 @@ def _verdict(found: Search, before: Sequence[Check], after: Sequence[Check]) -> 
     """What is said of a model whose causes nobody doubts, by the checks before and after."""
     left = min((check.p_value for check in after), default=1.0) * len(after) < LEFT_LEVEL
     if not found.best.causes:
-        return Verdict.UNKNOWN if left else Verdict.NONE
+        return Verdict.UNKNOWN if left or _loses_any(found.base) else Verdict.NONE
     explained = _excess(found.best) <= (1 - EXPLAINED) * _excess(found.base)
     mended = _failing(after) <= (1 - MENDED) * _failing(before)
     return Verdict.UNKNOWN if left and not (explained and mended) else Verdict.NAMED
+
+
+def _loses_any(trial: Trial) -> bool:
+    """Whether some video is not explained at all: checks count what it leaves as chance, however much that is."""
+    return any(part.misfit.large for part in trial.fit.fits)
 
 
 def _failing(checks: Sequence[Check]) -> int:

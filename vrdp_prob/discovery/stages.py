@@ -100,7 +100,7 @@ class Stages:
         found = self._search(fit, self.catalogue)
         if not found.best.causes:
             found = self._of_better_courses(fit, self._believed(found), self.catalogue).found
-        near = {one.causes[-1].cause_name() for rivals in found.rivals for one in rivals if found.comes_near(one)}
+        near = {one.causes[-1].cause_name() for rivals in found.near for one in rivals}
         further = {
             one.name
             for one in tried_causes(found, (), seed=self.seed)
@@ -173,8 +173,8 @@ def _beginning(found: Search) -> Beginning | None:
     if not causes:
         return None
     rivals = {
-        cause.name: frozenset(one.causes[-1].name for one in others if found.comes_near(one))
-        for cause, others in zip(found.best.causes, found.rivals, strict=True)
+        cause.name: frozenset(one.causes[-1].name for one in others)
+        for cause, others in zip(found.best.causes, found.near, strict=True)
     }
     return Beginning(causes, extended_model(found.best, found.overdispersion), rivals)
 

@@ -1,6 +1,6 @@
 """Forward selection of causes by how well whole videos are predicted that the model was not fitted to."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -115,9 +115,11 @@ class Search:
         """The search with what the best model leaves asked for the traces of other causes; none of them is tried."""
         return replace(self, refits=replace(self.refits, catalogue=tuple(catalogue)))
 
-    def comes_near(self, rival: Trial) -> bool:
-        """Whether a model with another cause in the place of one of the best model's may be as probable as that."""
-        return gain(self.best, rival, self.overdispersion)[0] < OUT_OF_REACH * self.needed
+    @property
+    def near(self) -> tuple[tuple[Trial, ...], ...]:
+        """For each cause of the best model: rivals that may be as probable as that."""
+        divisor, least = self.overdispersion, OUT_OF_REACH * self.needed
+        return tuple(tuple(one for one in some if gain(self.best, one, divisor)[0] < least) for some in self.rivals)
 
     def without(self, causes: Sequence[Effect]) -> "Search":
         """The search with a best model that lacks some of its causes, and those that bring too little without these."""
@@ -452,18 +454,16 @@ class _Searcher:
         for cause, without in zip(best.causes, lesser, strict=True):
             step = _tried_at(cause, steps)
             others = [one for one in step.tried if one.causes[-1].name not in best.names]
-            if near := self._near(cause) - {*best.names}:
-                again = [one for one in self.leavings.of(without).scores if one.effect.name in near][:MOST_RIVALS]
-                others = self.refits.extensions.made_of(without, again)
-            elif step.tried and (len(best.causes) > 1 or step is not steps[0]):
+            if not step.tried:  # the search has begun with the cause
+                others = self._instead(without, self.leavings.of(without), self._near(cause).difference(best.names))
+            elif len(best.causes) > 1 or step is not steps[0]:
                 least = HOPEFUL * max(gain(one, step.base)[0] for one in step.tried)
                 close = {
                     one.causes[-1].name
                     for one in others
                     if gain(one, step.base)[0] > least and not one.patches(one.causes[-1])
                 }
-                again = [one for one in step.left.scores if one.effect.name in close][:MOST_RIVALS]
-                others = self.refits.extensions.made_of(without, again)
+                others = self._instead(without, step.left, close)
                 if len(best.causes) == 1:
                     made = {*best.names, *(one.causes[-1].name for one in others)}
                     others += [one for one in steps[0].tried if one.causes[-1].name not in made]
@@ -473,6 +473,11 @@ class _Searcher:
                 others += sorted(hidden, key=merit, reverse=True)
             found.append(tuple(one for one in others if not one.patches(one.causes[-1])))
         return tuple(found)
+
+    def _instead(self, without: Trial, left: Left, names: Collection[str]) -> list[Trial]:
+        """Models with one of some causes in the place of the one that a model lacks, by the scores in what is left."""
+        again = [one for one in left.scores if one.effect.name in names][:MOST_RIVALS]
+        return self.refits.extensions.made_of(without, again)
 
 
 def _tried_at(cause: Effect, steps: Sequence[Step]) -> Step:

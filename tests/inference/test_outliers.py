@@ -92,3 +92,21 @@ def test_the_first_positions_may_be_outliers_whatever_happens_elsewhere(elsewher
         short[30:35, 0] = [[0.0, 0.0], [1.0, 2.0], [-1.0, 0.5], [2.0, -1.0], [0.0, 1.0]]
         positions = np.concatenate([positions, short], axis=1)
     assert outliers(times, positions)[:2, 0].all()
+
+
+@pytest.mark.parametrize("end", ["first", "last"])
+def test_a_single_position_before_or_after_a_contact_is_none(end: str) -> None:
+    times = np.arange(40) / 25
+    meeting = 1.4 / 25  # between the second frame and the third, so that a single one lies across the contact
+    struck = np.where(times < meeting, 2.0 * (times - meeting), -0.3 * (times - meeting))
+    hit = 0.4 + np.where(times < meeting, 0.0, 0.9 * (times - meeting))
+    positions = np.stack([np.stack([struck, hit], axis=1), np.zeros((40, 2))], axis=-1)
+    positions += np.random.default_rng(0).normal(0, 1e-3, positions.shape)
+    place = 0 if end == "first" else -1
+    seen = positions[1:] if end == "first" else positions[::-1][:-1]
+    bodies = (Body("0", Shape.SPHERE, 0.2), Body("1", Shape.SPHERE, 0.2))
+    assert not Clues.of(Tracks.from_arrays("early", bodies, times[1:], seen)).outliers.any()
+    far = seen + 5 * (np.arange(39) == np.arange(39)[place])[:, None, None]
+    assert Clues.of(Tracks.from_arrays("spoilt", bodies, times[1:], far)).outliers[place].all()
+    apart = seen + np.array([[0.0, 0.0], [0.0, 3.0]])
+    assert Clues.of(Tracks.from_arrays("apart", bodies, times[1:], apart)).outliers[place, 0]

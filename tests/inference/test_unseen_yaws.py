@@ -1,4 +1,4 @@
-"""Cubes whose yaw nobody measured: what a contact tells of it, in scenes of the tests' own integrator."""
+"""Cubes whose yaw nobody measured, or of which only turns were: what a contact tells of it, in scenes of the tests' own integrator."""
 
 from collections.abc import Callable
 
@@ -18,8 +18,8 @@ from vrdp_prob.inference.samplers.straightening import Rates
 from vrdp_prob.inference.samplers.yaw_tiles import yaw_jumps
 from vrdp_prob.inference.search import growing_fit, yaw_search
 from vrdp_prob.inference.search.descent import Descent
-from vrdp_prob.inference.search.hypothesis import QUARTER
-from vrdp_prob.inference.search.yaw_search import turned_worlds, unseen_yaws
+from vrdp_prob.inference.search.hypothesis import QUARTER, distances, turn, yaw_places, zero_place
+from vrdp_prob.inference.search.yaw_search import other_yaws, turned_worlds, unseen_yaws
 from vrdp_prob.models.likelihood import Likelihood
 
 ONE_CUBE = 2689
@@ -127,3 +127,40 @@ def test_posteriors_reach_the_true_spin(seed: int) -> None:
     found = [rank for rank in ranks(scene, posterior) if rank.kind in {"spin", "yaw"}]
     assert found
     assert all(abs(rank.error) < 3 for rank in found if rank.kind == "spin")
+
+
+@pytest.fixture(scope="module")
+def measured() -> tuple[MapFit, int, int]:
+    """A fit of a cube that a disc hits and whose angles were measured, and the places of its yaw and their zero."""
+    fit = fit_map(tracks(angles=True), default_model(), np.random.default_rng(0), model_error=False)
+    (yaw,) = yaw_places(fit.likelihood)
+    zero = zero_place(fit.likelihood, yaw)
+    assert zero is not None
+    return fit, yaw, zero
+
+
+def test_measured_angles_stay_as_they_were_seen_where_a_cube_is_turned(measured: tuple[MapFit, int, int]) -> None:
+    fit, yaw, zero = measured
+    assert not list(unseen_yaws(fit.likelihood, fit.point))
+    starts = turned_worlds(fit.likelihood, fit.point, 1, 0, spins=3, yaws=8)
+    assert len(starts) == 8
+    assert starts[:, yaw] + starts[:, zero] == pytest.approx(fit.point[yaw] + fit.point[zero])
+    assert np.ptp(starts[:, yaw]) > QUARTER / 2
+
+
+def test_a_quarter_turn_of_a_measured_cube_is_no_other_mode(measured: tuple[MapFit, int, int]) -> None:
+    fit, yaw, _ = measured
+    points = np.tile(fit.point, (2, 1))
+    turn(points, fit.likelihood, yaw, np.array([QUARTER, QUARTER / 4]))
+    same, other = distances(fit.likelihood, fit.point, fit.precision, points)
+    assert same < 1e-3
+    assert other > 3
+
+
+def test_the_yaw_of_a_measured_cube_is_looked_for(measured: tuple[MapFit, int, int]) -> None:
+    fit, yaw, _ = measured
+    askew = fit.point[None].copy()
+    turn(askew, fit.likelihood, yaw, np.array([QUARTER / 3]))
+    found = other_yaws(Descent(fit.likelihood, Optimiser.GAUSS_NEWTON), askew[0])
+    best = min(found, key=lambda one: one.cost)
+    assert distances(fit.likelihood, fit.point, fit.precision, best.point[None])[0] < 3

@@ -13,10 +13,20 @@ import torch
 from jaxtyping import Bool, Float
 
 from vrdp_prob.inference.draws.samples import Gaussian
+from vrdp_prob.inference.search.course_edges import best_beyond_edges, made_to_meet
 from vrdp_prob.inference.search.descent import Descent
 from vrdp_prob.inference.search.events import Pairs, courses_at
-from vrdp_prob.inference.search.free_flight import SeenContact
-from vrdp_prob.inference.search.hypothesis import QUARTER, Hypothesis, different, least_turn, owned, yaw_places
+from vrdp_prob.inference.search.free_flight import Approach, SeenContact
+from vrdp_prob.inference.search.hypothesis import (
+    QUARTER,
+    Hypothesis,
+    different,
+    least_turn,
+    owned,
+    turn,
+    yaw_places,
+    zero_place,
+)
 from vrdp_prob.inference.search.least_squares import Minimum, robust_cost
 from vrdp_prob.inference.search.release_contact import strike_before
 from vrdp_prob.models.likelihood import Likelihood
@@ -49,8 +59,8 @@ class Encounter:
     ----------
     bodies
         The bodies.
-    begin
-        Time (s) of the first approach.
+    approaches
+        When which of them came near each other.
     contacts
         What local fits say about contacts among them.
     first_contact
@@ -62,11 +72,16 @@ class Encounter:
     """
 
     bodies: frozenset[int]
-    begin: float
+    approaches: tuple[Approach, ...]
     contacts: tuple[SeenContact, ...]
     first_contact: dict[int, float]
     puzzling: bool
     at_release: tuple[tuple[int, int], ...]
+
+    @property
+    def begin(self) -> float:
+        """Time (s) of the first approach."""
+        return min(one.time for one in self.approaches)
 
 
 def alternatives(
@@ -83,13 +98,22 @@ def alternatives(
     likelihood = descent.likelihood
     local = owned(likelihood.coordinates, encounter.bodies) & active
     yaws = [place for place in yaw_places(likelihood, encounter.bodies) if active[place]]
-    drawn = _drawn(likelihood, hypothesis, encounter, np.flatnonzero(local), generator)
+    places = np.flatnonzero(local)
+    drawn = _drawn(likelihood, hypothesis, encounter, places, generator)
+    if encounter.puzzling:
+        bases = (hypothesis, hypothesis.before(encounter.begin))
+        met = [made_to_meet(likelihood, base, encounter.approaches, places, frame_count) for base in bases]
+        drawn = np.concatenate([drawn, *met])
     drawn = drawn[np.argsort(robust_cost(likelihood.residuals(drawn, frame_count), threshold))]
     found = courses_at(likelihood, torch.from_numpy(np.stack([hypothesis.point, *drawn])), frame_count)
     chosen = _spread(drawn, yaws, found[1:]) if encounter.puzzling else _other_courses(found)
     if not chosen:
         return []
     starts = drawn[chosen]
+    if encounter.puzzling:
+        others = drawn[[index for index in chosen if found[1 + index] != found[0]]]
+        edges = best_beyond_edges(likelihood, hypothesis.point, others, frame_count, threshold=threshold)
+        starts = np.concatenate([starts, edges])
     first = descent(starts, local, frame_count=frame_count, iterations=FIRST_ITERATIONS, threshold=threshold)
     hopeless = HOPELESS if encounter.puzzling else HOPELESS / 2
     hopeful = [one for one in first if one.cost < hypothesis.cost + hopeless]
@@ -116,6 +140,7 @@ def _drawn(
     """Worlds in which the bodies of an encounter have other states, half of them from before the encounter."""
     coordinates = likelihood.coordinates
     yaws = [place for place in yaw_places(likelihood, encounter.bodies) if place in places]
+    zeros = [zero for yaw in yaws if (zero := zero_place(likelihood, yaw)) is not None]
     count = DRAWS[len(yaws) > 1] if encounter.puzzling else FEW_DRAWS
     draws = np.tile(hypothesis.point, (count, 1))
     spreads = np.resize(np.repeat(SPREADS, 2), count)[:, None]
@@ -124,7 +149,7 @@ def _drawn(
         gaussian = Gaussian.from_precision(base.point[places], base.precision[np.ix_(places, places)])
         chosen = spreads[parity::2]
         moves = chosen * (generator.standard_normal((len(chosen), len(places))) @ gaussian.root.T)
-        moves[:, np.isin(places, yaws)] = 0.0
+        moves[:, np.isin(places, [*yaws, *zeros])] = 0.0
         draws[parity::2, places] = base.point[places] + np.clip(moves, -widest, widest)
     for contact in encounter.contacts:
         suggest(draws[::3], contact, likelihood, 1 / np.diag(hypothesis.precision))
@@ -141,7 +166,10 @@ def _turn(
     yaws: Sequence[int],
     generator: np.random.Generator,
 ) -> None:
-    """Draw yaws anew, in place; of a cube that has met something before, in half the draws, keep its yaw there."""
+    """Draw yaws anew, in place; of a cube that has met something before, in half the draws, keep its yaw there.
+
+    With that its spin changes, unless it was measured.
+    """
     coordinates = likelihood.coordinates
     places = coordinates.places
     count = len(draws)
@@ -151,13 +179,14 @@ def _turn(
         even = QUARTER * (generator.permutation(count) + generator.random(count)) / count
         known = encounter.first_contact.get(-1 if body is None else body)
         if known is None or spin is None:
-            draws[:, place] += even
+            turn(draws, likelihood, place, even)
             continue
-        draws[::2, place] += even[::2]
-        since = known - float(likelihood.tracks.first_seen[body])
-        change = (even[1::2] - QUARTER / 2) * 2 / max(encounter.begin - known, 0.2)
-        draws[1::2, spin] += change
-        draws[1::2, place] -= change * since
+        turn(draws[::2], likelihood, place, even[::2])
+        if zero_place(likelihood, place) is None:
+            since = known - float(likelihood.tracks.first_seen[body])
+            change = (even[1::2] - QUARTER / 2) * 2 / max(encounter.begin - known, 0.2)
+            draws[1::2, spin] += change
+            draws[1::2, place] -= change * since
 
 
 def suggest(

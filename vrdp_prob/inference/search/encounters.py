@@ -47,6 +47,7 @@ class EncounterFinder:
 
     def __init__(self, likelihood: Likelihood, clues: Clues) -> None:
         self._likelihood, self._clues = likelihood, clues
+        self._approaches = list(clues.approaches)
         self._tried: dict[Approach, int] = {}
         self._turned: set[int] = set()
 
@@ -55,10 +56,11 @@ class EncounterFinder:
         times = self._likelihood.tracks.times
         now = float(times[frame_count - 1])
         latest = now - SETTLED if frame_count < len(times) else now
-        ready = [one for one in self._clues.approaches if one.time <= latest and self._tried.get(one, 0) < MOST_TRIED]
+        contacts = contacts_in(self._likelihood, hypothesis, frame_count)
+        self._note(contacts)
+        ready = [one for one in self._approaches if one.time <= latest and self._tried.get(one, 0) < MOST_TRIED]
         if not ready:
             return []
-        contacts = contacts_in(self._likelihood, hypothesis, frame_count)
         suspects = _suspects(self._likelihood, hypothesis, frame_count)
         met = {(i, j) for _, i, j in contacts} | {(seen.first, seen.second) for seen in self._clues.contacts}
         chosen, puzzling = [], set()
@@ -77,6 +79,14 @@ class EncounterFinder:
         groups = _groups(chosen)
         return [self._encounter(group, contacts, puzzling=bool(puzzling & set(group))) for group in groups]
 
+    def _note(self, contacts: Sequence[Contact]) -> None:
+        """Remember contacts at which tracks show no approach: past a corner of a cube a body may come nearer still."""
+        for time, *pair in contacts:
+            first, second = sorted(pair)
+            known = (one for one in self._approaches if (one.first, one.second) == (first, second))
+            if all(abs(one.time - time) > SETTLED for one in known):
+                self._approaches.append(Approach(first, second, time))
+
     def _encounter(self, group: Sequence[Approach], contacts: Sequence[Contact], *, puzzling: bool) -> Encounter:
         bodies = frozenset(body for one in group for body in (one.first, one.second))
         pairs = {(one.first, one.second) for one in group}
@@ -91,12 +101,12 @@ class EncounterFinder:
             for body in {i, j} & bodies:
                 if time < begin - SETTLED / 2:
                     first.setdefault(body, time)
-        return Encounter(bodies, begin, seen, first, puzzling, self._at_release(pairs, begin))
+        return Encounter(bodies, tuple(group), seen, first, puzzling, self._at_release(pairs, begin))
 
     def _at_release(self, pairs: set[tuple[int, int]], begin: float) -> tuple[tuple[int, int], ...]:
-        """Pairs that meet so soon that hardly a frame shows how they came."""
-        tracks = self._likelihood.tracks
-        seen = [int((tracks.seen[:, [*pair]].all(axis=1) & (tracks.times <= begin)).sum()) for pair in sorted(pairs)]
+        """Pairs that meet so soon that hardly a frame shows how they came; the nearest frame may come after that."""
+        tracks = self._clues.clean
+        seen = [int((tracks.seen[:, [*pair]].all(axis=1) & (tracks.times < begin)).sum()) for pair in sorted(pairs)]
         return tuple(pair for pair, frames in zip(sorted(pairs), seen, strict=True) if frames <= UNSEEN)
 
 

@@ -27,8 +27,10 @@ from vrdp_prob.models.likelihood import Likelihood
 
 CANDIDATES = 64
 """Worlds drawn where a window brings something new."""
-REFINED = 2
-"""Candidates that are refined after that."""
+REFINED, MOST_REFINED = 2, 10
+"""Candidates that are refined after that, and that are at most, as long as refined ones explain little and differ."""
+ALIKE = 10.0
+"""Nats by which refined candidates differ at most that have found the same explanation."""
 SPREADS = (0.3, 1.0, 2.0, 4.0)
 """Candidates are drawn from the Gaussian of the fit so far, wider by these factors."""
 WIDEST = 2.0
@@ -86,7 +88,6 @@ class GrowingFit:
         self._clues, self._generator = clues, generator
         self._coordinates = likelihood.coordinates
         self._noise_places = self._coordinates.mask(NOISE_FIELDS)
-        self._yaws = yaw_places(likelihood)
         self._idle_sd = self._coordinates.prior_sd.copy()
         self._finder = EncounterFinder(likelihood, clues)
         self.hypotheses = [Hypothesis(start, np.inf, np.diag(self._idle_sd**-2))]
@@ -167,7 +168,7 @@ class GrowingFit:
         """Keep the best explanations that differ, with their yaws near zero."""
         kept = merged(self.likelihood, hypotheses, frame_count)
         end = float(self.likelihood.tracks.times[frame_count - 1])
-        self.hypotheses = [replace(one, point=turned_least(one.point, self._yaws)).noted(end) for one in kept]
+        self.hypotheses = [replace(one, point=turned_least(self.likelihood, one.point)).noted(end) for one in kept]
 
     def _followed(self, hypothesis: Hypothesis, frame_count: int, previous: int) -> Hypothesis:
         """An explanation on a larger window; refined unless nothing has happened that it does not know."""
@@ -257,19 +258,20 @@ class GrowingFit:
         if len(candidates) > 1:
             costs = robust_cost(self.likelihood.residuals(candidates, frame_count), HUBER)
             self.evaluations += len(candidates)
-            order = np.argsort(costs)[:REFINED].tolist()
-            order = order if 0 in order else [*order, 0]
-        best: Minimum | None = None
+            first, *rest = np.split(np.argsort(costs), [REFINED])
+            order = list(dict.fromkeys([*first.tolist(), 0, *np.concatenate(rest).tolist()]))[:MOST_REFINED]
+        found: list[Minimum] = []
         for start in candidates[order]:
             (minimum,) = self._descent(
                 start[None], active, frame_count=frame_count, iterations=6, tolerance=0.05, threshold=HUBER
             )
             self.evaluations += minimum.evaluations
-            if best is None or minimum.cost < best.cost:
-                best = minimum
+            found.append(minimum)
+            best = min(found, key=lambda one: one.cost)
             if best.cost < GOOD_FIT * len(best.jacobian) / 2:
                 break
-        assert best is not None  # there is at least one candidate
+            if len(found) > REFINED and all(one.cost < best.cost + ALIKE for one in found):
+                break
         return self._refined(hypothesis, best, active, frame_count)
 
     def _refined(

@@ -58,13 +58,29 @@ class Hypothesis:
 
 
 def yaw_places(likelihood: Likelihood, bodies: Iterable[int] | None = None) -> list[int]:
-    """Places of the yaws (of some bodies) that only contacts tell: cubes whose angle was not measured."""
-    coordinates, tracks = likelihood.coordinates, likelihood.tracks
-    measured = set(likelihood.observations.angle_bodies)
+    """Places of the yaws (of some bodies) that only contacts tell: those of cubes.
+
+    Measured angles tell how a cube turns, and not how it lies: they count from a zero of their own.
+    """
+    places, tracks = likelihood.coordinates.places, likelihood.tracks
     chosen = range(len(tracks.bodies)) if bodies is None else sorted(bodies)
-    cubes = (body for body in chosen if tracks.bodies[body].shape is Shape.CUBE and body not in measured)
-    places = (coordinates.places.get(("angle", body)) for body in cubes)
-    return [place for place in places if place is not None]
+    found = (places.get(("angle", body)) for body in chosen if tracks.bodies[body].shape is Shape.CUBE)
+    return [place for place in found if place is not None]
+
+
+def zero_place(likelihood: Likelihood, yaw: int) -> int | None:
+    """Place of the zero from which the measured angles of a cube count, by that of its yaw; None where it has none."""
+    coordinates = likelihood.coordinates
+    return coordinates.places.get(("angle_zero", coordinates.entries[yaw].owner))
+
+
+def turn(
+    points: Float[np.ndarray, "point dimension"], likelihood: Likelihood, yaw: int, by: Float[np.ndarray, "point"]
+) -> None:
+    """Turn a cube by some angles (rad), in place, its measured angles left as they were seen."""
+    points[:, yaw] += by
+    if (zero := zero_place(likelihood, yaw)) is not None:
+        points[:, zero] -= by
 
 
 def least_turn(angles: Float[np.ndarray, "*angle"]) -> Float[np.ndarray, "*angle"]:
@@ -73,12 +89,13 @@ def least_turn(angles: Float[np.ndarray, "*angle"]) -> Float[np.ndarray, "*angle
 
 
 def turned_least(
-    points: Float[np.ndarray, "*point dimension"], places: Sequence[int]
+    likelihood: Likelihood, points: Float[np.ndarray, "*point dimension"]
 ) -> Float[np.ndarray, "*point dimension"]:
-    """The same worlds with the yaws at some places within an eighth of a turn from zero."""
-    result = points.copy()
-    result[..., places] = least_turn(result[..., places])
-    return result
+    """The same worlds with the yaws that only contacts tell within an eighth of a turn from zero."""
+    result = points.copy().reshape(-1, points.shape[-1])
+    for yaw in yaw_places(likelihood):
+        turn(result, likelihood, yaw, least_turn(result[:, yaw]) - result[:, yaw])
+    return result.reshape(points.shape)
 
 
 def distances(
@@ -108,12 +125,15 @@ def distances(
         points = torch.from_numpy(np.concatenate([reference[None], moved, others]))
         turned = likelihood.rollout(points, frame_count).trajectory[..., 2].numpy()
     change = np.eye(len(reference))
-    difference = turned_least(others - reference, yaw_places(likelihood))
-    for place in yaws:
-        body = coordinates.entries[place].owner or 0
-        angle = turned[:, before[body], body]
-        change[place, slopes] = (angle[1 : len(slopes) + 1] - angle[0]) / SLOPE_STEP
-        difference[:, place] = least_turn(angle[len(slopes) + 1 :] - angle[0])
+    difference = others - reference
+    for place in yaw_places(likelihood):
+        apart = difference[:, place]
+        if place in yaws:
+            body = coordinates.entries[place].owner or 0
+            angle = turned[:, before[body], body]
+            change[place, slopes] = (angle[1 : len(slopes) + 1] - angle[0]) / SLOPE_STEP
+            apart = difference[:, place] = angle[len(slopes) + 1 :] - angle[0]
+        turn(difference, likelihood, place, least_turn(apart) - apart)
     straight = np.linalg.inv(change)
     metric = straight.T @ precision @ straight
     return np.sqrt(np.maximum(np.einsum("ij,jk,ik->i", difference, metric, difference), 0.0))

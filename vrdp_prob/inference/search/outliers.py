@@ -3,6 +3,7 @@
 import numpy as np
 from jaxtyping import Bool, Float
 
+from vrdp_prob.inference.search.free_flight import contact_distances
 from vrdp_prob.scene import Tracks
 
 FARTHEST = 7.0
@@ -15,6 +16,8 @@ FEWEST_LEFT = 4
 """Positions of a body that are kept in any case."""
 FEWEST_KNOWN = 8
 """Positions of a body from which its speeds are known to be no errors of the tracker."""
+NEIGHBOURS = 2
+"""Positions next to one at the beginning or the end of a track through which it is predicted."""
 PREDICTIONS = ((-2, -1), (-1, 1), (1, 2))
 """Neighbours, counted in seen frames, through which a straight line predicts a position."""
 
@@ -35,7 +38,12 @@ def gross_outliers(tracks: Tracks, sd: Float[np.ndarray, "time body"]) -> Bool[n
     for body in range(len(tracks.bodies)):
         seen = np.flatnonzero(tracks.seen[:, body])
         motion = _may_be_motion(
-            tracks.times[seen], tracks.positions[seen, body], found[seen, body], sd[seen, body], fastest
+            tracks.times[seen],
+            tracks.positions[seen, body],
+            found[seen, body],
+            sd[seen, body],
+            fastest,
+            meets=_meets_at_its_ends(tracks, body, ~found, fastest),
         )
         found[seen[motion], body] = False
     return found
@@ -86,11 +94,14 @@ def _may_be_motion(
     outliers: Bool[np.ndarray, "seen"],
     sd: Float[np.ndarray, "seen"],
     fastest: float,
+    *,
+    meets: tuple[bool, bool],
 ) -> Bool[np.ndarray, "seen"]:
     """Outliers, one or several in a row, that may well be motion.
 
     Through some a body goes over from its velocity before to that after: a soft contact. Others are all that was seen
-    of a body before its first contact or after its last one, where it is not much faster than anything else.
+    of a body before its first contact or after its last one, where it is not much faster than anything else; a single
+    position is if the body `meets` something there, at its first or last frames.
     """
     found = np.zeros(len(times), dtype=bool)
     velocity = np.diff(positions, axis=0) / np.diff(times)[:, None]
@@ -100,7 +111,7 @@ def _may_be_motion(
         if first > 1 and end + 1 < len(times) and not outliers[first - 2] and not outliers[end + 1]:
             middle = (velocity[first - 2] + velocity[end]) / 2
             reach = float(np.linalg.norm(velocity[end] - velocity[first - 2])) / 2
-        elif end - first > 1 and (first == 0 or end == len(times)):
+        elif (first == 0 and (end - first > 1 or meets[0])) or (end == len(times) and (end - first > 1 or meets[1])):
             middle, reach = np.zeros(2), fastest
         else:
             continue
@@ -108,6 +119,28 @@ def _may_be_motion(
         distance = np.linalg.norm(velocity[inside] - middle, axis=-1)
         found[first:end] = (distance <= OVERSHOOT * reach + FARTHEST * velocity_sd[inside]).all()
     return found
+
+
+def _meets_at_its_ends(
+    tracks: Tracks, body: int, trusted: Bool[np.ndarray, "time body"], fastest: float
+) -> tuple[bool, bool]:
+    """Whether a body may meet another one, or a wall, about its first trusted positions, and about its last ones."""
+    own, step = tracks.bodies[body], float(np.median(np.diff(tracks.times)))
+    if own.radius is None:
+        return False, False
+    farthest = own.radius * own.shape.reach
+
+    def near(frame: int) -> bool:
+        place = tracks.positions[frame, body]
+        gaps = [wall.distance(place) - farthest for wall in tracks.walls]
+        for other, one in enumerate(tracks.bodies):
+            touching = contact_distances(own, one)
+            if other != body and touching is not None and tracks.seen[frame, other] and trusted[frame, other]:
+                gaps.append(float(np.linalg.norm(tracks.positions[frame, other] - place)) - touching[1])
+        return min(gaps, default=np.inf) < fastest * step
+
+    frames = np.flatnonzero(tracks.seen[:, body] & trusted[:, body]).tolist()
+    return any(near(frame) for frame in frames[:NEIGHBOURS]), any(near(frame) for frame in frames[-NEIGHBOURS:])
 
 
 def _fastest(tracks: Tracks, body: int, trusted: Bool[np.ndarray, "time"]) -> float:

@@ -21,6 +21,7 @@ from vrdp_prob.inference.search.hypothesis import (
     frames_before_contact,
     least_turn,
     owned,
+    turn,
     yaw_places,
 )
 from vrdp_prob.inference.search.least_squares import Minimum
@@ -100,11 +101,11 @@ def other_yaws(descent: Descent, point: Float[np.ndarray, "dimension"]) -> list[
     descent
         Refines worlds of the density.
     point
-        A maximum. Every cube that meets something there, and whose yaw nobody measured, is turned by itself.
+        A maximum. Every cube that meets something there is turned by itself.
     """
     likelihood = descent.likelihood
     found: list[Minimum] = []
-    for body, frame in unseen_yaws(likelihood, point):
+    for body, frame in _cubes_that_meet(likelihood, point):
         met = bodies_met(likelihood, point, body)
         for one in _with_usual_decay(likelihood, point):
             starts = turned_worlds(likelihood, one, body, frame, spins=SPINS, yaws=YAWS)
@@ -131,9 +132,8 @@ def other_later_yaws(descent: Descent, point: Float[np.ndarray, "dimension"]) ->
         for before, time in pairwise([first, *later]):
             if time - before < CLOSE:
                 continue
-            turn = QUARTER * ((np.arange(QUARTERS * YAWS) + 0.5) / YAWS - QUARTERS / 2)
-            change = turn / (time - first)
-            starts = np.tile(point, (len(turn), 1))
+            change = QUARTER * ((np.arange(QUARTERS * YAWS) + 0.5) / YAWS - QUARTERS / 2) / (time - first)
+            starts = np.tile(point, (len(change), 1))
             starts[:, spin] += change
             starts[:, places["angle", body]] -= change * (first - float(tracks.first_seen[body]))
             frame = int(np.searchsorted(tracks.times, time))
@@ -175,7 +175,14 @@ def _contact_times(likelihood: Likelihood, point: Float[np.ndarray, "dimension"]
 
 
 def unseen_yaws(likelihood: Likelihood, point: Float[np.ndarray, "dimension"]) -> Iterator[tuple[int, int]]:
-    """Cubes whose yaw only contacts tell and that have some at a point, and the frame before the first of each."""
+    """Cubes whose angles nobody measured and that have contacts at a point, and the frame before the first of each."""
+    for body, frame in _cubes_that_meet(likelihood, point):
+        if body not in likelihood.observations.angle_bodies:
+            yield body, frame
+
+
+def _cubes_that_meet(likelihood: Likelihood, point: Float[np.ndarray, "dimension"]) -> Iterator[tuple[int, int]]:
+    """Cubes that have contacts at a point, which alone tell how they lie, and the frame before the first of each."""
     before = frames_before_contact(likelihood, point)
     for place in yaw_places(likelihood):
         body = likelihood.coordinates.entries[place].owner
@@ -201,10 +208,11 @@ def turned_worlds(
     """Worlds in which a body has other spins and, in a frame, other yaws; all yaws of one spin after one another.
 
     Spins are spread over their prior, yaws over a quarter turn. A body that rests before its first contact has one
-    spin.
+    spin, and so has one whose angles were measured.
     """
     coordinates = likelihood.coordinates
     yaw, spin = coordinates.places["angle", body], coordinates.places.get(("spin", body))
+    spin = None if body in likelihood.observations.angle_bodies else spin
     spinning = np.tile(point, (1 if spin is None else spins, 1))
     if spin is not None:
         spinning[:, spin] = coordinates.prior_mean[spin] + coordinates.prior_sd[spin] * np.linspace(
@@ -213,6 +221,6 @@ def turned_worlds(
     with torch.no_grad():
         angles = likelihood.rollout(torch.from_numpy(spinning)).trajectory[:, frame, body, 2].numpy()
     starts = np.repeat(spinning, yaws, axis=0)
-    turn = np.tile((np.arange(yaws) + 0.5) / yaws * QUARTER, len(spinning)) - np.repeat(angles, yaws)
-    starts[:, yaw] += least_turn(turn)
+    change = np.tile((np.arange(yaws) + 0.5) / yaws * QUARTER, len(spinning)) - np.repeat(angles, yaws)
+    turn(starts, likelihood, yaw, least_turn(change))
     return starts

@@ -1,4 +1,4 @@
-"""Cubes whose yaw nobody measured, or of which only turns were: what a contact tells of it, in scenes of the tests' own integrator."""
+"""Cubes of which nobody measured how they lie: what a contact tells of it, in scenes of the tests' own integrator."""
 
 from collections.abc import Callable
 

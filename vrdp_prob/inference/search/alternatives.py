@@ -100,8 +100,10 @@ def alternatives(
     yaws = [place for place in yaw_places(likelihood, encounter.bodies) if active[place]]
     places = np.flatnonzero(local)
     drawn = _drawn(likelihood, hypothesis, encounter, places, generator)
-    if encounter.puzzling:
-        bases = (hypothesis, hypothesis.before(encounter.begin))
+    before = hypothesis.before(encounter.begin)
+    may_be_graze = encounter.puzzling and (before is hypothesis or before.explains)
+    if may_be_graze:
+        bases = (hypothesis, before)
         met = [made_to_meet(likelihood, base, encounter.approaches, places, frame_count) for base in bases]
         drawn = np.concatenate([drawn, *met])
     drawn = drawn[np.argsort(robust_cost(likelihood.residuals(drawn, frame_count), threshold))]
@@ -110,7 +112,7 @@ def alternatives(
     if not chosen:
         return []
     starts = drawn[chosen]
-    if encounter.puzzling:
+    if may_be_graze:
         others = drawn[[index for index in chosen if found[1 + index] != found[0]]]
         edges = best_beyond_edges(likelihood, hypothesis.point, others, frame_count, threshold=threshold)
         starts = np.concatenate([starts, edges])

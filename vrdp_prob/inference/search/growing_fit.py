@@ -28,7 +28,8 @@ from vrdp_prob.models.likelihood import Likelihood
 CANDIDATES = 64
 """Worlds drawn where a window brings something new."""
 REFINED, MOST_REFINED = 2, 10
-"""Candidates that are refined after that, and that are at most, as long as refined ones explain little and differ."""
+"""Candidates that are refined after that, and that are at most, where all before is explained and what was refined is
+not, and differs."""
 ALIKE = 10.0
 """Nats by which refined candidates differ at most that have found the same explanation."""
 SPREADS = (0.3, 1.0, 2.0, 4.0)
@@ -43,6 +44,8 @@ MOST_UNREFINED = 2
 """...at most so often in a row."""
 WORSE = 1.3
 """A window whose new frames fit worse than this gets fresh candidates."""
+EXPLAINED = 1.3
+"""A fit explains the frames so far up to this factor on the cost that noise alone would make."""
 GOOD_FIT = 1.1
 """No further candidate is refined once the mean squared residual is below this (in units of the noise)."""
 FOLLOWED = 4
@@ -168,7 +171,18 @@ class GrowingFit:
         """Keep the best explanations that differ, with their yaws near zero."""
         kept = merged(self.likelihood, hypotheses, frame_count)
         end = float(self.likelihood.tracks.times[frame_count - 1])
-        self.hypotheses = [replace(one, point=turned_least(self.likelihood, one.point)).noted(end) for one in kept]
+        expected = self._expected_cost(frame_count)
+        self.hypotheses = [
+            replace(
+                one, point=turned_least(self.likelihood, one.point), explains=one.cost < EXPLAINED * expected
+            ).noted(end)
+            for one in kept
+        ]
+
+    def _expected_cost(self, frame_count: int) -> float:
+        """Cost of the first frames that noise alone would make."""
+        observations = self.likelihood.observations.until(frame_count)
+        return len(observations.frame) + len(observations.angle) / 2
 
     def _followed(self, hypothesis: Hypothesis, frame_count: int, previous: int) -> Hypothesis:
         """An explanation on a larger window; refined unless nothing has happened that it does not know."""
@@ -270,7 +284,7 @@ class GrowingFit:
             best = min(found, key=lambda one: one.cost)
             if best.cost < GOOD_FIT * len(best.jacobian) / 2:
                 break
-            if len(found) > REFINED and all(one.cost < best.cost + ALIKE for one in found):
+            if len(found) > REFINED and (not hypothesis.explains or all(one.cost < best.cost + ALIKE for one in found)):
                 break
         return self._refined(hypothesis, best, active, frame_count)
 
@@ -287,7 +301,7 @@ class GrowingFit:
         precision[idle, idle] = self._idle_sd[idle] ** -2
         pairs = self._pairs(minimum.point, frame_count)
         self.evaluations += 1
-        return Hypothesis(minimum.point, minimum.cost, precision, pairs, 0, hypothesis.earlier)
+        return Hypothesis(minimum.point, minimum.cost, precision, pairs, earlier=hypothesis.earlier)
 
     def _pairs(self, point: Float[np.ndarray, "dimension"], frame_count: int) -> tuple[tuple[int, int], ...]:
         with torch.no_grad():

@@ -35,6 +35,8 @@ class Hypothesis:
         Pairs that have collided, in order.
     unrefined
         Windows since it was last refined.
+    explains
+        Whether it explains the frames so far about as well as noise would.
     earlier
         What it was after earlier windows, with the time (s) at which each window ended.
     """
@@ -44,6 +46,7 @@ class Hypothesis:
     precision: Float[np.ndarray, "dimension dimension"]
     pairs: tuple[tuple[int, int], ...] = ()
     unrefined: int = 0
+    explains: bool = True
     earlier: tuple[tuple[float, "Hypothesis"], ...] = ()
 
     def before(self, time: float) -> "Hypothesis":

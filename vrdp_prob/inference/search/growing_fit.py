@@ -272,8 +272,8 @@ class GrowingFit:
         if len(candidates) > 1:
             costs = robust_cost(self.likelihood.residuals(candidates, frame_count), HUBER)
             self.evaluations += len(candidates)
-            first, *rest = np.split(np.argsort(costs), [REFINED])
-            order = list(dict.fromkeys([*first.tolist(), 0, *np.concatenate(rest).tolist()]))[:MOST_REFINED]
+            ranked = np.argsort(costs)[:MOST_REFINED].tolist()
+            order = list(dict.fromkeys([*ranked[:REFINED], 0, *ranked[REFINED:]]))
         found: list[Minimum] = []
         for start in candidates[order]:
             (minimum,) = self._descent(

@@ -33,6 +33,7 @@ from vrdp_prob.inference.search.modes import (
 )
 from vrdp_prob.inference.search.plan import FitPlan
 from vrdp_prob.inference.search.refinement import Refined, Searched, at_the_top, best_first, climb, refine
+from vrdp_prob.inference.search.release_places import released_apart
 from vrdp_prob.inference.search.yaw_search import with_other_yaws
 from vrdp_prob.models.likelihood import Likelihood
 from vrdp_prob.models.noise import NoiseFamily
@@ -362,4 +363,4 @@ def _start(likelihood: Likelihood, clues: Clues) -> Float[np.ndarray, "dimension
                 start[place] = value
     if (place := coordinates.places.get((NOISE, None))) is not None:
         start[place] = np.log(clues.noise / likelihood.observations.position_reference)
-    return start
+    return released_apart(likelihood, start)

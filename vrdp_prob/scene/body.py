@@ -161,11 +161,16 @@ class Wall:
         (x1, y1), (x2, y2) = sorted([(self.x1, self.y1), (self.x2, self.y2)])
         return _rounded(x1), _rounded(y1), _rounded(x2), _rounded(y2)
 
-    def distance(self, place: Float[np.ndarray, "2"]) -> float:
-        """Distance in m of a place from the wall."""
+    def nearest(self, place: Float[np.ndarray, "2"]) -> Float[np.ndarray, "2"]:
+        """Point of the wall, in m, that is nearest to a place."""
         begin, along = np.array([self.x1, self.y1]), np.array([self.x2 - self.x1, self.y2 - self.y1])
         share = np.clip((place - begin) @ along / (along @ along), 0.0, 1.0)
-        return float(np.linalg.norm(place - begin - share * along))
+        nearest: np.ndarray = begin + share * along
+        return nearest
+
+    def distance(self, place: Float[np.ndarray, "2"]) -> float:
+        """Distance in m of a place from the wall."""
+        return float(np.linalg.norm(place - self.nearest(place)))
 
 
 def _rounded(number: float) -> float:

@@ -13,6 +13,7 @@ from vrdp_prob.models.unknowns import Structure, unknowns
 from vrdp_prob.scene import Body, Shape, Tracks, Wall
 
 FLOOR = Wall(-3.0, 0.0, 3.0, 0.0, 0.8)
+NOISE = 0.001
 
 
 def released(shape: Shape, places: list[list[float]], *walls: Wall) -> tuple[Likelihood, np.ndarray]:
@@ -46,14 +47,19 @@ def possible(likelihood: Likelihood, start: np.ndarray) -> bool:
 def test_a_world_begins_possible(shape: Shape, places: list[list[float]], walls: list[Wall]) -> None:
     likelihood, start = released(shape, places, *walls)
     assert not possible(likelihood, start)
-    moved = released_apart(likelihood, start)
+    moved = released_apart(likelihood, start, NOISE)
     assert possible(likelihood, moved)
     assert np.abs(moved - start).max() < 0.005
 
 
 def test_bodies_that_are_apart_stay_where_they_are() -> None:
     likelihood, start = released(Shape.SPHERE, [[0.0, 0.21], [0.5, 0.3]], FLOOR)
-    np.testing.assert_array_equal(released_apart(likelihood, start), start)
+    np.testing.assert_array_equal(released_apart(likelihood, start, NOISE), start)
+
+
+def test_bodies_that_are_far_within_a_wall_stay_there() -> None:
+    likelihood, start = released(Shape.SPHERE, [[0.0, 0.19]], FLOOR)
+    np.testing.assert_array_equal(released_apart(likelihood, start, NOISE), start)
 
 
 def test_a_body_that_begins_at_a_wall_is_fitted() -> None:

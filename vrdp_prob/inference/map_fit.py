@@ -363,4 +363,4 @@ def _start(likelihood: Likelihood, clues: Clues) -> Float[np.ndarray, "dimension
                 start[place] = value
     if (place := coordinates.places.get((NOISE, None))) is not None:
         start[place] = np.log(clues.noise / likelihood.observations.position_reference)
-    return released_apart(likelihood, start)
+    return released_apart(likelihood, start, clues.noise)

@@ -100,10 +100,9 @@ def alternatives(
     yaws = [place for place in yaw_places(likelihood, encounter.bodies) if active[place]]
     places = np.flatnonzero(local)
     drawn = _drawn(likelihood, hypothesis, encounter, places, generator)
-    before = hypothesis.before(encounter.begin)
-    may_be_graze = encounter.puzzling and (before is hypothesis or before.explains)
+    may_be_graze = encounter.puzzling and hypothesis.explained_before(encounter.begin)
     if may_be_graze:
-        bases = (hypothesis, before)
+        bases = (hypothesis, hypothesis.before(encounter.begin))
         met = [made_to_meet(likelihood, base, encounter.approaches, places, frame_count) for base in bases]
         drawn = np.concatenate([drawn, *met])
     drawn = drawn[np.argsort(robust_cost(likelihood.residuals(drawn, frame_count), threshold))]

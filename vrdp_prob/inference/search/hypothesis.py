@@ -54,6 +54,11 @@ class Hypothesis:
         known = [one for end, one in self.earlier if end < time]
         return known[-1] if known else self
 
+    def explained_before(self, time: float) -> bool:
+        """Whether it explained all before a time (s), as far as that is known."""
+        before = self.before(time)
+        return before is self or before.explains
+
     def noted(self, end: float) -> "Hypothesis":
         """The same, remembered as what it is after the window that ends at a time (s)."""
         kept = tuple((time, one) for time, one in self.earlier if time < end)

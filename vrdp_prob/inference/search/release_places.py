@@ -10,11 +10,15 @@ from vrdp_prob.scene import Body, Shape, Tracks
 
 ROUNDS = 8
 """Times that each two things are moved apart; what is moved from one may overlap another then."""
+MOST_MOVED = 6.0
+"""Standard deviations of a position by which a body is moved at most."""
 APART = 1e-5
 """Share of the radius of a body that is left between it and what it would overlap."""
 
 
-def released_apart(likelihood: Likelihood, start: Float[np.ndarray, "dimension"]) -> Float[np.ndarray, "dimension"]:
+def released_apart(
+    likelihood: Likelihood, start: Float[np.ndarray, "dimension"], noise: float
+) -> Float[np.ndarray, "dimension"]:
     """A world with its bodies moved apart where they overlap walls or each other as they are released.
 
     A world in which they do is impossible, and no descent leads out of it.
@@ -24,7 +28,10 @@ def released_apart(likelihood: Likelihood, start: Float[np.ndarray, "dimension"]
     likelihood
         The density.
     start
-        The world; its cubes lie with no yaw.
+        The world; its cubes lie with no yaw. It is left as it is where some body would have to be moved by far more
+        than the noise: then radii, walls or positions are wrong.
+    noise
+        Measurement noise in m.
     """
     tracks, places = likelihood.tracks, likelihood.coordinates.places
     result = start.copy()
@@ -37,7 +44,8 @@ def released_apart(likelihood: Likelihood, start: Float[np.ndarray, "dimension"]
                 away = _apart(tracks.bodies[one], tracks.bodies[other], result[own] - result[others])
                 result[own] += away / 2
                 result[others] -= away / 2
-    return result
+    farthest = max(float(np.linalg.norm(result[own] - start[own])) for own in owned.values())
+    return result if farthest < MOST_MOVED * noise else start
 
 
 def _out_of_walls(tracks: Tracks, body: int, place: Float[np.ndarray, "2"]) -> Float[np.ndarray, "2"]:

@@ -16,14 +16,17 @@ FLOOR = Wall(-3.0, 0.0, 3.0, 0.0, 0.8)
 NOISE = 0.001
 
 
-def released(shape: Shape, places: list[list[float]], *walls: Wall) -> tuple[Likelihood, np.ndarray]:
-    """Likelihood of bodies of radius 0.2 m that drift away from some places (m), and the world that begins there."""
+def released(
+    shape: Shape, places: list[list[float]], *walls: Wall, radii: tuple[float | None, ...] = (0.2, 0.2)
+) -> tuple[Likelihood, np.ndarray]:
+    """Likelihood of bodies of some radii (m) that drift away from some places (m), and the world that begins there."""
     times = np.arange(10) / 25
     positions = np.array(places) + times[:, None, None] * np.array([0.5, 0.5])
-    bodies = tuple(Body(str(k), shape, 0.2) for k in range(len(places)))
+    bodies = tuple(Body(str(k), shape, radius) for k, radius in zip(range(len(places)), radii, strict=False))
     tracks = Tracks.from_arrays("released", bodies, times, positions, walls=walls)
     everything = frozenset(range(len(places)))
-    coordinates = unknowns(tracks, default_model(), Structure(moving=everything, colliding=everything))
+    meeting = frozenset(body for body in everything if bodies[body].radius is not None)
+    coordinates = unknowns(tracks, default_model(), Structure(moving=everything, colliding=meeting))
     start = coordinates.prior_mean.copy()
     for body, (x, y) in enumerate(places):
         start[[coordinates.places["x", body], coordinates.places["y", body]]] = x, y
@@ -55,6 +58,13 @@ def test_a_world_begins_possible(shape: Shape, places: list[list[float]], walls:
 def test_bodies_that_are_apart_stay_where_they_are() -> None:
     likelihood, start = released(Shape.SPHERE, [[0.0, 0.21], [0.5, 0.3]], FLOOR)
     np.testing.assert_array_equal(released_apart(likelihood, start, NOISE), start)
+
+
+def test_bodies_whose_radius_is_not_stated_meet_nothing() -> None:
+    likelihood, start = released(Shape.SPHERE, [[0.0, 0.197], [0.1, 0.3]], FLOOR, radii=(0.2, None))
+    moved = released_apart(likelihood, start, NOISE)
+    changed = np.flatnonzero(moved != start)
+    assert [likelihood.coordinates.entries[place].owner for place in changed] == [0]
 
 
 def test_bodies_that_are_far_within_a_wall_stay_there() -> None:

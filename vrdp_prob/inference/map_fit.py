@@ -317,8 +317,7 @@ def _in_doubt(attempts: Sequence[GrowingFit]) -> bool:
 
 def _plausible(attempts: Sequence[GrowingFit]) -> bool:
     """Whether the best explanation is about as good as noise alone would make it."""
-    observations = attempts[0].likelihood.observations
-    expected = len(observations.frame) + len(observations.angle) / 2
+    expected = attempts[0].expected_cost(len(attempts[0].likelihood.tracks.times))
     return min(one.hypotheses[0].cost for one in attempts) < GOOD_COST * expected
 
 

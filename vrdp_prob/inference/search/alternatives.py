@@ -12,7 +12,6 @@ import numpy as np
 import torch
 from jaxtyping import Bool, Float
 
-from vrdp_prob.inference.draws.samples import Gaussian
 from vrdp_prob.inference.search.course_edges import best_beyond_edges, made_to_meet
 from vrdp_prob.inference.search.descent import Descent
 from vrdp_prob.inference.search.events import Pairs, courses_at
@@ -147,7 +146,7 @@ def _drawn(
     spreads = np.resize(np.repeat(SPREADS, 2), count)[:, None]
     widest = WIDEST * coordinates.prior_sd[places]
     for parity, base in enumerate((hypothesis, hypothesis.before(encounter.begin))):
-        gaussian = Gaussian.from_precision(base.point[places], base.precision[np.ix_(places, places)])
+        gaussian = base.around(places)
         chosen = spreads[parity::2]
         moves = chosen * (generator.standard_normal((len(chosen), len(places))) @ gaussian.root.T)
         moves[:, np.isin(places, [*yaws, *zeros])] = 0.0

@@ -11,7 +11,6 @@ import numpy as np
 import torch
 from jaxtyping import Float
 
-from vrdp_prob.inference.draws.samples import Gaussian
 from vrdp_prob.inference.search.events import courses_at
 from vrdp_prob.inference.search.free_flight import Approach, contact_distances
 from vrdp_prob.inference.search.hypothesis import Hypothesis
@@ -58,7 +57,7 @@ def made_to_meet(
     """
     entries = likelihood.coordinates.entries
     places = np.array([place for place in places if entries[place].field in PATH], dtype=int)
-    gaussian = Gaussian.from_precision(hypothesis.point[places], hypothesis.precision[np.ix_(places, places)])
+    gaussian = hypothesis.around(places)
     steps = np.zeros((1 + len(places), len(hypothesis.point)))
     steps[1:, places] = STEP * gaussian.root.T
     with torch.no_grad():

@@ -12,7 +12,6 @@ import numpy as np
 import torch
 from jaxtyping import Bool, Float
 
-from vrdp_prob.inference.draws.samples import Gaussian
 from vrdp_prob.inference.search.alternatives import Encounter, alternatives, suggest
 from vrdp_prob.inference.search.clues import Clues
 from vrdp_prob.inference.search.descent import Descent
@@ -171,7 +170,7 @@ class GrowingFit:
         """Keep the best explanations that differ, with their yaws near zero."""
         kept = merged(self.likelihood, hypotheses, frame_count)
         end = float(self.likelihood.tracks.times[frame_count - 1])
-        expected = self._expected_cost(frame_count)
+        expected = self.expected_cost(frame_count)
         self.hypotheses = [
             replace(
                 one, point=turned_least(self.likelihood, one.point), explains=one.cost < EXPLAINED * expected
@@ -179,7 +178,7 @@ class GrowingFit:
             for one in kept
         ]
 
-    def _expected_cost(self, frame_count: int) -> float:
+    def expected_cost(self, frame_count: int) -> float:
         """Cost of the first frames that noise alone would make."""
         observations = self.likelihood.observations.until(frame_count)
         return len(observations.frame) + len(observations.angle) / 2
@@ -248,7 +247,7 @@ class GrowingFit:
     ) -> Float[np.ndarray, "candidate dimension"]:
         """Worlds drawn from what is known so far, half of them with the collisions that local fits suggest."""
         places = np.flatnonzero(active)
-        gaussian = Gaussian.from_precision(hypothesis.point[places], hypothesis.precision[np.ix_(places, places)])
+        gaussian = hypothesis.around(places)
         normal = self._generator.standard_normal((CANDIDATES, len(places)))
         spreads = np.resize(np.array(SPREADS), CANDIDATES)[:, None]
         widest = WIDEST * self._coordinates.prior_sd[places]

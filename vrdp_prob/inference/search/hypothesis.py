@@ -5,8 +5,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import torch
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
+from vrdp_prob.inference.draws.samples import Gaussian
 from vrdp_prob.inference.search.least_squares import Minimum
 from vrdp_prob.models.coordinates import Coordinates
 from vrdp_prob.models.likelihood import Likelihood
@@ -48,6 +49,10 @@ class Hypothesis:
     unrefined: int = 0
     explains: bool = True
     earlier: tuple[tuple[float, "Hypothesis"], ...] = ()
+
+    def around(self, places: Int[np.ndarray, "place"]) -> Gaussian:
+        """The Gaussian around it, of the coordinates at some places, the others held."""
+        return Gaussian.from_precision(self.point[places], self.precision[np.ix_(places, places)])
 
     def before(self, time: float) -> "Hypothesis":
         """What it was after the last window that ended before a time (s); itself where there is none."""
@@ -121,7 +126,6 @@ def distances(
     """
     coordinates = likelihood.coordinates
     before = frames_before_contact(likelihood, reference, frame_count)
-    yaws = [place for place in yaw_places(likelihood) if coordinates.entries[place].owner in before]
     slopes = [
         place
         for place, entry in enumerate(coordinates.entries)
@@ -136,8 +140,8 @@ def distances(
     difference = others - reference
     for place in yaw_places(likelihood):
         apart = difference[:, place]
-        if place in yaws:
-            body = coordinates.entries[place].owner or 0
+        body = coordinates.entries[place].owner
+        if body is not None and body in before:
             angle = turned[:, before[body], body]
             change[place, slopes] = (angle[1 : len(slopes) + 1] - angle[0]) / SLOPE_STEP
             apart = difference[:, place] = angle[len(slopes) + 1 :] - angle[0]

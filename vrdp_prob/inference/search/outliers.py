@@ -35,7 +35,7 @@ def gross_outliers(tracks: Tracks, sd: Float[np.ndarray, "time body"]) -> Bool[n
                 break
             found[seen[new], body] = True
     fastest = max((_fastest(tracks, body, ~found[:, body]) for body in range(len(tracks.bodies))), default=0.0)
-    for body in range(len(tracks.bodies)):
+    for body in np.flatnonzero(found.any(axis=0)).tolist():
         seen = np.flatnonzero(tracks.seen[:, body])
         motion = _may_be_motion(
             tracks.times[seen],
@@ -111,7 +111,7 @@ def _may_be_motion(
         if first > 1 and end + 1 < len(times) and not outliers[first - 2] and not outliers[end + 1]:
             middle = (velocity[first - 2] + velocity[end]) / 2
             reach = float(np.linalg.norm(velocity[end] - velocity[first - 2])) / 2
-        elif (first == 0 and (end - first > 1 or meets[0])) or (end == len(times) and (end - first > 1 or meets[1])):
+        elif (first == 0 or end == len(times)) and (end - first > 1 or meets[int(first > 0)]):
             middle, reach = np.zeros(2), fastest
         else:
             continue

@@ -35,7 +35,11 @@ def released_apart(
     """
     tracks, places = likelihood.tracks, likelihood.coordinates.places
     result = start.copy()
-    owned = {body: np.array([places["x", body], places["y", body]]) for body in range(len(tracks.bodies))}
+    owned = {
+        body: np.array([places["x", body], places["y", body]])
+        for body, one in enumerate(tracks.bodies)
+        if one.radius is not None  # the others meet nothing
+    }
     for _ in range(ROUNDS):
         for body, own in owned.items():
             result[own] += _out_of_walls(tracks, body, result[own])
@@ -44,7 +48,7 @@ def released_apart(
                 away = _apart(tracks.bodies[one], tracks.bodies[other], result[own] - result[others])
                 result[own] += away / 2
                 result[others] -= away / 2
-    farthest = max(float(np.linalg.norm(result[own] - start[own])) for own in owned.values())
+    farthest = max((float(np.linalg.norm(result[own] - start[own])) for own in owned.values()), default=0.0)
     return result if farthest < MOST_MOVED * noise else start
 
 
@@ -64,15 +68,14 @@ def _apart(first: Body, second: Body, between: Float[np.ndarray, "2"]) -> Float[
 
 def _missing(between: Float[np.ndarray, "2"], reach: float) -> Float[np.ndarray, "2"]:
     distance = float(np.linalg.norm(between))
-    if reach == 0 or distance >= reach or distance == 0:
+    if distance >= reach or distance == 0:
         return np.zeros(2)
     return (reach * (1 + APART) - distance) * between / distance
 
 
 def _extent(body: Body, direction: Float[np.ndarray, "2"]) -> float:
     """How far (m) a body reaches along a direction; a cube as it lies with no yaw. 0 where its radius is not stated."""
-    if body.radius is None:
-        return 0.0
+    radius = body.radius or 0.0
     if body.shape is not Shape.CUBE:
-        return body.radius
-    return body.radius * float(np.abs(direction).sum() / max(np.linalg.norm(direction), 1e-12))
+        return radius
+    return radius * float(np.abs(direction).sum() / max(np.linalg.norm(direction), 1e-12))

@@ -1,5 +1,8 @@
 """Long work tells that it goes on."""
 
+import threading
+import time
+
 import pytest
 
 from vrdp_prob.progress import LogProgress, SilentProgress, progress_display
@@ -28,6 +31,25 @@ def test_a_stage_of_unknown_length_counts_its_steps(capsys: pytest.CaptureFixtur
     with LogProgress(every=0).stage("Trying causes") as advance:
         advance(2)
     assert capsys.readouterr().err == "Trying causes: 2 steps in 0 s\n"
+
+
+def test_a_log_goes_on_where_no_step_is_done(capsys: pytest.CaptureFixture[str]) -> None:
+    with LogProgress(every=0.2).stage("Trying causes") as advance:
+        advance(1)
+        told, deadline = "", time.monotonic() + 20
+        while told.count("\n") < 2 and time.monotonic() < deadline:
+            time.sleep(0.05)
+            told += capsys.readouterr().err
+    assert told.count("Trying causes: 1 steps in") == told.count("\n") >= 2
+
+
+def test_a_stage_that_fails_ends(capsys: pytest.CaptureFixture[str]) -> None:
+    before = threading.active_count()
+    stage = LogProgress(every=0.1).stage("Trying causes")
+    with pytest.raises(ValueError, match="broken"), stage:
+        raise ValueError("broken")
+    assert threading.active_count() == before
+    assert not capsys.readouterr().err
 
 
 def test_a_log_has_no_bars() -> None:

@@ -4,6 +4,7 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
+from threading import Event, Lock, Thread
 from typing import Protocol, runtime_checkable
 
 from rich.console import Console
@@ -13,6 +14,8 @@ Advance = Callable[[float], None]
 
 AT_ONCE = 1.0
 """Seconds within which steps are reported that were done before."""
+SHORTEST = 0.1
+"""Seconds between two looks at a stage in which no step is done."""
 
 
 @runtime_checkable
@@ -75,7 +78,7 @@ class TerminalProgress:
 
 
 class LogProgress:
-    """A line on standard error now and then; short stages tell nothing.
+    """A line on standard error now and then, while steps are done and while none is; short stages tell nothing.
 
     Parameters
     ----------
@@ -94,18 +97,30 @@ class LogProgress:
         """Open a stage told in lines."""
         begin = told = self._clock()
         done = kept = 0.0
+        one_at_a_time, ended = Lock(), Event()
 
         def advance(steps: float) -> None:
             nonlocal done, kept, told
-            done += steps
-            now = self._clock()
-            if now - begin < AT_ONCE:
-                kept = done
-            if now - told >= self._every:
-                told = now
-                print(_line(description, done, kept, total, now - begin), file=sys.stderr, flush=True)
+            with one_at_a_time:
+                done += steps
+                now = self._clock()
+                if now - begin < AT_ONCE:
+                    kept = done
+                if now - told >= self._every:
+                    told = now
+                    print(_line(description, done, kept, total, now - begin), file=sys.stderr, flush=True)
 
-        yield advance
+        def go_on() -> None:
+            while not ended.wait(max(self._every, SHORTEST)):
+                advance(0)
+
+        going_on = Thread(target=go_on, daemon=True)
+        going_on.start()
+        try:
+            yield advance
+        finally:
+            ended.set()
+            going_on.join()
 
 
 def _line(description: str, done: float, kept: float, total: float | None, seconds: float) -> str:

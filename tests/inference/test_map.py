@@ -19,7 +19,7 @@ from vrdp_prob.inference.search.encounters import CROWDED, MANY_PARTNERS, hard_t
 from vrdp_prob.inference.search.events import courses
 from vrdp_prob.inference.search.hypothesis import distances, yaw_places
 from vrdp_prob.inference.search.misfit import Misfit
-from vrdp_prob.inference.search.mode_search import ModeSearch
+from vrdp_prob.inference.search.mode_search import ModeSearch, agree
 from vrdp_prob.inference.search.model_error_fit import expected_model_error
 from vrdp_prob.inference.search.modes import structure_at, with_all_that_meet
 from vrdp_prob.inference.search.plan import CURRICULUM, GROWING, FitPlan, Optimiser
@@ -218,6 +218,15 @@ def test_windows_end_with_the_whole_video() -> None:
     assert FitPlan().ends(tracks)[-2:] == [120, 128]
     assert CURRICULUM.ends(tracks) == [40, 80, 128]
     assert FitPlan(windows=()).ends(tracks) == [128]
+
+
+def test_searches_agree_at_the_noise_that_they_leave() -> None:
+    assert not agree([300.0], 310.0)
+    assert agree([300.0, 340.0, 300.5], 310.0)
+    assert not agree([300.0, 340.0, 302.0], 310.0)
+    assert agree([15_000.0, 15_030.0], 310.0)
+    assert not agree([15_000.0, 15_100.0], 310.0)
+    assert not agree([np.inf, np.inf], 310.0)
 
 
 def test_the_search_says_what_it_did_not_cover() -> None:

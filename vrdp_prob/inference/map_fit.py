@@ -21,7 +21,7 @@ from vrdp_prob.inference.search.event_orders import with_other_orders
 from vrdp_prob.inference.search.events import Pairs, first_contacts
 from vrdp_prob.inference.search.growing_fit import GrowingFit, merged
 from vrdp_prob.inference.search.misfit import Misfit, judge, shows_outliers, with_outliers
-from vrdp_prob.inference.search.mode_search import ModeSearch
+from vrdp_prob.inference.search.mode_search import ModeSearch, agree
 from vrdp_prob.inference.search.model_error_fit import TURNS, next_model_error
 from vrdp_prob.inference.search.modes import (
     HOPELESS,
@@ -43,8 +43,6 @@ from vrdp_prob.models.unknowns import MOTION, NOISE, Held, Structure, unknowns
 from vrdp_prob.progress import ProgressDisplay, SilentProgress
 from vrdp_prob.scene import Tracks
 
-AGREED = 1.0
-"""Fits are grown anew until the two best agree to so many nats."""
 GOOD_COST = 1.15
 """A fit is plausible up to this factor on the cost that noise alone would make."""
 LBFGS_ITERATIONS = 30
@@ -310,15 +308,9 @@ def _attempts(task: _Task, generator: np.random.Generator, progress: ProgressDis
 
 def _in_doubt(attempts: Sequence[GrowingFit]) -> bool:
     """Whether a fit met what easily leads astray or explains too little, and no two agree on the best explanation."""
-    costs = sorted(one.hypotheses[0].cost for one in attempts)
-    agreed = len(costs) > 1 and costs[1] - costs[0] < AGREED
-    return not agreed and (any(one.doubtful for one in attempts) or not _plausible(attempts))
-
-
-def _plausible(attempts: Sequence[GrowingFit]) -> bool:
-    """Whether the best explanation is about as good as noise alone would make it."""
+    costs = [one.hypotheses[0].cost for one in attempts]
     expected = attempts[0].expected_cost(len(attempts[0].likelihood.tracks.times))
-    return min(one.hypotheses[0].cost for one in attempts) < GOOD_COST * expected
+    return not agree(costs, expected) and (any(one.doubtful for one in attempts) or min(costs) >= GOOD_COST * expected)
 
 
 def _grow(task: _Task, generator: np.random.Generator, progress: ProgressDisplay | None) -> GrowingFit:

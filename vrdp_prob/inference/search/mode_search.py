@@ -1,6 +1,12 @@
 """What was done to find all modes of a posterior."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+
+import numpy as np
+
+AGREED = 1.0
+"""Nats by which the two best fits differ at most that have found the same explanation."""
 
 
 @dataclass(frozen=True)
@@ -45,3 +51,20 @@ class ModeSearch:
                 "probable course of events; there may be a better explanation, or others as good."
             )
         return ""
+
+
+def agree(costs: Sequence[float], expected: float) -> bool:
+    """Whether the two best of some fits have found the same explanation, going by their costs (nats).
+
+    Fits are grown at the noise of the tracks themselves. Where they leave more than that, the noise will be taken to be
+    larger, and what is much apart at the small one is not at the other.
+
+    Parameters
+    ----------
+    costs
+        Costs of the fits.
+    expected
+        The cost that noise alone would make.
+    """
+    best, second = sorted([*costs, np.inf, np.inf])[:2]
+    return second - best < AGREED * max(best / expected, 1.0)

@@ -336,12 +336,14 @@ def fit_together(
         check_names(shared, model)
     if plan is None:
         plan = FitPlan() if model_error else IN_DOUBT
-    with (progress or SilentProgress()).stage("Fitting each video (MAP)", total=len(videos)) as advance:
+    display = progress or SilentProgress()
+    with display.stage("Fitting each video (MAP)", total=len(videos)) as advance:
         fitted = partial(fit_alone, model=model, seed=seed, plan=plan, model_error=model_error)
         try:
             alone = in_processes(fitted, videos, advance=advance)
         except NoWorldError as error:
             raise NoCommonWorldError(str(error)) from error
+    with display.stage("Fitting all videos together"):
         try:
             fits, joint = joined(alone, model, shared, seed=seed, plan=plan)
         except ImpossibleStartError as error:

@@ -12,11 +12,13 @@ from tests.discovery.stand_ins import refit_with, refits_with
 from vrdp_prob.discovery import stages
 from vrdp_prob.discovery.candidates.scores import CauseScore
 from vrdp_prob.discovery.selection import beginning as beginning_module
-from vrdp_prob.discovery.selection import search
 from vrdp_prob.discovery.selection.beginning import Beginning
+from vrdp_prob.discovery.selection.comparison import Comparison
 from vrdp_prob.discovery.selection.courses import Courses
 from vrdp_prob.discovery.selection.extensions import Extensions
+from vrdp_prob.discovery.selection.forward import ForwardSelection, Step
 from vrdp_prob.discovery.selection.leavings import Leavings, Left
+from vrdp_prob.discovery.selection.search import Search
 from vrdp_prob.discovery.selection.trials import Trial
 from vrdp_prob.inference import default_model
 from vrdp_prob.models.effects.external_impulse import ExternalImpulse
@@ -28,11 +30,11 @@ from vrdp_prob.models.parameters import Prior
 TILTED = Beginning((SurfaceTilt(),), default_model(), {SurfaceTilt.name: frozenset({Wind.name})})
 
 
-def _search(best: Trial, rivals: Sequence[Sequence[Trial]], monkeypatch: pytest.MonkeyPatch) -> search.Search:
+def _search(best: Trial, rivals: Sequence[Sequence[Trial]], monkeypatch: pytest.MonkeyPatch) -> Search:
     """A search with such a best model, of which gains are not divided; a cause needs 6 nats."""
     monkeypatch.setattr(Leavings, "of", lambda _self, _trial: Left((), (), np.ones(3)))
     lesser = tuple(refit_with("", 0.0) for _ in rivals)
-    return search.Search(refit_with("", 0.0), best, (), lesser, tuple(map(tuple, rivals)), refits_with(needed=6.0))
+    return Search(refit_with("", 0.0), best, (), lesser, tuple(map(tuple, rivals)), refits_with(needed=6.0))
 
 
 def test_what_happens_once_is_nothing_to_go_on_from_and_rivals_are_those_that_come_near(
@@ -85,8 +87,8 @@ def test_the_search_goes_on_from_the_model_with_them(*, brings: bool, monkeypatc
     begun.fitted.return_value = tilt if brings else None
     asked: list[Trial] = []
     monkeypatch.setattr(Leavings, "of", lambda _self, _trial: Left((), (), np.ones(3)))
-    monkeypatch.setattr(search._Searcher, "tried", lambda self, one: asked.append(one) or self.untried(one))
-    chain, steps, _ = search._Searcher(refits_with(needed=6.0), begun).forward(plain)
+    monkeypatch.setattr(ForwardSelection, "tried", lambda self, one: asked.append(one) or self.untried(one))
+    chain, steps, _ = ForwardSelection(refits_with(needed=6.0), begun).models(plain)
     assert chain == ([plain, tilt] if brings else [plain])
     assert asked == chain[-1:]
     assert [step.base for step in steps] == chain
@@ -100,8 +102,8 @@ def test_causes_that_come_near_in_some_videos_are_compared_in_all(monkeypatch: p
     monkeypatch.setattr(
         Extensions, "made_of", lambda _self, one, some: [wind] if (one, some) == (plain, [scores[1]]) else []
     )
-    steps = [search.Step(one, Left((), (), np.ones(3))) for one in (plain, tilt)]
-    assert search._Searcher(refits_with(), TILTED)._rivals(tilt, (plain,), steps) == ((wind,),)
+    steps = [Step(one, Left((), (), np.ones(3))) for one in (plain, tilt)]
+    assert Comparison(refits_with(), TILTED)._rivals(tilt, (plain,), steps) == ((wind,),)
 
 
 def test_what_is_believed_is_where_a_fit_begins_and_no_part_of_it() -> None:

@@ -8,10 +8,14 @@ import pytest
 
 from tests.discovery.stand_ins import refit_with, refits_with, without_tracks
 from vrdp_prob.discovery.candidates.scores import CauseScore
-from vrdp_prob.discovery.selection import courses, refits, search
+from vrdp_prob.discovery.selection import courses, forward, lesser_models, refits
+from vrdp_prob.discovery.selection.comparison import Comparison
 from vrdp_prob.discovery.selection.courses import Courses
 from vrdp_prob.discovery.selection.extensions import Extensions
+from vrdp_prob.discovery.selection.forward import ForwardSelection, Step
 from vrdp_prob.discovery.selection.leavings import Leavings, Left
+from vrdp_prob.discovery.selection.lesser_models import LesserModels
+from vrdp_prob.discovery.selection.search import Search
 from vrdp_prob.discovery.selection.trials import Trial
 from vrdp_prob.models.effects.bowl import Bowl
 from vrdp_prob.models.effects.lens_distortion import LensDistortion
@@ -24,19 +28,19 @@ def tracks_show_no_walls(monkeypatch: pytest.MonkeyPatch) -> None:
     without_tracks(monkeypatch)
 
 
-def _searcher(needed: float = 0.0) -> search._Searcher:
-    return search._Searcher(refits_with(needed))
+def _selection(needed: float = 0.0) -> ForwardSelection:
+    return ForwardSelection(refits_with(needed))
 
 
 def _asked(monkeypatch: pytest.MonkeyPatch) -> list[Trial]:
     """The models on which causes are tried, as they come; none is."""
     asked: list[Trial] = []
 
-    def tried(self: search._Searcher, trial: Trial) -> search.Step:
+    def tried(self: ForwardSelection, trial: Trial) -> Step:
         asked.append(trial)
         return self.untried(trial)
 
-    monkeypatch.setattr(search._Searcher, "tried", tried)
+    monkeypatch.setattr(ForwardSelection, "tried", tried)
     return asked
 
 
@@ -51,15 +55,15 @@ def test_kicks_come_last_unless_the_best_other_cause_is_in_doubt(
         asked.append(trial)
         return in_doubt
 
-    monkeypatch.setattr(search._Searcher, "doubted", doubted)
-    found = _searcher()._in_order(refit_with("nothing", 0.0), [drag, kicks, tilt])
+    monkeypatch.setattr(refits.Refits, "doubted", doubted)
+    found = _selection()._in_order(refit_with("nothing", 0.0), [drag, kicks, tilt])
     assert [one.causes[0] for one in found] == order
     assert asked == [tilt]
 
 
 def test_kicks_alone_are_ordered_by_merit() -> None:
     kicks, weaker = refit_with("kicks", 30.0, patches=True), refit_with("kicks", 5.0, patches=True)
-    assert _searcher()._in_order(refit_with("nothing", 0.0), [weaker, kicks]) == [kicks, weaker]
+    assert _selection()._in_order(refit_with("nothing", 0.0), [weaker, kicks]) == [kicks, weaker]
 
 
 @pytest.mark.parametrize(
@@ -72,10 +76,10 @@ def test_two_causes_are_found_of_which_neither_stands_out_beside_chance(
 ) -> None:
     nothing, tilt, second = refit_with("", 0.0), refit_with("tilt", -1.0), refit_with("tilt+drag", both)
     monkeypatch.setattr(refits.Refits, "with_lost", lambda _self, trial: [second] if trial is tilt else [])
-    monkeypatch.setattr(search._Searcher, "_in_order", lambda _self, _trial, found: found)
+    monkeypatch.setattr(ForwardSelection, "_in_order", lambda _self, _trial, found: found)
     monkeypatch.setattr(Leavings, "of", Mock())
-    monkeypatch.setattr(search._Searcher, "doubted", lambda *_given: in_doubt)
-    assert _searcher(needed=2.0)._pair(nothing, tilt) == ((tilt, second) if is_found else None)
+    monkeypatch.setattr(refits.Refits, "doubted", lambda *_given: in_doubt)
+    assert _selection(needed=2.0)._pair(nothing, tilt) == ((tilt, second) if is_found else None)
 
 
 @pytest.mark.parametrize(("paired", "best"), [(True, "tilt"), (False, "friction")])
@@ -91,10 +95,10 @@ def test_fits_from_the_beginning_are_tried_where_no_two_causes_are_established(
     monkeypatch.setattr(refits.Refits, "leaves_unexplained", lambda _self, _trial, _first: False)
     monkeypatch.setattr(refits.Refits, "with_lost_found", lambda _self, _trial, first: first)
     monkeypatch.setattr(refits.Refits, "with_lost", lambda _self, _trial: [tilt, anew])
-    monkeypatch.setattr(search._Searcher, "_pair", lambda _self, _trial, first: (first, both) if paired else None)
-    monkeypatch.setattr(search._Searcher, "doubted", lambda *_given: False)
+    monkeypatch.setattr(ForwardSelection, "_pair", lambda _self, _trial, first: (first, both) if paired else None)
+    monkeypatch.setattr(refits.Refits, "doubted", lambda *_given: False)
     monkeypatch.setattr(Leavings, "of", lambda _self, _trial: Left((), (), np.ones(3)))
-    step = _searcher(needed=2.0).tried(nothing)
+    step = _selection(needed=2.0).tried(nothing)
     assert step.tried[0].causes == (best,)
     assert step.pair == ((tilt, both) if paired else None)
 
@@ -116,10 +120,10 @@ def test_lost_videos_are_searched_with_every_cause_before_one_that_explains_none
     monkeypatch.setattr(refits.Refits, "leaves_unexplained", lambda _self, _trial, _first: leaves)
     monkeypatch.setattr(refits.Refits, "with_lost_found", with_lost_found)
     monkeypatch.setattr(refits.Refits, "with_lost", lambda _self, _trial: [slip, jitter])
-    monkeypatch.setattr(search._Searcher, "_pair", lambda *_given: None)
-    monkeypatch.setattr(search._Searcher, "doubted", lambda *_given: False)
+    monkeypatch.setattr(ForwardSelection, "_pair", lambda *_given: None)
+    monkeypatch.setattr(refits.Refits, "doubted", lambda *_given: False)
     monkeypatch.setattr(Leavings, "of", lambda _self, _trial: Left((), (), np.ones(3)))
-    assert _searcher(needed=2.0).tried(nothing).tried == (slip, jitter)
+    assert _selection(needed=2.0).tried(nothing).tried == (slip, jitter)
     assert gone_on_from == ([] if leaves else ["jitter"])
 
 
@@ -133,7 +137,7 @@ def test_an_established_pair_goes_before_kicks_that_explain_less(
 ) -> None:
     winner = None if kicked is None else refit_with("kicks", kicked)
     pair = None if both is None else (refit_with("tilt", 1.0), refit_with("tilt+drag", both))
-    found = _searcher(needed=2.0).or_first_of(pair, winner)
+    found = _selection(needed=2.0).or_first_of(pair, winner)
     assert (found and found.causes[0]) == taken
 
 
@@ -148,9 +152,9 @@ def test_what_a_better_course_of_events_brings_is_no_merit_of_the_cause(
     nothing, winner, better = refit_with("", 0.0), refit_with("tilt", 10.0), refit_with("better course", without)
     winner.without.return_value = better
 
-    monkeypatch.setattr(search, "mends_any_course", lambda _cause: False)
+    monkeypatch.setattr(forward, "mends_any_course", lambda _cause: False)
     _judge_by_gain(monkeypatch)
-    base, found = _searcher(needed=2.0).chosen(nothing, search.Step(nothing, Mock(spec=Left), (winner,)))
+    base, found = _selection(needed=2.0).chosen(nothing, Step(nothing, Mock(spec=Left), (winner,)))
     assert base.causes[0] == goes_on_from
     assert (found and found.causes[0]) == taken
 
@@ -169,9 +173,9 @@ def test_videos_with_kicks_are_searched_anew_without_them(
     kicked.acting.return_value = [0, 2]
     tilt.fit = Mock(fits=["of one course only", "", ""])
     monkeypatch.setattr(courses, "may_take_another_course", lambda fit: fit != "of one course only")
-    monkeypatch.setattr(search, "mends_any_course", lambda _cause: True)
+    monkeypatch.setattr(forward, "mends_any_course", lambda _cause: True)
     _judge_by_gain(monkeypatch)
-    base, winner = _searcher(needed=2.0).chosen(tilt, search.Step(tilt, Mock(spec=Left), (kicked,)))
+    base, winner = _selection(needed=2.0).chosen(tilt, Step(tilt, Mock(spec=Left), (kicked,)))
     assert base.causes[0] == goes_on_from
     assert (winner and winner.causes[0]) == taken
     tilt.mended.assert_called_once_with([2], seed=0, thorough=True)
@@ -185,10 +189,10 @@ def test_a_video_in_which_a_cause_brings_most_is_searched_without_it(
     winner.log_density = 30.0 * np.array([0.3, share, 0.7 - share])
     winner.without.return_value = base
     asked: list[list[int]] = []
-    monkeypatch.setattr(search, "mends_any_course", lambda _cause: False)
+    monkeypatch.setattr(forward, "mends_any_course", lambda _cause: False)
     monkeypatch.setattr(Courses, "searched_anew", lambda _self, one, videos: asked.append(videos) or one)
     _judge_by_gain(monkeypatch)
-    assert _searcher(needed=2.0).chosen(base, search.Step(base, Mock(spec=Left), (winner,))) == (base, winner)
+    assert _selection(needed=2.0).chosen(base, Step(base, Mock(spec=Left), (winner,))) == (base, winner)
     assert asked == searched
 
 
@@ -206,9 +210,9 @@ def test_a_better_course_is_not_gone_on_from_with_a_video_that_has_lost_its_own(
     without.fallen_from.side_effect = lambda base: [1] if base is before else []
     without.mended.return_value, without.fit.fits = mended, ["explained", "lost", "explained"]
     monkeypatch.setattr(courses, "may_take_another_course", lambda _fit: True)
-    monkeypatch.setattr(search, "mends_any_course", lambda _cause: False)
+    monkeypatch.setattr(forward, "mends_any_course", lambda _cause: False)
     _judge_by_gain(monkeypatch)
-    found, taken = _searcher(needed=5.0).chosen(before, search.Step(before, Mock(spec=Left), (winner,)))
+    found, taken = _selection(needed=5.0).chosen(before, Step(before, Mock(spec=Left), (winner,)))
     assert found is mended
     assert taken is None
     without.mended.assert_called_once_with([1], seed=0, thorough=True)
@@ -219,7 +223,7 @@ def _judge_by_gain(monkeypatch: pytest.MonkeyPatch) -> None:
         return bool((trial.log_density - lesser.log_density).sum() < 2.0)
 
     monkeypatch.setattr(Leavings, "of", Mock())
-    monkeypatch.setattr(search._Searcher, "doubted", doubted)
+    monkeypatch.setattr(refits.Refits, "doubted", doubted)
 
 
 @pytest.mark.parametrize(("gained", "taken"), [(9.5, None), (3.0, "drag")], ids=["it explains the gain", "hardly"])
@@ -233,9 +237,9 @@ def test_a_better_course_of_one_video_is_no_merit_of_the_cause_without_which_oth
         without.with_courses_of.side_effect = lambda other: {before: both}[other]
     else:
         before.with_courses_of.side_effect = lambda other: {without: both}[other]
-    monkeypatch.setattr(search, "mends_any_course", lambda _cause: False)
+    monkeypatch.setattr(forward, "mends_any_course", lambda _cause: False)
     _judge_by_gain(monkeypatch)
-    base, found = _searcher(needed=2.0).chosen(before, search.Step(before, Mock(spec=Left), (winner,)))
+    base, found = _selection(needed=2.0).chosen(before, Step(before, Mock(spec=Left), (winner,)))
     assert base is both
     assert (found and found.causes[0]) == taken
 
@@ -244,10 +248,10 @@ def test_of_several_walls_at_once_none_is_a_merit_of_a_better_course(monkeypatch
     """The model to go on from is that without any of them."""
     tilt, walls = refit_with("tilt", 0.0), refit_with("tilt+wall+second_wall", 50.0)
     walls.without.return_value = refit_with("tilt", 0.5)
-    monkeypatch.setattr(search, "mends_any_course", lambda _cause: False)
+    monkeypatch.setattr(forward, "mends_any_course", lambda _cause: False)
     _judge_by_gain(monkeypatch)
-    step = search.Step(tilt, Mock(spec=Left), (walls,))
-    assert _searcher(needed=2.0).chosen(tilt, step) == (tilt, walls)
+    step = Step(tilt, Mock(spec=Left), (walls,))
+    assert _selection(needed=2.0).chosen(tilt, step) == (tilt, walls)
     walls.without.assert_called_once_with("wall", "second_wall")
 
 
@@ -263,11 +267,11 @@ def test_a_course_found_beside_causes_is_handed_back_and_causes_are_looked_for_o
     chosen |= {mended: (mended, None if needs_it else again), again: (again, None)}
     left_out = {found: without_drag, without_drag: mended}
     asked = _asked(monkeypatch)
-    monkeypatch.setattr(search, "mends_any_course", lambda _cause: False)
-    monkeypatch.setattr(search._Searcher, "chosen", lambda _self, trial, _step: chosen[trial])
-    monkeypatch.setattr(search._Searcher, "_left_out", lambda _self, trial, *_causes: left_out[trial])
+    monkeypatch.setattr(forward, "mends_any_course", lambda _cause: False)
+    monkeypatch.setattr(ForwardSelection, "chosen", lambda _self, trial, _step: chosen[trial])
+    monkeypatch.setattr(LesserModels, "left_out", lambda _self, trial, *_causes: left_out[trial])
     monkeypatch.setattr(Leavings, "of", lambda _self, _trial: Left((), (), np.ones(3)))
-    chain, steps, limit = _searcher(needed=6.0).forward(plain)
+    chain, steps, limit = _selection(needed=6.0).models(plain)
     assert chain == ([mended] if needs_it else [mended, again])
     assert asked == [plain, friction, both, *chain]
     assert len(steps) == len(chain)
@@ -276,8 +280,8 @@ def test_a_course_found_beside_causes_is_handed_back_and_causes_are_looked_for_o
 
 def test_a_course_that_gains_nothing_without_the_cause_is_not_handed_back(monkeypatch: pytest.MonkeyPatch) -> None:
     plain, tilt = refit_with("", 0.0), refit_with("tilt", 50.0)
-    monkeypatch.setattr(search._Searcher, "_left_out", lambda _self, _trial, *_causes: refit_with("", 1.0))
-    assert _searcher(needed=6.0).handed_back([plain, tilt], [_step(), _step()]) == [plain, tilt]
+    monkeypatch.setattr(LesserModels, "left_out", lambda _self, _trial, *_causes: refit_with("", 1.0))
+    assert _selection(needed=6.0).handed_back([plain, tilt], [_step(), _step()]) == [plain, tilt]
 
 
 @pytest.mark.parametrize(("lacking", "again"), [(250.0, True), (350.0, False)])
@@ -286,9 +290,9 @@ def test_causes_are_not_looked_for_anew_for_a_course_that_brings_a_trifle_of_wha
 ) -> None:
     plain, tilt, better = refit_with("", 0.0), refit_with("tilt", 50.0), refit_with("", 10.0)  # in each of three videos
     plain.lacking = lacking
-    monkeypatch.setattr(search, "mends_any_course", lambda _cause: True)
-    monkeypatch.setattr(search._Searcher, "_left_out", lambda _self, _trial, *_causes: better)
-    found = _searcher(needed=6.0).handed_back([plain, tilt], [_step(), _step()])
+    monkeypatch.setattr(forward, "mends_any_course", lambda _cause: True)
+    monkeypatch.setattr(LesserModels, "left_out", lambda _self, _trial, *_causes: better)
+    found = _selection(needed=6.0).handed_back([plain, tilt], [_step(), _step()])
     assert found == ([better] if again else [plain, tilt])
 
 
@@ -299,39 +303,39 @@ def test_causes_are_not_tried_anew_for_a_course_that_brings_a_trifle_of_what_a_m
     plain, better = refit_with("", 0.0), refit_with("", 10.0)
     plain.lacking, plain.causes, better.causes = lacking, (), ()
     asked = _asked(monkeypatch)
-    monkeypatch.setattr(search._Searcher, "chosen", lambda _self, _trial, _step: (better, None))
+    monkeypatch.setattr(ForwardSelection, "chosen", lambda _self, _trial, _step: (better, None))
     monkeypatch.setattr(Leavings, "of", lambda _self, _trial: Left((), (), np.ones(3)))
-    chain, _, limit = _searcher(needed=6.0).forward(plain)
+    chain, _, limit = _selection(needed=6.0).models(plain)
     assert chain == [better]
     assert len(asked) == times
     assert not limit
 
 
 def test_a_search_ends_though_each_round_finds_a_better_course(monkeypatch: pytest.MonkeyPatch) -> None:
-    plain, *better = (refit_with("", 10.0 * number) for number in range(search.MOST_ROUNDS + 2))
+    plain, *better = (refit_with("", 10.0 * number) for number in range(forward.MOST_ROUNDS + 2))
     for one in (plain, *better):
         one.lacking, one.causes = 0.0, ()
     following = dict(pairwise([plain, *better]))
     asked = _asked(monkeypatch)
-    monkeypatch.setattr(search._Searcher, "chosen", lambda _self, trial, _step: (following[trial], None))
+    monkeypatch.setattr(ForwardSelection, "chosen", lambda _self, trial, _step: (following[trial], None))
     monkeypatch.setattr(Leavings, "of", lambda _self, _trial: Left((), (), np.ones(3)))
-    chain, _, limit = _searcher(needed=6.0).forward(plain)
+    chain, _, limit = _selection(needed=6.0).models(plain)
     assert chain == better[-1:]
     assert asked == [plain, *better[:-1]]
-    assert limit == search.COURSES_LEFT
+    assert limit == forward.COURSES_LEFT
 
 
 def test_a_search_ends_at_five_causes_and_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
-    models = [refit_with("+".join("abcde"[:count]), 10.0 * count) for count in range(search.MOST_CAUSES + 1)]
+    models = [refit_with("+".join("abcde"[:count]), 10.0 * count) for count in range(forward.MOST_CAUSES + 1)]
     following = dict(pairwise(models))
     asked = _asked(monkeypatch)
-    monkeypatch.setattr(search._Searcher, "chosen", lambda _self, trial, _step: (trial, following[trial]))
+    monkeypatch.setattr(ForwardSelection, "chosen", lambda _self, trial, _step: (trial, following[trial]))
     monkeypatch.setattr(Leavings, "of", lambda _self, _trial: Left((), (), np.ones(3)))
-    chain, steps, limit = _searcher(needed=6.0).forward(models[0])
+    chain, steps, limit = _selection(needed=6.0).models(models[0])
     assert chain == models
     assert asked == models[:-1]
     assert len(steps) == len(chain)
-    assert limit == search.CAUSES_LEFT
+    assert limit == forward.CAUSES_LEFT
 
 
 @pytest.mark.parametrize(
@@ -345,10 +349,10 @@ def test_a_cause_that_is_ahead_by_more_than_the_course_brings_is_not_looked_for_
     plain, tilt, without, better = (refit_with(*one) for one in (("", 0.0), ("tilt", 50.0), ("", 4.0), ("", 10.0)))
     without.with_courses_of.side_effect = lambda other: {plain: better}[other]
     tilt.fallen_from.return_value = lost
-    monkeypatch.setattr(search, "mends_any_course", lambda _cause: kicks)
-    monkeypatch.setattr(search._Searcher, "_left_out", lambda _self, _trial, *_causes: without)
+    monkeypatch.setattr(forward, "mends_any_course", lambda _cause: kicks)
+    monkeypatch.setattr(LesserModels, "left_out", lambda _self, _trial, *_causes: without)
     tried = (refit_with("tilt", 49.0), refit_with("drag", rival))
-    found = _searcher(needed=6.0).handed_back([plain, tilt], [_step(*tried), _step()])
+    found = _selection(needed=6.0).handed_back([plain, tilt], [_step(*tried), _step()])
     assert found == ([better, tilt] if remains else [better])
 
 
@@ -361,42 +365,42 @@ def test_rivals_are_those_that_came_close_on_the_model_on_which_they_were_tried(
     clear = Mock(spec=CauseScore, effect=LinearDrag(), size=30.0)
     asked: list[list[CauseScore]] = []
     monkeypatch.setattr(Extensions, "made_of", lambda _self, _trial, scores: asked.append(list(scores)) or [])
-    step = search.Step(plain, Left((clear,), (), np.ones(3)), (tilt, drag))
-    assert _searcher()._rivals(tilt, (better,), [_step(), step]) == ((),)
+    step = Step(plain, Left((clear,), (), np.ones(3)), (tilt, drag))
+    assert Comparison(refits_with())._rivals(tilt, (better,), [_step(), step]) == ((),)
     assert asked == [[clear]]
 
 
 def test_what_a_better_course_leaves_is_scored_though_the_cause_remains(monkeypatch: pytest.MonkeyPatch) -> None:
     plain, tilt, again, better = (refit_with(*one) for one in (("", 0.0), ("tilt", 50.0), ("tilt", 60.0), ("", 10.0)))
     chosen = {plain: (plain, tilt), tilt: (again, None), again: (again, None)}
-    monkeypatch.setattr(search, "mends_any_course", lambda _cause: False)
-    monkeypatch.setattr(search._Searcher, "tried", search._Searcher.untried)
-    monkeypatch.setattr(search._Searcher, "chosen", lambda _self, trial, _step: chosen[trial])
-    monkeypatch.setattr(search._Searcher, "_left_out", lambda _self, _trial, *_causes: better)
+    monkeypatch.setattr(forward, "mends_any_course", lambda _cause: False)
+    monkeypatch.setattr(ForwardSelection, "tried", ForwardSelection.untried)
+    monkeypatch.setattr(ForwardSelection, "chosen", lambda _self, trial, _step: chosen[trial])
+    monkeypatch.setattr(LesserModels, "left_out", lambda _self, _trial, *_causes: better)
     left = {one: Left((), (), np.full(3, float(number))) for number, one in enumerate((plain, tilt, again, better))}
     monkeypatch.setattr(Leavings, "of", lambda _self, trial: left[trial])
-    chain, steps, _ = _searcher(needed=6.0).forward(plain)
+    chain, steps, _ = _selection(needed=6.0).models(plain)
     assert chain == [better, again]
     assert [step.left for step in steps] == [left[better], left[again]]
 
 
-def _step(*tried: Trial) -> search.Step:
+def _step(*tried: Trial) -> Step:
     """A step in which some causes were tried."""
-    return search.Step(refit_with("", 0.0), Left((), (), np.ones(3)), tried)
+    return Step(refit_with("", 0.0), Left((), (), np.ones(3)), tried)
 
 
 def test_a_law_that_loses_most_videos_comes_last(monkeypatch: pytest.MonkeyPatch) -> None:
     nothing, wind, drag = refit_with("", 0.0), refit_with("wind", 30.0), refit_with("drag", 10.0)
     wind.loses_most_of.return_value = True
-    monkeypatch.setattr(search._Searcher, "doubted", lambda *_given: False)
-    assert _searcher()._in_order(nothing, [wind, drag]) == [drag, wind]
+    monkeypatch.setattr(refits.Refits, "doubted", lambda *_given: False)
+    assert _selection()._in_order(nothing, [wind, drag]) == [drag, wind]
 
 
 def test_a_cause_that_may_be_nothing_goes_though_another_one_brings_less(monkeypatch: pytest.MonkeyPatch) -> None:
     both, drag, tilt = refit_with("tilt+drag", 10.0), refit_with("drag", 5.0), refit_with("tilt", 6.0)
-    monkeypatch.setattr(search._Searcher, "doubted", lambda _self, trial, lesser, _divisor: lesser is drag)
-    monkeypatch.setattr(search._Searcher, "_lesser", lambda *_given: ())
-    assert _searcher()._pruned(both, (drag, tilt), np.ones(3))[0] is drag
+    monkeypatch.setattr(refits.Refits, "doubted", lambda _self, trial, lesser, _divisor: lesser is drag)
+    monkeypatch.setattr(LesserModels, "without_each", lambda *_given: ())
+    assert LesserModels(refits_with()).pruned(both, (drag, tilt), np.ones(3))[0] is drag
 
 
 @pytest.mark.parametrize(
@@ -410,10 +414,10 @@ def test_a_rival_takes_the_place_of_a_doubted_cause_where_it_explains_as_much(
     nothing, bowl, tilt = refit_with("", 0.0), refit_with("bowl", 10.0), refit_with("tilt", explains)
     nothing.causes, bowl.causes, tilt.causes = (), (Bowl(),), (SurfaceTilt(),)
     tilt.continued.return_value = tilt
-    monkeypatch.setattr(search._Searcher, "_left_out", lambda _self, _best, _divisor, _cause: nothing)
+    monkeypatch.setattr(LesserModels, "left_out", lambda _self, _best, _divisor, _cause: nothing)
     _judge_by_gain(monkeypatch)
     monkeypatch.setattr(Leavings, "of", lambda _self, _trial: Mock(spec=Left, overdispersion=np.ones(3)))
-    before = search.Search(nothing, bowl, (), (nothing,), ((tilt,),), refits_with(needed=2.0))
+    before = Search(nothing, bowl, (), (nothing,), ((tilt,),), refits_with(needed=2.0))
     found = before.with_rival(bowl.causes[0], lambda _trial: is_believed)
     assert (found.best if found else None) is (tilt if taken else None)
 
@@ -423,11 +427,11 @@ def test_what_brings_too_little_without_a_doubted_cause_goes_too(monkeypatch: py
     bowl = Bowl()
     nothing.causes, lens.causes, both.causes = (), (LensDistortion(),), (LensDistortion(), bowl)
     both.without.return_value, lens.continued.return_value = lens, lens
-    monkeypatch.setattr(search._Searcher, "_left_out", lambda _self, _best, _divisor, _cause: nothing)
+    monkeypatch.setattr(LesserModels, "left_out", lambda _self, _best, _divisor, _cause: nothing)
     _judge_by_gain(monkeypatch)
     monkeypatch.setattr(Leavings, "of", lambda _self, _trial: Mock(spec=Left, overdispersion=np.ones(3)))
     base = refit_with("", 0.0)
-    found = search.Search(base, both, (), (lens, nothing), ((), ()), refits_with(needed=5.0)).without([bowl])
+    found = Search(base, both, (), (lens, nothing), ((), ()), refits_with(needed=5.0)).without([bowl])
     assert found.best is base
     assert found.lesser == ()
 
@@ -446,6 +450,8 @@ def test_a_model_without_a_cause_is_searched_where_it_may_do_as_well(
     best.without.return_value, without.mended.return_value = without, found
     without.continued.return_value, found.continued.return_value = without, found
     without.fit.fits = ["a", "b", "c"]
-    monkeypatch.setattr(search, "doubtful", lambda _fits: [1])
-    assert _searcher(needed=2.0)._left_out(best, np.ones(3), SurfaceTilt()) is (found if is_searched else without)
+    monkeypatch.setattr(lesser_models, "doubtful", lambda _fits: [1])
+    assert LesserModels(refits_with(needed=2.0)).left_out(best, np.ones(3), SurfaceTilt()) is (
+        found if is_searched else without
+    )
     assert [call.args for call in without.mended.call_args_list] == ([([1],)] if is_searched else [])

@@ -367,9 +367,18 @@ def _believes_otherwise(model: PhysicsModel, before: PhysicsModel) -> bool:
     )
 
 
-def merit(trial: Trial) -> float:
-    """By which models are ordered: what they predict of left-out videos, less what their causes are believed less."""
-    return float(trial.log_density.sum()) + trial.log_prior
+def merit(trial: Trial, overdispersion: Float[np.ndarray, "video"] | None = None) -> float:
+    """By which models are ordered: what they predict of left-out videos, less what their causes are believed less.
+
+    Parameters
+    ----------
+    trial
+        The model.
+    overdispersion
+        Of each video, by which what is predicted of it is divided; 1 where None.
+    """
+    predicted = trial.log_density if overdispersion is None else trial.log_density / overdispersion
+    return float(predicted.sum()) + trial.log_prior
 
 
 def gains(

@@ -1,0 +1,117 @@
+"""The best model beside its likes: without each of its causes, and with another one in the place of each."""
+
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
+from functools import cached_property, partial
+
+from vrdp_prob.discovery.selection.beginning import Beginning
+from vrdp_prob.discovery.selection.forward import Step
+from vrdp_prob.discovery.selection.leavings import Left
+from vrdp_prob.discovery.selection.lesser_models import LesserModels
+from vrdp_prob.discovery.selection.refits import Refits
+from vrdp_prob.discovery.selection.shortlist import HOPEFUL
+from vrdp_prob.discovery.selection.trials import Trial, gain, merit
+from vrdp_prob.inference.runs.parallel import in_processes
+from vrdp_prob.models.effects.effect import Effect
+from vrdp_prob.models.effects.external_impulse import ExternalImpulse
+
+MOST_RIVALS = 2
+"""Causes that are fitted at most in the place of one."""
+MOST_SWAPS = 3
+"""How often a rival takes the place of a cause."""
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """What the best model is compared with.
+
+    Parameters
+    ----------
+    refits
+        What makes the refits.
+    beginning
+        What the search has gone on from, beside the model that was given.
+    """
+
+    refits: Refits
+    beginning: Beginning | None = None
+
+    @cached_property
+    def _lesser(self) -> LesserModels:
+        return LesserModels(self.refits)
+
+    def compared(
+        self, chain: Sequence[Trial], steps: Sequence[Step]
+    ) -> tuple[Trial, tuple[Trial, ...], tuple[tuple[Trial, ...], ...]]:
+        """The best model, each of its causes left out, and others in the place of each.
+
+        A cause that was found first may fit worse than another once a further one has joined; then they are swapped.
+        """
+        best = chain[-1]
+        known = [one for one in chain[-2:-1] if one.causes == best.causes[:-1]]
+        divisor = steps[-1].left.overdispersion
+        lesser = (*self._lesser.without_each(best, best.causes[: len(best.causes) - len(known)], divisor), *known)
+        sure = partial(merit, overdispersion=divisor)
+        for _ in range(MOST_SWAPS):
+            best, lesser = self._lesser.pruned(best, lesser, divisor)
+            rivals = self._rivals(best, lesser, steps)
+            others = (one for some in rivals for one in some)
+            better = max(others, key=sure, default=best)
+            if sure(better) > sure(best) and self.refits.is_nothing(better, best, divisor):
+                better = best
+            if sure(better) <= sure(best):
+                break
+            best, lesser = better, self._lesser.without_each(better, better.causes, divisor)
+        else:
+            rivals = self._rivals(best, lesser, steps)
+        return best, lesser, rivals
+
+    def _rivals(self, best: Trial, lesser: Sequence[Trial], steps: Sequence[Step]) -> tuple[tuple[Trial, ...], ...]:
+        """For each cause of a model: models in which another one takes its place.
+
+        A rival was tried when that cause was, and came close to it; what happened once may as well have been something
+        unseen that a body met. Of a single cause all that was tried on the model that was given are rivals.
+        """
+        found = []
+        for cause, without in zip(best.causes, lesser, strict=True):
+            step = _tried_at(cause, steps)
+            others = [one for one in step.tried if one.causes[-1].name not in best.names]
+            if not step.tried:  # the search has begun with the cause
+                others = self._instead(
+                    without, self.refits.leavings.of(without), self._near(cause).difference(best.names)
+                )
+            elif len(best.causes) > 1 or step is not steps[0]:
+                least = HOPEFUL * max(gain(one, step.base)[0] for one in step.tried)
+                close = {
+                    one.causes[-1].name
+                    for one in others
+                    if gain(one, step.base)[0] > least and not one.patches(one.causes[-1])
+                }
+                others = self._instead(without, step.left, close)
+                if len(best.causes) == 1:
+                    made = {*best.names, *(one.causes[-1].name for one in others)}
+                    others += [one for one in steps[0].tried if one.causes[-1].name not in made]
+            if cause is best.causes[-1] and isinstance(cause, ExternalImpulse):
+                made = {one.causes[-1].name for one in others}
+                hidden = in_processes(Trial.continued, self.refits.extensions.hidden_instead(best, without, known=made))
+                others += sorted(hidden, key=merit, reverse=True)
+            found.append(tuple(one for one in others if not one.patches(one.causes[-1])))
+        return tuple(found)
+
+    def _instead(self, without: Trial, left: Left, names: Collection[str]) -> list[Trial]:
+        """Models with one of some causes in the place of the one that a model lacks, by the scores in what is left."""
+        again = [one for one in left.scores if one.effect.name in names][:MOST_RIVALS]
+        return self.refits.extensions.made_of(without, again)
+
+    def _near(self, cause: Effect) -> frozenset[str]:
+        """Names of effects that could take the place of a cause in the videos that the search begins with."""
+        return frozenset() if self.beginning is None else self.beginning.rivals.get(cause.name, frozenset())
+
+
+def _tried_at(cause: Effect, steps: Sequence[Step]) -> Step:
+    """The step at which a cause was tried first; for a wall or a disc that kicks led to, that of these."""
+    for name in (cause.name, ExternalImpulse.name):
+        for step in steps:
+            if any(one.name == name for trial in step.tried for one in trial.beyond(step.base)):
+                return step
+    return steps[0]

@@ -43,6 +43,13 @@ def test_a_log_goes_on_where_no_step_is_done(capsys: pytest.CaptureFixture[str])
     assert told.count("Trying causes: 1 steps in") == told.count("\n") >= 2
 
 
+def test_a_stage_without_steps_tells_its_time(capsys: pytest.CaptureFixture[str]) -> None:
+    times = iter([0.0, 40.0])
+    with LogProgress(every=30, clock=times.__next__).stage("Fitting all videos together") as advance:
+        advance(0)
+    assert capsys.readouterr().err == "Fitting all videos together: 40 s\n"
+
+
 def test_a_stage_that_fails_ends(capsys: pytest.CaptureFixture[str]) -> None:
     before = threading.active_count()
     stage = LogProgress(every=0.1).stage("Trying causes")

@@ -126,7 +126,8 @@ class LogProgress:
 def _line(description: str, done: float, kept: float, total: float | None, seconds: float) -> str:
     """How far a stage is; what was there when it began says nothing of the time that is left."""
     if not total:
-        return f"{description}: {done:.0f} steps in {seconds:.0f} s"
+        steps = f"{done:.0f} steps in " if done else ""
+        return f"{description}: {steps}{seconds:.0f} s"
     left = f", about {seconds * (total - done) / (done - kept):.0f} s left" if kept < done < total else ""
     return f"{description}: {done:.0f} of {total:.0f} in {seconds:.0f} s{left}"
 

@@ -10,10 +10,22 @@ from contextlib import contextmanager
 
 import loky
 
-from vrdp_prob.errors import InputError
+from vrdp_prob.errors import InputError, check_whole_number
 
 PATIENCE = 20
 """Seconds in which a cluster has to answer."""
+
+
+def check_processes(processes: int | None) -> None:
+    """Refuse a number of processes that is none.
+
+    Raises
+    ------
+    InputError
+        If it is neither None nor a whole number of at least 1.
+    """
+    if processes is not None:
+        check_whole_number("processes", processes, least=1)
 
 
 @contextmanager
@@ -22,6 +34,7 @@ def local_workers(processes: int | None, *, tasks: int) -> Iterator[Executor]:
 
     There are no more of them than tasks.
     """
+    check_processes(processes)
     workers = loky.ProcessPoolExecutor(
         max_workers=min(processes or os.cpu_count() or 1, max(tasks, 1)), initializer=_end_with, initargs=(os.getpid(),)
     )

@@ -205,7 +205,7 @@ def test_too_few_videos_are_refused(
         (["--out", "{folder}/tracks.csv"], "tracks.csv"),
         (["--camera", "{folder}/none.json"], "none.json"),
         (["--seed", "-1"], "--seed"),
-        (["--search-videos", "2"], "--search-videos: 2 is no number of videos in which causes can be looked for"),
+        (["--search-videos", "2"], "--search-videos is 2; give a whole number of at least 3"),
     ],
 )
 def test_options_are_refused_before_the_search(

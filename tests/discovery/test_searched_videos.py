@@ -50,5 +50,14 @@ def test_what_shows_in_other_videos_alone_is_no_cause_but_told_of(tmp_path: Path
 
 @pytest.mark.parametrize("searched", [0, 2, -3, True])
 def test_too_few_videos_to_search_are_refused(searched: int, tmp_path: Path) -> None:
-    with pytest.raises(InputError, match=rf"searched: {searched!r} is no number of videos .* at least 3, or nothing"):
+    with pytest.raises(InputError, match=rf"searched is {searched!r}; give a whole number of at least 3"):
         found_in(tmp_path, [], seed=1, searched=searched)
+
+
+@pytest.mark.parametrize(("change", "least"), [({"seed": -1}, 0), ({"processes": 0}, 1)])
+def test_numbers_that_are_none_are_refused_before_any_work(change: dict[str, int], least: int, tmp_path: Path) -> None:
+    (name, value), kept = next(iter(change.items())), tmp_path / "kept"
+    videos = hide([], seed=1, setting=PAIRS).tracks
+    with pytest.raises(InputError, match=rf"{name} is {value!r}; give a whole number of at least {least}"):
+        discover(videos, checkpoint=kept, **change)
+    assert not kept.exists()

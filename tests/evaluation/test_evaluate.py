@@ -198,7 +198,9 @@ def test_a_cluster_gives_the_same_numbers(folder: Path, evaluation: Evaluation) 
         ({"source": "films"}, "use tracks or videos"),
         ({"source": "videos"}, "holds no video"),
         ({"sampler": "gibbs"}, "sampler 'gibbs' is not known"),
-        ({"draws": 0}, "must be at least 1"),
+        ({"draws": 0}, "draws is 0; give a whole number of at least 1"),
+        ({"seed": -1}, "seed is -1; give a whole number of at least 0"),
+        ({"processes": 0}, "processes is 0; give a whole number of at least 1"),
         ({"dask": "tcp://127.0.0.1:1"}, "no Dask scheduler answers"),
     ],
 )

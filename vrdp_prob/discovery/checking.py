@@ -3,7 +3,7 @@
 from collections.abc import Collection
 from pathlib import Path
 
-from vrdp_prob.errors import InputError
+from vrdp_prob.errors import InputError, check_whole_number
 
 FEWEST_VIDEOS = 3
 """Videos without which a gain has no uncertainty: each is predicted from the others, and the spread is over videos."""
@@ -48,10 +48,5 @@ def check_searched(searched: int | None, *, source: str = "searched") -> None:
     InputError
         If it is no whole number, or less than three.
     """
-    if searched is None:
-        return
-    if not isinstance(searched, int) or isinstance(searched, bool) or searched < FEWEST_VIDEOS:
-        raise InputError(
-            f"{source}: {searched!r} is no number of videos in which causes can be looked for; give at least "
-            f"{FEWEST_VIDEOS}, or nothing for all."
-        )
+    if searched is not None:
+        check_whole_number(source, searched, least=FEWEST_VIDEOS)

@@ -20,6 +20,7 @@ from vrdp_prob.discovery.selection.search import Search
 from vrdp_prob.discovery.selection.tried import tried_causes
 from vrdp_prob.discovery.stages import Stages
 from vrdp_prob.discovery.words import title
+from vrdp_prob.errors import check_whole_number
 from vrdp_prob.inference import default_model
 from vrdp_prob.inference.assembly import limits_of_tracks
 from vrdp_prob.inference.infer import check_model
@@ -43,6 +44,7 @@ from vrdp_prob.models.simulator.rollout import compile_model
 from vrdp_prob.progress import ProgressDisplay
 from vrdp_prob.report.wording import counted, listed
 from vrdp_prob.scene import Shape, Tracks
+from vrdp_prob.workers import check_processes
 
 TELLING = 2.0
 """Overdispersion of a video that is told of."""
@@ -91,11 +93,13 @@ def discover(
     ------
     InputError
         If there are fewer than three videos that show motion, or are to be searched, two have one name, the model is
-        none, the videos have no common world, the checkpoint belongs to another run, or one is asked for with an effect
-        whose class other processes cannot import.
+        none, seed or processes are no whole number of at least 0 or 1, the videos have no common world, the checkpoint
+        belongs to another run, or one is asked for with an effect whose class other processes cannot import.
     """
     check_video_count(videos)
     check_searched(searched)
+    check_whole_number("seed", seed, least=0)
+    check_processes(processes)
     check_model(model)
     check_videos(videos)
     videos, still = _in_motion(videos)

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from vrdp_prob.discovery.finding import ComparedAnswer, ComparedOption, Finding
-from vrdp_prob.errors import InputError
+from vrdp_prob.errors import InputError, check_whole_number
 from vrdp_prob.inference import infer
 from vrdp_prob.inference.runs.parallel import in_processes, several_processes
 from vrdp_prob.models.physics import PhysicsModel
@@ -14,6 +14,7 @@ from vrdp_prob.reasoning import Answer, PosteriorWorlds, ask
 from vrdp_prob.reasoning.vocabulary import ChangeWord
 from vrdp_prob.scene import Question, Tracks
 from vrdp_prob.scene.question import RIGHT
+from vrdp_prob.workers import check_processes
 
 DRAWS = 200
 NOT_ASKED = "The questions were not asked: no cause is named, so there is no second model whose answers could differ."
@@ -52,7 +53,14 @@ def with_answers(
         Number of processes that work on videos side by side; as many as there are cores where None.
     progress
         Who follows the work.
+
+    Raises
+    ------
+    InputError
+        If seed or processes are no whole number of at least 0 or 1.
     """
+    check_whole_number("seed", seed, least=0)
+    check_processes(processes)
     if not finding.named:
         return replace(finding, notes=(*finding.notes, NOT_ASKED)) if any(questions.values()) else finding
     asked = [

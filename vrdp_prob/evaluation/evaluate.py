@@ -20,7 +20,7 @@ from vrdp_prob.datasets import (
     video_names,
 )
 from vrdp_prob.datasets.loading import CameraChoice
-from vrdp_prob.errors import InputError
+from vrdp_prob.errors import InputError, check_whole_number
 from vrdp_prob.evaluation.judgement import Judgement, Kind
 from vrdp_prob.evaluation.one_scene import BEST_FIT, POSTERIOR, VARIANTS, SceneResult, Settings, Task, evaluate_scene
 from vrdp_prob.evaluation.scores import Interval, Scores, brier_gain
@@ -34,7 +34,7 @@ from vrdp_prob.reasoning.prepared import check_answer, prepare
 from vrdp_prob.reasoning.vocabulary import ChangeWord, Vocabulary
 from vrdp_prob.reasoning.worlds import DRAWS
 from vrdp_prob.scene import Question, Tracks
-from vrdp_prob.workers import cluster, local_workers
+from vrdp_prob.workers import check_processes, cluster, local_workers
 
 SOURCES = ("tracks", "videos")
 """What videos may be read from."""
@@ -162,8 +162,9 @@ def evaluate(
     check_options(sampler=sampler)
     if source not in (None, *SOURCES):
         raise InputError(f"input is '{source}'; use {' or '.join(SOURCES)}.")
-    if draws < 1 or (processes is not None and processes < 1):
-        raise InputError(f"draws is {draws} and processes is {processes}; both must be at least 1.")
+    check_whole_number("draws", draws, least=1)
+    check_whole_number("seed", seed, least=0)
+    check_processes(processes)
     learned = None if concepts is None else read_concepts(concepts)
     if learned is not None and source != "videos" and has_tracks(folder):
         raise InputError(f"{folder}: learned concepts look at videos, and this holds positions; use --input videos.")

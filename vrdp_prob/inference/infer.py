@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from vrdp_prob.errors import InputError
+from vrdp_prob.errors import InputError, check_whole_number
 from vrdp_prob.inference.assembly import posterior_from
 from vrdp_prob.inference.draws.diagnostics import Reported
 from vrdp_prob.inference.draws.samples import Samples, assess
@@ -202,9 +202,8 @@ def check_counts(draws: int, seed: int) -> None:
     InputError
         If one is no whole number, fewer than 4 draws are asked for, or the seed is negative.
     """
-    for name, value, least in (("draws", draws, FEWEST_DRAWS), ("seed", seed, 0)):
-        if not isinstance(value, int | np.integer) or value < least:
-            raise InputError(f"{name} is {value!r}; give a whole number of at least {least}.")
+    check_whole_number("draws", draws, least=FEWEST_DRAWS)
+    check_whole_number("seed", seed, least=0)
 
 
 def check_plan(plan: object) -> None:

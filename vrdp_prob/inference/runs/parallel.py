@@ -12,7 +12,7 @@ from threadpoolctl import ThreadpoolController
 
 from vrdp_prob.inference.runs.journal import Step, in_a_step
 from vrdp_prob.progress import Advance
-from vrdp_prob.workers import local_workers
+from vrdp_prob.workers import check_processes, local_workers
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
@@ -34,6 +34,7 @@ def several_processes(count: int | None) -> Iterator[None]:
     count
         Number of processes. With 1 everything stays in this one.
     """
+    check_processes(count)
     number = count or os.cpu_count() or 1
     if number == 1 or _alone.get():
         yield

@@ -1,5 +1,6 @@
 """Figures of what a model misses, and the window estimates that they show."""
 
+from dataclasses import replace
 from xml.etree import ElementTree
 
 import numpy as np
@@ -66,6 +67,8 @@ def test_no_video_says_anything_of_accelerations_that_its_own_tracks_rule_out() 
     description = describe.description_of(spoilt, [])
     assert description.size is None
     assert any(sentence.startswith("Far more is missing in") for sentence in description.sentences)
+    first, *_ = describe._window_sentences(replace(found, lost=tuple(f"run{k}" for k in range(9))))
+    assert first.startswith("Far more is missing in run0, run1, run2, run3, run4, run5, ... (9 in all) than")
 
 
 def test_of_few_windows_no_size_is_told(monkeypatch: pytest.MonkeyPatch) -> None:

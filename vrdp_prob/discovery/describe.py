@@ -5,6 +5,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from jaxtyping import Float
 
+from vrdp_prob.datasets.folder import some
 from vrdp_prob.discovery.checks.contacts import DURATION
 from vrdp_prob.discovery.checks.flight import BESIDE
 from vrdp_prob.discovery.checks.measurement import GENERAL
@@ -20,7 +21,6 @@ from vrdp_prob.discovery.residuals.residual_model import ResidualModel
 from vrdp_prob.discovery.sparse_formula import SparseFormula, sparse_formula
 from vrdp_prob.discovery.words import number
 from vrdp_prob.inference.several_videos.fitting import SharedFit
-from vrdp_prob.report.wording import listed
 
 CLEARLY = 1.5
 """Ratio of sizes from which on one part of the motion is said to show more of an effect than another."""
@@ -128,7 +128,7 @@ def _window_sentences(windows: Windows) -> Iterator[str]:
     """Size and direction of the missing acceleration, and where in speed, time and place there is more of it."""
     if windows.lost:
         yield (
-            f"Far more is missing in {listed(windows.lost)} than the tracks show where nothing touches, or than in the "
+            f"Far more is missing in {some(windows.lost)} than the tracks show where nothing touches, or than in the "
             "other videos, as where a contact is missed or lasts; that is left out of what is said of accelerations."
         )
     if not _show_something(windows):

@@ -94,7 +94,10 @@ def test_the_search_goes_on_from_the_model_with_them(*, brings: bool, monkeypatc
     assert [step.base for step in steps] == chain
 
 
-def test_causes_that_come_near_in_some_videos_are_compared_in_all(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("kicked", [False, True], ids=["nothing was tried since", "kicks were tried since"])
+def test_causes_that_come_near_in_some_videos_are_compared_in_all(
+    *, kicked: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
     plain, tilt, wind = (refit_with(*one) for one in (("", 0.0), ("tilt", 50.0), ("wind", 49.0)))
     tilt.causes, wind.causes, tilt.names = (SurfaceTilt(),), (Wind(),), (SurfaceTilt.name,)
     scores = tuple(Mock(spec=CauseScore, effect=effect, size=30.0) for effect in (LinearDrag(), Wind()))
@@ -102,7 +105,11 @@ def test_causes_that_come_near_in_some_videos_are_compared_in_all(monkeypatch: p
     monkeypatch.setattr(
         Extensions, "made_of", lambda _self, one, some: [wind] if (one, some) == (plain, [scores[1]]) else []
     )
-    steps = [Step(one, Left((), (), np.ones(3))) for one in (plain, tilt)]
+    kicks = refit_with("tilt+kicks", 55.0)
+    kicks.beyond.return_value = kicks.causes = (ExternalImpulse(),)
+    steps = [
+        Step(one, Left((), (), np.ones(3)), tried) for one, tried in ((plain, ()), (tilt, (kicks,) if kicked else ()))
+    ]
     assert Comparison(refits_with(), TILTED)._rivals(tilt, (plain,), steps) == ((wind,),)
 
 

@@ -88,8 +88,9 @@ def test_what_videos_have_of_a_score_adds_up_and_a_slope_is_called_for_in_most()
         ((14.0, 15.0, 16.0, 13.0), 1e-12, [2, 1, 0]),
         ((-3.0, 40.0, -2.0, -4.0), 1e-7, [1]),
         ((300.0, 900.0, 300.0, 300.0), 0.0, [1, 0, 2, 3]),
+        ((1.0, 3000.0, 1.0, 1.0), 0.0, [1]),
     ],
-    ids=["one", "two", "all alike", "one against the others", "beyond numbers"],
+    ids=["one", "two", "all alike", "one against the others", "all, beyond numbers", "one, beyond numbers"],
 )
 def test_few_videos_are_those_without_which_a_cause_is_not_called_for(
     by_video: tuple[float, ...], p_value: float, few: list[int]

@@ -128,7 +128,10 @@ class CauseScore:
         if not self.by_video:
             return list(dict.fromkeys(site.video for site in self.sites))
         alone = float(chi2.sf(self.chi_square, self.degrees))
-        least = float(chi2.isf(min(1.0, level * alone / self.p_value), self.degrees)) if self.p_value else 0.0
+        share = (
+            alone / self.p_value if alone and self.p_value else 1.0
+        )  # both are 0 of what no number is small enough for
+        least = float(chi2.isf(min(1.0, level * share), self.degrees))
         parts = np.array(self.by_video)
         order = np.argsort(-parts, kind="stable")
         left = self.chi_square - np.cumsum(parts[order])

@@ -14,6 +14,8 @@ from vrdp_prob.discovery.selection.trials import Trial, gain, merit
 from vrdp_prob.inference.runs.parallel import in_processes
 from vrdp_prob.models.effects.effect import Effect
 from vrdp_prob.models.effects.external_impulse import ExternalImpulse
+from vrdp_prob.models.effects.hidden_obstacle import HiddenObstacle
+from vrdp_prob.models.effects.wall import Wall
 
 MOST_RIVALS = 2
 """Causes that are fitted at most in the place of one."""
@@ -110,7 +112,8 @@ class Comparison:
 
 def _tried_at(cause: Effect, steps: Sequence[Step]) -> Step:
     """The step at which a cause was tried first; for a wall or a disc that kicks led to, that of these."""
-    for name in (cause.name, ExternalImpulse.name):
+    led_to_by_kicks = isinstance(cause, Wall | HiddenObstacle)
+    for name in (cause.name, ExternalImpulse.name) if led_to_by_kicks else (cause.name,):
         for step in steps:
             if any(one.name == name for trial in step.tried for one in trial.beyond(step.base)):
                 return step

@@ -128,9 +128,8 @@ class CauseScore:
         if not self.by_video:
             return list(dict.fromkeys(site.video for site in self.sites))
         alone = float(chi2.sf(self.chi_square, self.degrees))
-        share = (
-            alone / self.p_value if alone and self.p_value else 1.0
-        )  # both are 0 of what no number is small enough for
+        may_be_told = alone > 0 and self.p_value > 0  # loud calls have some too small for numbers
+        share = alone / self.p_value if may_be_told else 1.0
         least = float(chi2.isf(min(1.0, level * share), self.degrees))
         parts = np.array(self.by_video)
         order = np.argsort(-parts, kind="stable")

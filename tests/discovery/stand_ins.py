@@ -13,6 +13,7 @@ def refit_with(cause: str, gained: float, *, patches: bool = False) -> Mock:
     """A refit, with what it gains in each of three videos, and whether its cause patches several of them."""
     refit = create_autospec(Trial, instance=True)
     refit.causes, refit.log_density, refit.log_prior = tuple(cause.split("+")), np.full(3, gained), 0.0
+    refit.cause_names = frozenset(refit.causes) - {""}
     refit.fitted_density = refit.log_density
     refit.fit, refit.lacking = Mock(videos=(0, 1, 2)), 0.0
     refit.beyond = lambda base: tuple(one for one in refit.causes if one not in base.causes)

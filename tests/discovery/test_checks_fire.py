@@ -14,7 +14,7 @@ from tests.discovery.fitted import SMALL, fitted, moved
 from tests.discovery.measurement import Measurement
 from tests.discovery.test_checks import by_name
 from tests.discovery.videos import Video, move, recorded
-from vrdp_prob.discovery.checks.clock import LOST, SINGLE
+from vrdp_prob.discovery.checks.clock import LOST_FRAMES, SINGLE_FRAMES
 from vrdp_prob.discovery.checks.contacts import DISTANCE, MOMENTUM, RUBBING, contact_checks
 from vrdp_prob.discovery.checks.flight import free_flight_checks
 from vrdp_prob.discovery.checks.kicks import KICK
@@ -93,7 +93,7 @@ def bent(video: Video) -> Float[np.ndarray, "time body 2"]:
 
 def test_none_fires_where_nothing_is_wrong() -> None:
     found = checked(null()[1])
-    assert {DISTANCE, KICK, LOST, SINGLE, DISTORTION, OUTLIERS} <= set(found)
+    assert {DISTANCE, KICK, LOST_FRAMES, SINGLE_FRAMES, DISTORTION, OUTLIERS} <= set(found)
     assert min(check.p_value for check in found.values()) > CHANCE
 
 
@@ -102,8 +102,8 @@ def test_none_fires_where_nothing_is_wrong() -> None:
     [
         (DISTANCE, larger, "farther apart than the sum of their radii"),
         (KICK, kicked, "Without a partner in reach"),
-        (LOST, lost, "jump ahead along their paths together"),
-        (SINGLE, irregular, "too early or too late for all bodies"),
+        (LOST_FRAMES, lost, "jump ahead along their paths together"),
+        (SINGLE_FRAMES, irregular, "too early or too late for all bodies"),
         (DISTORTION, bent, "away from the middle of the picture"),
     ],
 )
@@ -112,7 +112,9 @@ def test_a_check_fires_on_what_it_is_for(name: str, change: Changes, says: str) 
     found = checked(moved(model, [change(video) for video in videos]))
     assert found[name].p_value < CHANCE
     assert says in found[name].sentence
-    assert found[name].p_value == min(found[one].p_value for one in (DISTANCE, KICK, LOST, SINGLE, DISTORTION))
+    assert found[name].p_value == min(
+        found[one].p_value for one in (DISTANCE, KICK, LOST_FRAMES, SINGLE_FRAMES, DISTORTION)
+    )
 
 
 @pytest.mark.parametrize(

@@ -18,6 +18,7 @@ from vrdp_prob.discovery.describe import describe
 from vrdp_prob.discovery.finding import Check, Verdict
 from vrdp_prob.discovery.residuals.contact_patterns import AT_WALLS
 from vrdp_prob.discovery.selection import doubts as doubts_module
+from vrdp_prob.discovery.selection import leavings as leavings_module
 from vrdp_prob.discovery.selection.doubts import (
     OWN_CHECKS,
     Doubt,
@@ -26,6 +27,7 @@ from vrdp_prob.discovery.selection.doubts import (
     doubts,
     with_doubts,
 )
+from vrdp_prob.discovery.selection.leavings import Leavings
 from vrdp_prob.discovery.selection.search import Search
 from vrdp_prob.discovery.selection.trials import Trial
 from vrdp_prob.inference.several_videos.fitting import SharedFit
@@ -115,26 +117,30 @@ def test_a_cause_whose_own_checks_are_mended_leaves_no_details() -> None:
 def test_own_checks_are_asked_of_the_model_without_the_very_cause_fitted_to_its_end(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    asked: list[Mock] = []
+    asked: list[list[Check]] = []
     checks = {RUBBING: left(RUBBING, 1e-97), KICK: left(KICK, 1e-97)}
 
     def lesser(name: str) -> Mock:
         one = create_autospec(Trial, instance=True)
-        one.continued.return_value = Mock(left=checks[name])
+        one.continued.return_value = create_autospec(Trial, instance=True, fit=checks[name])
         return one
 
-    def made(ended: Mock) -> tuple[Check, ...]:
-        asked.append(ended)
-        return tuple(ended.left)
+    def made(fit: list[Check], *, seed: int) -> tuple[Check, ...]:
+        assert seed == 0
+        asked.append(fit)
+        return tuple(fit)
 
     friction, kick = ContactFriction(), ExternalImpulse()
     best = create_autospec(Trial, instance=True, causes=(friction, kick), fit=Mock())
     found = create_autospec(Search, instance=True, best=best, lesser=(lesser(RUBBING), lesser(KICK)))
-    found.refits = Mock(leavings=Mock(checks=made))
+    found.refits = Mock(leavings=Leavings((), 0))
+    monkeypatch.setattr(leavings_module, "run_checks", made)
     monkeypatch.setattr(doubts_module, "surprise", lambda _fit, _cause: 1.0)
-    doubted = outcome._doubted(found, [*left(RUBBING, 2e-4), *left(KICK, 2e-4)])
-    assert list(doubted) == [kick]
-    assert asked == [found.lesser[0].continued.return_value]
+    for _ in range(2):  # asked again, the fit is not made again
+        doubted = outcome._doubted(found, [*left(RUBBING, 2e-4), *left(KICK, 2e-4)])
+        assert list(doubted) == [kick]
+    assert asked == [checks[RUBBING]]
+    found.lesser[0].continued.assert_called_once_with()
 
 
 def test_checks_and_causes_go_by_their_names(trial: Trial) -> None:

@@ -15,7 +15,7 @@ from tests.discovery.test_checks_fire import Changes, bent, grossly_wrong, irreg
 from tests.discovery.test_wall_contacts import with_effect
 from vrdp_prob.discovery.checks.battery import run_checks
 from vrdp_prob.discovery.checks.bodies import friction_against
-from vrdp_prob.discovery.checks.clock import LOST, SINGLE
+from vrdp_prob.discovery.checks.clock import LOST_FRAMES, SINGLE_FRAMES
 from vrdp_prob.discovery.checks.contacts import (
     DISTANCE,
     DURATION,
@@ -134,7 +134,15 @@ def test_every_check_that_is_made_has_a_figure(setting: Setting, measurement: Me
 
 
 def test_every_check_that_there_is_has_a_figure_and_none_is_of_a_check_that_there_is_not() -> None:
-    named = {question.name for question in QUESTIONS} | {SHAKING, DISTANCE, KICK, LOST, SINGLE, DISTORTION, OUTLIERS}
+    named = {question.name for question in QUESTIONS} | {
+        SHAKING,
+        DISTANCE,
+        KICK,
+        LOST_FRAMES,
+        SINGLE_FRAMES,
+        DISTORTION,
+        OUTLIERS,
+    }
     named |= {RUBBING_AT_WALLS, REBOUND_AT_WALLS, MOMENTUM, MEMORY, SIZE, *TURNING.values(), *DURATION.values()}
     named |= {friction_against(what) for what in ("material", "shape", "mass")}
     assert named - SHOWN_BY.keys() == WHERE_CHECKS_FAIL.keys()
@@ -142,14 +150,15 @@ def test_every_check_that_there_is_has_a_figure_and_none_is_of_a_check_that_ther
 
 
 @pytest.mark.parametrize(
-    ("check", "change"), [(DISTANCE, larger), (KICK, kicked), (LOST, lost), (SINGLE, irregular), (DISTORTION, bent)]
+    ("check", "change"),
+    [(DISTANCE, larger), (KICK, kicked), (LOST_FRAMES, lost), (SINGLE_FRAMES, irregular), (DISTORTION, bent)],
 )
 def test_what_is_wrong_stands_out_of_the_band_of_noise(check: str, change: Changes) -> None:
     videos, model = null()
     (quiet,), (wrong,) = (shown(check, one) for one in (model, moved(model, [change(video) for video in videos])))
     assert len(wrong.outside) / len(wrong.dots) > 2 * len(quiet.outside) / len(quiet.dots)
     assert np.abs(wrong.excess).max() > 2 * np.abs(quiet.excess).max()
-    if check == LOST:
+    if check == LOST_FRAMES:
         time, size = wrong.dots[np.abs(wrong.excess).argmax()]
         assert time == pytest.approx(0.8, abs=0.1)
         assert abs(size) == pytest.approx(0.02, rel=0.2)

@@ -1,6 +1,7 @@
 """Figures of what a model misses, and the window estimates that they show."""
 
 from dataclasses import replace
+from unittest.mock import create_autospec
 from xml.etree import ElementTree
 
 import numpy as np
@@ -12,13 +13,16 @@ from vrdp_prob.discovery import describe
 from vrdp_prob.discovery.checks.contacts import DISTANCE
 from vrdp_prob.discovery.checks.measurement import MEMORY
 from vrdp_prob.discovery.checks.neighbours import roughness
+from vrdp_prob.discovery.page import flight_figures
 from vrdp_prob.discovery.page.figures import residual_figures, title_of
 from vrdp_prob.discovery.page.plots import Plot, side_by_side
+from vrdp_prob.discovery.residuals.fitted_motion import FittedMotion
 from vrdp_prob.discovery.residuals.free_flight import FreeFlight
 from vrdp_prob.discovery.residuals.missing_acceleration import Windows, missing_acceleration
 from vrdp_prob.discovery.residuals.residual_model import ResidualModel
 from vrdp_prob.inference.several_videos.fitting import SharedFit
 from vrdp_prob.report.axes import Axis
+from vrdp_prob.scene import Body, Shape, Tracks
 
 SVG = "{http://www.w3.org/2000/svg}"
 
@@ -134,3 +138,14 @@ def test_an_arrow_too_short_to_see_is_a_dot() -> None:
     plot = Plot(axis, axis, "", "")
     plot.arrow((0.2, 0.5), (0.8, 0.5), "red")
     assert "<circle" not in plot.element
+
+
+def test_the_nearest_body_is_one_that_is_there() -> None:
+    """One that nobody has seen yet, or nobody sees any more, is at no distance."""
+    places = np.array([[[0.0, 0.0], [1.0, 0.0], [0.0, 3.0]]] * 4)
+    seen = places.copy()
+    seen[2:, 1] = np.nan
+    bodies = tuple(Body(name, Shape.CYLINDER, radius=0.1) for name in "abc")
+    motion = create_autospec(FittedMotion, instance=True, position=places)
+    motion.tracks = Tracks.from_arrays("two", bodies, 0.1 * np.arange(4), seen)
+    np.testing.assert_allclose(flight_figures._distance(motion)[:, 0], [1.0, 1.0, 3.0, 3.0])

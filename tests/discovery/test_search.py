@@ -8,7 +8,7 @@ import pytest
 
 from tests.discovery.stand_ins import refit_with, refits_with, without_tracks
 from vrdp_prob.discovery.candidates.scores import CauseScore
-from vrdp_prob.discovery.selection import courses, forward, lesser_models, refits
+from vrdp_prob.discovery.selection import comparison, courses, forward, lesser_models, refits
 from vrdp_prob.discovery.selection.comparison import Comparison
 from vrdp_prob.discovery.selection.courses import Courses
 from vrdp_prob.discovery.selection.extensions import Extensions
@@ -338,6 +338,22 @@ def test_a_search_ends_at_five_causes_and_says_so(monkeypatch: pytest.MonkeyPatc
     assert limit == forward.CAUSES_LEFT
 
 
+def test_causes_that_come_in_one_step_count_each_and_things_of_one_cause_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Two at a time, and a second wall that is none."""
+    names = ("", "tilt+wall", "tilt+wall+second_wall", "tilt+wall+second_wall+drag+kick", "+".join("abcdef"))
+    models = [refit_with(name, 10.0 * count) for count, name in enumerate(names)]
+    for one in models:
+        one.cause_names = one.cause_names - {"second_wall"}
+    following = dict(pairwise(models))
+    asked = _asked(monkeypatch)
+    monkeypatch.setattr(ForwardSelection, "chosen", lambda _self, trial, _step: (trial, following[trial]))
+    monkeypatch.setattr(Leavings, "of", lambda _self, _trial: Left((), (), np.ones(3)))
+    chain, _, limit = _selection(needed=6.0).models(models[0])
+    assert chain == models
+    assert asked == models[:-1]
+    assert limit == forward.CAUSES_LEFT
+
+
 @pytest.mark.parametrize(
     ("rival", "lost", "kicks", "remains"),
     [(20.0, [], False, True), (37.0, [], False, False), (20.0, [1], False, False), (20.0, [], True, False)],
@@ -387,6 +403,30 @@ def test_what_a_better_course_leaves_is_scored_though_the_cause_remains(monkeypa
 def _step(*tried: Trial) -> Step:
     """A step in which some causes were tried."""
     return Step(refit_with("", 0.0), Left((), (), np.ones(3)), tried)
+
+
+def test_what_the_last_of_several_rivals_makes_needless_goes_too(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each rival is better than the one before it; the last takes a place, and is asked what it needs."""
+    rivals = [refit_with("tilt+drag", 10.0 * count) for count in range(comparison.MOST_SWAPS + 2)]
+    pruned = refit_with("drag", 10.0 * comparison.MOST_SWAPS)
+    following = dict(pairwise(rivals))
+    asked: list[Trial] = []
+
+    def without_what_is_needless(
+        _self: LesserModels, best: Trial, lesser: tuple[Trial, ...], _divisor: np.ndarray
+    ) -> tuple[Trial, tuple[Trial, ...]]:
+        asked.append(best)
+        return (pruned, ()) if best is rivals[comparison.MOST_SWAPS] else (best, lesser)
+
+    monkeypatch.setattr(LesserModels, "pruned", without_what_is_needless)
+    monkeypatch.setattr(LesserModels, "without_each", lambda *_given: ())
+    monkeypatch.setattr(refits.Refits, "is_nothing", lambda *_given: False)
+    monkeypatch.setattr(Comparison, "_rivals", lambda _self, best, *_given: ((following.get(best, best),),))
+    found, lesser, near = Comparison(refits_with()).compared(rivals[:1], [_step()])
+    assert asked == rivals[: comparison.MOST_SWAPS + 1]
+    assert found is pruned
+    assert lesser == ()
+    assert near == ((pruned,),)
 
 
 def test_a_law_that_loses_most_videos_comes_last(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -5,10 +5,11 @@ import pytest
 from scipy.stats import chi2, kstest
 
 from vrdp_prob.discovery.checks.false_discovery import controlled, significant
-from vrdp_prob.discovery.checks.replications import anywhere, independent_places, sum_p_value, two_sided_p_value
+from vrdp_prob.discovery.checks.replications import sum_p_value, two_sided_p_value
 from vrdp_prob.discovery.checks.scatter_regression import dependence
 from vrdp_prob.discovery.finding import Check
 from vrdp_prob.discovery.residuals.linear import Score
+from vrdp_prob.discovery.residuals.look_elsewhere import anywhere, independent_places
 from vrdp_prob.discovery.words import direction_words, number
 
 

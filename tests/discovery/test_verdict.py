@@ -16,8 +16,12 @@ from vrdp_prob.discovery.selection.trials import Trial
 from vrdp_prob.inference import default_model
 from vrdp_prob.inference.several_videos.fitting import SharedFit
 from vrdp_prob.models.effects.effect import Effect
+from vrdp_prob.models.effects.surface_tilt import SurfaceTilt
+from vrdp_prob.models.effects.wind import Wind
+from vrdp_prob.scene import Tracks
 
 discover = import_module("vrdp_prob.discovery.discover")
+TILTED_TABLE = SurfaceTilt()
 
 
 def _checks(failing: int, p_value: float = 1e-9) -> list[Check]:
@@ -109,15 +113,36 @@ def test_all_videos_are_searched_anew_where_no_cause_explains_what_is_left(
     fit, better = create_autospec(SharedFit, instance=True), create_autospec(SharedFit, instance=True)
     fit.fits, fit.with_other_courses.return_value = (), better if better_by == "courses" else fit
     better.with_other_courses.return_value = better
-    before, anew = (create_autospec(outcome.Outcome, instance=True) for _ in range(2))
+    before = create_autospec(outcome.Outcome, instance=True)
     before.verdict, before.found = verdict, _search(causes)
     monkeypatch.setattr(stages, "explained", lambda _fits: explains)
     monkeypatch.setattr(stages, "with_other_spins", lambda _given, *, seed: better if better_by == "spins" else fit)
-    further = create_autospec(Search, instance=True)
-    monkeypatch.setattr(stages, "search", lambda given, *_given, **_named: {better: further}[given])
-    monkeypatch.setattr(stages, "outcome_of", lambda given, **_named: {further: anew}[given])
-    found = stages.Stages(default_model(), (), 0, None)._of_better_courses(fit, before, [])
-    assert found is {"anew": anew, "before": before}[taken]
+    found = stages.Stages(default_model(), (), 0, None)._with_better_courses(fit, before)
+    assert found is {"anew": better, "before": fit}[taken]
+
+
+@pytest.mark.parametrize("finds_better", [True, False])
+def test_what_some_videos_call_for_is_no_question_of_doubts(
+    *, finds_better: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Where nothing is found the videos are searched anew, and what is found then is asked of all, doubted or not."""
+    fit, better = (create_autospec(SharedFit, instance=True) for _ in range(2))
+    nothing, tilted = _search(()), _search(())
+    tilted.best = Mock(causes=(TILTED_TABLE,), cause_names=frozenset({TILTED_TABLE.cause_name()}))
+    nothing.best.cause_names = frozenset()
+    believed = create_autospec(outcome.Outcome, instance=True)
+    for one in (nothing, tilted):
+        one.near = ()
+    monkeypatch.setattr(stages.Stages, "_fit", lambda *_given: fit)
+    monkeypatch.setattr(stages, "search", lambda given, *_given, **_named: {fit: nothing, better: tilted}[given])
+    monkeypatch.setattr(stages, "outcome_of", lambda given, **_named: {nothing: believed}[given])
+    monkeypatch.setattr(stages.Stages, "_with_better_courses", lambda *_given: better if finds_better else fit)
+    monkeypatch.setattr(stages, "tried_causes", lambda *_given, **_named: ())
+    monkeypatch.setattr(stages, "_beginning", lambda _found: None)
+    asked = stages.Stages(default_model(), (TILTED_TABLE, Wind()), 0, None).asked_of_all(
+        [Mock(spec=Tracks)] * 4, searched=3
+    )
+    assert asked.causes == ((TILTED_TABLE,) if finds_better else ())
 
 
 def test_a_cause_that_may_take_the_place_of_several_is_told_once() -> None:

@@ -116,12 +116,8 @@ def _without_mimics(
 
 def _doubted(found: Search, after: Sequence[Check]) -> dict[Effect, tuple[Doubt, ...]]:
     """The causes of the best model that are doubted, and why."""
-
-    def fitted_to_the_end(lesser: Trial) -> tuple[Check, ...]:
-        return found.refits.leavings.checks(lesser.continued())
-
     reasons = {
-        cause: tuple(doubts(found.best, cause, after, without=partial(fitted_to_the_end, lesser)))
+        cause: tuple(doubts(found.best, cause, after, without=partial(found.refits.leavings.checks_at_the_end, lesser)))
         for cause, lesser in zip(found.best.causes, found.lesser, strict=True)
     }
     return {cause: some for cause, some in reasons.items() if some}

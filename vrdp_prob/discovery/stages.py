@@ -99,14 +99,15 @@ class Stages:
         fit = self._fit(some, self.catalogue)
         found = self._search(fit, self.catalogue)
         if not found.best.causes:
-            found = self._of_better_courses(fit, self._believed(found), self.catalogue).found
+            better = self._with_better_courses(fit, self._believed(found))
+            found = found if better is fit else self._search(better, self.catalogue)
         near = {one.causes[-1].cause_name() for rivals in found.near for one in rivals}
         further = {
             one.name
             for one in tried_causes(found, (), seed=self.seed)
             if one.gain * len(videos) / len(some) >= one.gain_needed
         }
-        asked = {cause.cause_name() for cause in found.best.causes} | near | further
+        asked = found.best.cause_names | near | further
         causes = tuple(effect for effect in self.catalogue if effect.cause_name() in asked)
         return Asked(causes, searched, len(videos), _beginning(found))
 
@@ -123,7 +124,8 @@ class Stages:
         causes, beginning = (self.catalogue, None) if asked is None else (asked.causes, asked.beginning)
         fit = self._fit(videos, causes)
         outcome = self._believed(self._search(fit, causes, beginning))
-        return self._of_better_courses(fit, outcome, causes)
+        better = self._with_better_courses(fit, outcome)
+        return outcome if better is fit else self._believed(self._search(better, causes))
 
     def _fit(self, videos: Sequence[Tracks], causes: Sequence[Effect]) -> SharedFit:
         """The fit of the model; single lost videos are searched anew, unless it lacks something."""
@@ -133,16 +135,15 @@ class Stages:
                 fit = fit.with_lost_courses(seed=self.seed)
         return fit
 
-    def _of_better_courses(self, fit: SharedFit, outcome: Outcome, causes: Sequence[Effect]) -> Outcome:
-        """What is found where all videos are searched anew, if something is left that no cause explains.
+    def _with_better_courses(self, fit: SharedFit, outcome: Outcome) -> SharedFit:
+        """The fit with all videos searched anew, if it leaves something that no cause explains.
 
-        The outcome stays where the model does not explain most videos, or where the searches find nothing better.
+        It is the same fit where the model does not explain most videos, or where the searches find nothing better.
         """
         if outcome.verdict is not Verdict.UNKNOWN or outcome.found.best.causes or not explained(fit.fits):
-            return outcome
+            return fit
         with self._stage("Searching all videos anew"):
-            better = with_other_spins(fit, seed=self.seed).with_other_courses(seed=self.seed)
-        return outcome if better is fit else self._believed(self._search(better, causes))
+            return with_other_spins(fit, seed=self.seed).with_other_courses(seed=self.seed)
 
     def _lacks_something(self, fit: SharedFit, causes: Sequence[Effect]) -> bool:
         """Whether tracks show what videos are lost for, or most videos call for a law: no course is to blame then."""

@@ -18,6 +18,7 @@ from vrdp_prob.discovery.candidates.probes import Probe, probes
 from vrdp_prob.discovery.residuals.free_flight import ONE_SIDED_95
 from vrdp_prob.discovery.residuals.jitter import jitter
 from vrdp_prob.discovery.residuals.linear import RANK, Score
+from vrdp_prob.discovery.residuals.look_elsewhere import anywhere, independent_places
 from vrdp_prob.discovery.residuals.residual_model import ResidualModel
 from vrdp_prob.inference.runs.parallel import in_parallel, in_processes
 from vrdp_prob.inference.several_videos.fitting import SharedFit
@@ -26,8 +27,7 @@ from vrdp_prob.models.effects.effect import Effect
 from vrdp_prob.models.parameters import Parameter, Scope, Transform
 
 REPLICATIONS = 400
-TAIL = 0.05
-"""Tail probability at which the number of independent places of a scan is read off its null distribution."""
+"""Scans of noise, of which each scan of what is left is one by chance."""
 SITE_LEVEL = 1e-3
 """An effect that happens once in a video is there if chance makes a statistic as large, anywhere, less often."""
 LEAST_START = 0.01
@@ -222,7 +222,7 @@ def _scan_shared(
         for linear_video, one in zip(model.linear.videos, directions, strict=True)
     ]
     alone = _p_value(scores[best], names, effect)
-    p_value = min(1.0, _independent(blocks, degrees, generator) * alone)
+    p_value = anywhere(alone, _places(blocks, degrees, generator))
     estimate = dict(zip(names, scores[best].estimate.tolist(), strict=True))
     start = dict(points[best]) | (_starting(effect, estimate) if len(estimate) == len(names) else {})
     largest = _largest([zip(names, score.estimate, score.sd, strict=True) for score in scores], effect)
@@ -325,13 +325,10 @@ def _starting(effect: Effect, estimate: Mapping[str, float]) -> dict[str, float]
     return {name: max(value, least.get(name, value)) for name, value in estimate.items()}
 
 
-def _independent(
+def _places(
     blocks: Sequence[Float[np.ndarray, "_ point strength"]], degrees: int, generator: np.random.Generator
 ) -> float:
-    """Number of independent places that makes the largest statistic of a scan as large as it is by chance.
-
-    It is read off the scans of noise; the tail beyond them is that of the single statistic.
-    """
+    """Number of independent places of a scan, from scans of noise."""
     points, strengths = blocks[0].shape[1:]
     if points == 1:
         return 1.0
@@ -343,7 +340,7 @@ def _independent(
         information += np.einsum("rps,rpt->pst", block, block)
     inverse = np.linalg.pinv(information, rcond=RANK, hermitian=True)
     largest = np.einsum("nps,pst,npt->np", gradients, inverse, gradients).max(axis=1)
-    return max(1.0, TAIL / float(chi2.sf(np.quantile(largest, 1 - TAIL), degrees)))
+    return independent_places(largest, degrees, points)
 
 
 def _scan_once(
@@ -363,7 +360,7 @@ def _scan_once(
             if not degrees:
                 continue
             statistic = scores[best].chi_square
-            p_value = min(1.0, _independent([block], degrees, generator) * float(chi2.sf(statistic, degrees)))
+            p_value = anywhere(float(chi2.sf(statistic, degrees)), _places([block], degrees, generator))
             fields = [probe.field for probe in mine]
             values = {**points[index][best], **dict(zip(fields, scores[best].estimate.tolist(), strict=True))}
             sites.append(Site(index, owner, values, statistic, p_value))

@@ -8,7 +8,7 @@ scatter is estimated beside it, and the F test needs no replications.
 from collections.abc import Iterator, Sequence
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
 from vrdp_prob.discovery.checks.false_discovery import SEEN
 from vrdp_prob.discovery.checks.own_values import BodyFrictions, Rebounds
@@ -68,24 +68,31 @@ def _friction_checks(fit: SharedFit, contacts: Sequence[FittedContacts]) -> Iter
     known = np.stack([rolls, ~rolls], axis=1).astype(float)
     known = known[:, known.any(axis=0)]
 
-    def asked(columns: Sequence[Float[np.ndarray, "number"]]) -> Dependence | None:
-        return dependence(own.logarithm, own.covariance, np.eye(len(bodies)), known, np.stack(columns, axis=1))
+    def asked(
+        columns: Sequence[Float[np.ndarray, "number"]],
+        rows: Int[np.ndarray, "row"],
+        known: Float[np.ndarray, "number column"],
+    ) -> Dependence | None:
+        """The dependence of some bodies' frictions on columns, beside what is known."""
+        return dependence(
+            own.logarithm[rows],
+            own.covariance[np.ix_(rows, rows)],
+            np.eye(len(rows)),
+            _independent_columns(known[rows]),
+            np.stack(columns, axis=1)[rows],
+        )
 
     materials = sorted({body.material for body in bodies if body.material is not None})
     if len(materials) > 1:
-        found = asked([_indicator(bodies, material) for material in materials[1:]])
+        stated = np.flatnonzero([body.material is not None for body in bodies])
+        found = asked([_indicator(bodies, material) for material in materials[1:]], stated, known)
         yield from _friction_check("material", found, _material_words(found, materials))
     if {Shape.CUBE, Shape.CYLINDER} <= {body.shape for body in bodies}:
-        found = asked([np.array([float(body.shape is Shape.CUBE) for body in bodies])])
+        cubes = np.array([float(body.shape is Shape.CUBE) for body in bodies])
+        found = asked([cubes], np.arange(len(bodies)), known)
         yield from _friction_check("shape", found, f"that of cubes is {_more(found)} than that of cylinders")
-    rows = np.flatnonzero(np.isfinite(own.log_mass))
-    found = dependence(
-        own.logarithm[rows],
-        own.covariance[np.ix_(rows, rows)],
-        np.eye(len(rows)),
-        _independent_columns(np.concatenate([own.weighed_together[rows], known[rows]], axis=1)),
-        own.log_mass[rows, None],
-    )
+    weighed = np.flatnonzero(np.isfinite(own.log_mass))
+    found = asked([own.log_mass], weighed, np.concatenate([own.weighed_together, known], axis=1))
     visible = "" if found is None else f"a power of {number(NORMAL_95 * float(found.sd[0]))} of the mass"
     yield from _friction_check("mass", found, _mass_words(found, own.largest_mass_ratio), visible)
 

@@ -5,14 +5,16 @@ from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float, Int
+from scipy.stats import chi2
 
 from vrdp_prob.discovery.checks.false_discovery import SEEN
 from vrdp_prob.discovery.checks.replications import sum_p_value
 from vrdp_prob.discovery.finding import Check
+from vrdp_prob.discovery.residuals.look_elsewhere import anywhere, independent_places
 from vrdp_prob.discovery.residuals.residual_model import ResidualModel
 from vrdp_prob.discovery.words import number, opposite
 
-LOST, SINGLE = "time stamps: lost frames", "time stamps: single frames"
+LOST_FRAMES, SINGLE_FRAMES = "time stamps: lost frames", "time stamps: single frames"
 
 
 @dataclass(frozen=True)
@@ -93,15 +95,15 @@ def clock_checks(model: ResidualModel, replicas: Sequence[Float[np.ndarray, "_ r
     replicas
         What noise leaves of each video beside that.
     """
-    lost, jitter = 0.0, 0.0
-    lost_replicas, jitter_replicas = (np.zeros(replicas[0].shape[1]) for _ in range(2))
+    largest, jitter_replicas = (np.zeros(replicas[0].shape[1]) for _ in range(2))
+    places, jitter = 0, 0.0
     strongest, where = (0.0, 0.0), ""
     squares, weights = 0.0, 0.0
     for index, (video, noise) in enumerate(zip(model.videos, replicas, strict=True)):
         motion = video.motion
         late, single = (LateFrames.of(model, index, noise, lasting=lasting) for lasting in (True, False))
-        lost += float(late.statistic.max(initial=0.0))
-        lost_replicas += late.replicas.max(axis=0, initial=0.0)
+        places += len(late.frames)
+        largest = np.maximum(largest, late.replicas.max(axis=0, initial=0.0))
         jitter += float(single.statistic.sum())
         jitter_replicas += single.replicas.sum(axis=0)
         squares += float((single.gradient**2 - single.information).sum())
@@ -110,14 +112,14 @@ def clock_checks(model: ResidualModel, replicas: Sequence[Float[np.ndarray, "_ r
             best = int(late.statistic.argmax())
             strongest = float(late.statistic[best]), float(late.lateness[best])
             where = f"video {video.linear.name} from {number(float(motion.times[late.frames[best]]))} s on"
-    p_value = sum_p_value(lost, lost_replicas)
+    p_value = anywhere(float(chi2.sf(strongest[0], 1)), independent_places(largest, 1, places))
     sentence = (
         f"All bodies jump {opposite(strongest[1], 'back', 'ahead')} along their paths together, as if frames were "
         f"missing: most in {where}, by {number(abs(strongest[1]))} s."
         if p_value < SEEN
         else "No jump of all bodies along their paths was seen."
     )
-    yield Check(LOST, abs(strongest[1]), p_value, False, sentence)
+    yield Check(LOST_FRAMES, abs(strongest[1]), p_value, False, sentence)
     p_value = sum_p_value(jitter, jitter_replicas)
     spread = float(np.sqrt(max(squares, 0.0) / weights)) if weights else 0.0
     sentence = (
@@ -125,4 +127,4 @@ def clock_checks(model: ResidualModel, replicas: Sequence[Float[np.ndarray, "_ r
         if p_value < SEEN
         else "No frame comes too early or too late for all bodies."
     )
-    yield Check(SINGLE, spread, p_value, False, sentence)
+    yield Check(SINGLE_FRAMES, spread, p_value, False, sentence)

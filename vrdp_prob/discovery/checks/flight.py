@@ -10,9 +10,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from vrdp_prob.discovery.checks.false_discovery import SEEN
-from vrdp_prob.discovery.checks.replications import anywhere
 from vrdp_prob.discovery.finding import Check
 from vrdp_prob.discovery.residuals.free_flight import FreeFlight, Part
+from vrdp_prob.discovery.residuals.look_elsewhere import anywhere
 from vrdp_prob.discovery.words import by, direction_words, number, opposite
 from vrdp_prob.scene import Shape
 

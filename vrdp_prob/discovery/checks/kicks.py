@@ -9,10 +9,10 @@ from jaxtyping import Float, Int
 from scipy.stats import chi2
 
 from vrdp_prob.discovery.checks.false_discovery import SEEN
-from vrdp_prob.discovery.checks.replications import anywhere, independent_places
 from vrdp_prob.discovery.finding import Check
 from vrdp_prob.discovery.residuals.fitted_motion import REACH, FittedMotion, Kicks
 from vrdp_prob.discovery.residuals.linear import Score
+from vrdp_prob.discovery.residuals.look_elsewhere import anywhere, independent_places
 from vrdp_prob.discovery.residuals.residual_model import ResidualModel
 from vrdp_prob.discovery.words import number
 

@@ -10,29 +10,6 @@ from jaxtyping import Float
 from scipy.stats import chi2, norm
 
 REPLICATIONS = 300
-TAIL = 0.05
-"""Tail probability at which the number of independent places of a scan is read off its null distribution."""
-
-
-def independent_places(largest: Float[np.ndarray, "replica"], degrees: int, places: int) -> float:
-    """Number of independent places that makes the largest chi-square of a scan as large as it is by chance.
-
-    Parameters
-    ----------
-    largest
-        Largest chi-square of each replication.
-    degrees
-        Degrees of freedom of each.
-    places
-        Number of places looked at, which is an upper bound.
-    """
-    alone = float(chi2.sf(np.quantile(largest, 1 - TAIL), degrees))
-    return float(np.clip(TAIL / max(alone, 1e-300), 1.0, max(places, 1)))
-
-
-def anywhere(p_value: float, places: float) -> float:
-    """Probability of so small a p-value at the best of so many independent places."""
-    return float(-np.expm1(places * np.log1p(-min(p_value, 1 - 1e-16))))
 
 
 def sum_p_value(value: float, replicas: Float[np.ndarray, "replica"]) -> float:

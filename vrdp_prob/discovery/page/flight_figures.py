@@ -13,7 +13,7 @@ from vrdp_prob.discovery.page.scatter import Banded, Points, with_bands, with_ba
 from vrdp_prob.discovery.page.seen import Figure, Seen
 from vrdp_prob.discovery.residuals.fitted_motion import FittedMotion
 from vrdp_prob.discovery.residuals.free_flight import NORMAL_95
-from vrdp_prob.discovery.residuals.free_flight_patterns import way_travelled
+from vrdp_prob.discovery.residuals.free_flight_patterns import there, way_travelled
 from vrdp_prob.discovery.residuals.residual_model import joined
 from vrdp_prob.scene import Body
 
@@ -53,12 +53,11 @@ def _along(coordinate: int) -> Direction:
 
 def _to_nearest(motion: FittedMotion) -> Float[np.ndarray, "time body 2"]:
     """From each body to the nearest other one, in m; 0 where there is none."""
-    place, tracks = motion.position, motion.tracks
+    place = motion.position
     apart = place[:, None] - place[:, :, None]
     distance = np.linalg.norm(apart, axis=-1)
     distance[:, np.arange(place.shape[1]), np.arange(place.shape[1])] = np.inf
-    absent = tracks.times[:, None] < tracks.first_seen
-    distance[np.broadcast_to(absent[:, None], distance.shape)] = np.inf
+    distance[np.broadcast_to(~there(motion.tracks)[:, None], distance.shape)] = np.inf
     nearest = distance.argmin(axis=2)
     found = np.take_along_axis(apart, nearest[:, :, None, None], axis=2)[:, :, 0]
     return np.where(np.isfinite(distance.min(axis=2))[..., None], found, 0.0)

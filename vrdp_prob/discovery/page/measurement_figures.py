@@ -5,7 +5,7 @@ from functools import partial
 
 import numpy as np
 
-from vrdp_prob.discovery.checks.clock import LOST, SINGLE, LateFrames
+from vrdp_prob.discovery.checks.clock import LOST_FRAMES, SINGLE_FRAMES, LateFrames
 from vrdp_prob.discovery.checks.measurement import MEMORY, OUTLIERS, SIZE
 from vrdp_prob.discovery.checks.neighbours import FEWEST, FramesApart, apart_from_neighbours
 from vrdp_prob.discovery.page.scatter import Banded, Points, with_bands
@@ -137,7 +137,7 @@ MEASUREMENT_FIGURES: Mapping[str, Figure] = {
     OUTLIERS: _outliers,
     MEMORY: partial(_neighbours, memory=True),
     SIZE: partial(_neighbours, memory=False),
-    LOST: _lost,
-    SINGLE: _single,
+    LOST_FRAMES: _lost,
+    SINGLE_FRAMES: _single,
 }
 """How what a check of the measurement is about is shown, by its name."""

@@ -4,7 +4,7 @@ from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
 from vrdp_prob.discovery.residuals.fitted_motion import FittedMotion
 from vrdp_prob.scene import Body, Shape, Tracks
@@ -61,7 +61,7 @@ class Scales:
     axes
         Axes along which these places differ: both, unless everything moves along one.
     materials
-        All materials that are stated.
+        The materials to tell from the rest: all that are stated, less the first where every body's is.
     shapes
         All shapes.
     weighed
@@ -112,7 +112,7 @@ class Scales:
             float(np.median(speeds)) if len(speeds) else 1.0,
             np.median(places, axis=0) if len(places) else np.zeros(2),
             spanned(places),
-            tuple(sorted({body.material for body in bodies if body.material is not None})),
+            told_apart(bodies),
             frozenset(body.shape for body in bodies),
             all(body.mass is not None for body in bodies),
             all(motion.tracks.turning_told for motion in motions),
@@ -126,6 +126,13 @@ def spanned(places: Float[np.ndarray, "place 2"]) -> tuple[int, ...]:
     """Axes along which places differ; one of them where everything moves along it."""
     spread = places.std(axis=0) if len(places) else np.ones(2)
     return tuple(int(axis) for axis in np.flatnonzero(spread >= FLAT * spread.max()))
+
+
+def told_apart(bodies: Sequence[Body]) -> tuple[str, ...]:
+    """Materials to tell from the rest: what nobody stated is none of them."""
+    materials = {body.material for body in bodies}
+    stated = sorted(material for material in materials if material is not None)
+    return tuple(stated if None in materials else stated[1:])
 
 
 def patterns(scales: Scales) -> Iterator[Pattern]:
@@ -195,7 +202,7 @@ def _of_bodies(scales: Scales, shapes: Collection[Shape]) -> Iterator[tuple[str,
     """What bodies are, by which an acceleration may differ between them: one of some shapes, a material, a mass."""
     for shape in [one for one in Shape if one in shapes][:-1]:
         yield str(shape), _of_body(_has(shape)), f"[{shape}]"
-    for material in scales.materials[1:]:
+    for material in scales.materials:
         yield f"material {material}", _of_body(_is_made_of(material)), f"[{material}]"
     if scales.weighed:
         yield "mass", _of_body(lambda body: float(np.log(body.mass or 1.0))), "log(m)"
@@ -272,14 +279,15 @@ def _towards_others(power: int, *, weighed: bool) -> Field:
     def field(motion: FittedMotion) -> Float[np.ndarray, "time body 2"]:
         apart = motion.position[:, None] - motion.position[:, :, None]
         squares = (apart**2).sum(axis=-1) + SOFTENING**2
-        here = _there(motion.tracks)[:, None, :, None]
+        here = there(motion.tracks)[:, None, :, None]
         pull = (here * apart / squares[..., None] ** ((power + 1) / 2)).sum(axis=2)
         return pull / motion.mass[:, None] if weighed and power > 1 else pull
 
     return field
 
 
-def _there(tracks: Tracks) -> Float[np.ndarray, "time body"]:
-    """1 from the first to the last frame in which a body was seen, else 0."""
+def there(tracks: Tracks) -> Bool[np.ndarray, "time body"]:
+    """Whether a body is there: from the first to the last frame in which it was seen."""
     times = tracks.times[:, None]
-    return ((times >= tracks.first_seen) & (times <= tracks.last_seen)).astype(float)
+    found: np.ndarray = (times >= tracks.first_seen) & (times <= tracks.last_seen)
+    return found

@@ -41,7 +41,8 @@ def models_of_the_others(
 ) -> Mapping[str, tuple[PhysicsModel, PhysicsModel]]:
     """For each video, by name: two models, believing what all other videos say.
 
-    With what a video itself says in its prior as well, that would count twice.
+    With what a video itself says of shared numbers in its prior as well, that would count twice. What is believed of
+    bodies is what all videos say: one of many says little of what they are like as a rule.
 
     Parameters
     ----------

@@ -54,18 +54,14 @@ class Comparison:
         divisor = steps[-1].left.overdispersion
         lesser = (*self._lesser.without_each(best, best.causes[: len(best.causes) - len(known)], divisor), *known)
         sure = partial(merit, overdispersion=divisor)
-        for _ in range(MOST_SWAPS):
+        for swaps in range(MOST_SWAPS + 1):
             best, lesser = self._lesser.pruned(best, lesser, divisor)
             rivals = self._rivals(best, lesser, steps)
             others = (one for some in rivals for one in some)
             better = max(others, key=sure, default=best)
-            if sure(better) > sure(best) and self.refits.is_nothing(better, best, divisor):
-                better = best
-            if sure(better) <= sure(best):
+            if swaps == MOST_SWAPS or sure(better) <= sure(best) or self.refits.is_nothing(better, best, divisor):
                 break
             best, lesser = better, self._lesser.without_each(better, better.causes, divisor)
-        else:
-            rivals = self._rivals(best, lesser, steps)
         return best, lesser, rivals
 
     def _rivals(self, best: Trial, lesser: Sequence[Trial], steps: Sequence[Step]) -> tuple[tuple[Trial, ...], ...]:

@@ -9,7 +9,7 @@ from jaxtyping import Float
 
 from vrdp_prob.discovery.candidates.scores import happens_once
 from vrdp_prob.discovery.checks.bodies import REBOUND, friction_against
-from vrdp_prob.discovery.checks.clock import LOST, SINGLE
+from vrdp_prob.discovery.checks.clock import LOST_FRAMES, SINGLE_FRAMES
 from vrdp_prob.discovery.checks.contacts import DISTANCE, DURATION, REBOUND_AT_WALLS, RUBBING, RUBBING_AT_WALLS
 from vrdp_prob.discovery.checks.kicks import KICK
 from vrdp_prob.discovery.checks.measurement import DISTORTION
@@ -41,9 +41,9 @@ OWN_CHECKS: Mapping[str, tuple[str, ...]] = {
     ContactFriction.name: (RUBBING, RUBBING_AT_WALLS),
     ContactRadiusError.name: (DISTANCE, *DURATION.values()),
     ExternalImpulse.name: (KICK,),
-    ClockError.name: (LOST,),
-    DroppedFrames.name: (LOST,),
-    IrregularFrames.name: (SINGLE,),
+    ClockError.name: (LOST_FRAMES,),
+    DroppedFrames.name: (LOST_FRAMES,),
+    IrregularFrames.name: (SINGLE_FRAMES,),
     LensDistortion.name: (DISTORTION,),
     MassDependentFriction.name: (friction_against("mass"),),
     MaterialFriction.name: (friction_against("material"),),

@@ -90,7 +90,7 @@ class ForwardSelection:
         begun = None if self.beginning is None else self.beginning.fitted(base, self.refits)
         chain = [base] if begun is None else [base, begun]
         steps, rounds = [self.untried(one) for one in chain], 0
-        while len(chain) <= MOST_CAUSES:
+        while len(chain[-1].cause_names) < MOST_CAUSES:
             step = steps[-1] = self.tried(chain[-1])
             found, winner = self.chosen(chain[-1], step)
             is_exhausted = _is_trifle(found, chain[-1])

@@ -12,7 +12,7 @@ from vrdp_prob.discovery.finding import Check
 from vrdp_prob.discovery.residuals.overdispersion import overdispersion
 from vrdp_prob.discovery.selection.shortlist import SHORTLIST_LEVEL
 from vrdp_prob.discovery.selection.trials import Trial
-from vrdp_prob.inference.several_videos.second_look import MOST
+from vrdp_prob.inference.several_videos.second_look import SHARE_ASTRAY
 from vrdp_prob.models.effects.effect import Effect
 
 LOUD = 20.0
@@ -55,6 +55,7 @@ class Leavings:
     seed: int
     _left: dict[Trial, Left] = field(default_factory=dict)
     _checks: dict[Trial, tuple[Check, ...]] = field(default_factory=dict)
+    _ended: dict[Trial, Trial] = field(default_factory=dict)
 
     def of(self, trial: Trial) -> Left:
         """What a model leaves."""
@@ -78,6 +79,12 @@ class Leavings:
         if trial not in self._checks:
             self._checks[trial] = run_checks(trial.fit, seed=self.seed)
         return self._checks[trial]
+
+    def checks_at_the_end(self, trial: Trial) -> tuple[Check, ...]:
+        """Checks of what a model leaves whose fit was not followed to its end, since it is worse in any case."""
+        if trial not in self._ended:
+            self._ended[trial] = trial.continued()
+        return self.checks(self._ended[trial])
 
     def something(self, trial: Trial) -> bool:
         """Whether a model leaves what chance explains less well than some cause may."""
@@ -123,4 +130,4 @@ class Leavings:
 
 def _half(trial: Trial) -> int:
     """Number of videos of which no more than so many may be on wrong courses by themselves."""
-    return len(trial.fit.videos) // MOST
+    return int(SHARE_ASTRAY * len(trial.fit.videos))

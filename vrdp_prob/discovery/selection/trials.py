@@ -21,8 +21,8 @@ from vrdp_prob.inference.several_videos.fitting import SharedFit
 from vrdp_prob.inference.several_videos.population import own_parameters, with_learned_population
 from vrdp_prob.inference.several_videos.second_look import (
     LOST,
-    MOST,
-    SINGLE,
+    SHARE_ASTRAY,
+    SHARE_LOST,
     explained,
     lost_videos,
     may_take_another_course,
@@ -133,6 +133,11 @@ class Trial:
         """Names of the causes."""
         return tuple(cause.name for cause in self.causes)
 
+    @property
+    def cause_names(self) -> frozenset[str]:
+        """Names of the causes, of which several may be ways or things of one."""
+        return frozenset(cause.cause_name() for cause in self.causes)
+
     def beyond(self, base: "Trial") -> tuple[Effect, ...]:
         """The causes that it has beyond those of another model."""
         return tuple(cause for cause in self.causes if cause not in base.causes)
@@ -151,7 +156,7 @@ class Trial:
     def fallen_from(self, base: "Trial") -> list[int]:
         """Videos that are less probable than under a model with less, the worst first: they have lost their course."""
         fallen = self._fallen_from(base)
-        return fallen[: max(len(self.fit.fits) // MOST, 1)]
+        return fallen[: max(int(SHARE_ASTRAY * len(self.fit.fits)), 1)]
 
     def loses_videos_of(self, other: "Trial") -> bool:
         """Whether a video is less probable than in another fit and explained no more."""
@@ -176,7 +181,9 @@ class Trial:
         if self.fit.joint.converged or not explained(fits):
             return self
         holding = [one for one in self._fallen_from(base, HELD_BACK) if may_take_another_course(fits[one])]
-        found = self if len(holding) > max(len(fits) // SINGLE, 1) else self.mended(holding, seed=seed, yielding=True)
+        found = (
+            self if len(holding) > max(SHARE_LOST * len(fits), 1) else self.mended(holding, seed=seed, yielding=True)
+        )
         if found is self:
             return self
         found = replace(found, fit=with_own_population(found.fit)).continued()

@@ -21,7 +21,7 @@ from vrdp_prob.inference.several_videos.linking import LinkedVideo, SharedNumber
 from vrdp_prob.inference.several_videos.parts import carried_starts, fit_alone, link_fits
 from vrdp_prob.inference.several_videos.second_look import (
     FAR_WORSE,
-    MOST,
+    SHARE_ASTRAY,
     WORSE,
     doubtful,
     explained,
@@ -80,7 +80,7 @@ def _strays(fits: Sequence[MapFit], joint: JointFit) -> bool:
 
     Where more are, it is the model that lacks something.
     """
-    return 0 < int((_worsened(fits, joint) > WORSE).sum()) <= len(fits) / MOST
+    return 0 < int((_worsened(fits, joint) > WORSE).sum()) <= SHARE_ASTRAY * len(fits)
 
 
 def _has_unseen_yaws(fit: MapFit) -> bool:

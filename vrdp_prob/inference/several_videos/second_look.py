@@ -30,10 +30,11 @@ EXPLAINED = 1.2
 sd."""
 LOST = 1.2
 """Residuals in units of the noise from which a video may have lost its course of events."""
-MOST = 2
-"""One video in so many is looked at again."""
-SINGLE = 4
-"""One video in so many, at most, has lost its course by itself; where more are lost, the model lacks something."""
+SHARE_ASTRAY = 0.5
+"""Share of the videos, at most, that may be on wrong courses and are looked at again; where more are, the model lacks
+something."""
+SHARE_LOST = 0.25
+"""Share of the videos, at most, that have lost their courses by themselves; where more have, a cause is missing."""
 SAME = 0.01
 """Fits whose residuals differ by a smaller share are taken for the same one, and unless they are far worse than those
 of other videos no further one is looked for in the same way: with what the others say, or without, since what they say
@@ -61,7 +62,7 @@ def doubtful(fits: Sequence[MapFit], among: Collection[int] | None = None) -> li
         Videos that may be; all where None.
     """
     excess = _excess(fits)
-    order = np.argsort(-excess, kind="stable")[: len(fits) // MOST]
+    order = np.argsort(-excess, kind="stable")[: int(SHARE_ASTRAY * len(fits))]
     possible = range(len(fits)) if among is None else among
     return [
         int(index)
@@ -83,7 +84,7 @@ def lost_videos(fits: Sequence[MapFit]) -> list[int]:
 
 def loses_single_videos(fits: Sequence[MapFit]) -> bool:
     """Whether a model explains most videos and loses few, which rather lack their course of events than a cause."""
-    return explained(fits) and 0 < len(lost_videos(fits)) <= max(len(fits) // SINGLE, 1)
+    return explained(fits) and 0 < len(lost_videos(fits)) <= max(SHARE_LOST * len(fits), 1)
 
 
 def outweigh(fits: Sequence[MapFit], some: Collection[int]) -> bool:
@@ -100,7 +101,7 @@ def lost_together(fits: Sequence[MapFit]) -> list[list[int]]:
     """
     lost, as_good = lost_videos(fits), trusted(fits)
     groups = [[index for index in lost if not as_good[index]], [index for index in lost if as_good[index]]]
-    return [group[: len(fits) // MOST] for group in groups if group]
+    return [group[: int(SHARE_ASTRAY * len(fits))] for group in groups if group]
 
 
 def may_take_another_course(fit: MapFit) -> bool:

@@ -1,12 +1,20 @@
 """Stand-ins for refits, and for what makes them."""
 
+from collections.abc import Mapping
 from unittest.mock import Mock, create_autospec
 
 import numpy as np
 import pytest
 
+from vrdp_prob.discovery.candidates.scores import CauseScore
 from vrdp_prob.discovery.selection import refits
 from vrdp_prob.discovery.selection.trials import Trial
+from vrdp_prob.models.effects.effect import Effect
+
+
+def start_with(effect: Effect, values: Mapping[str, float] | None = None) -> CauseScore:
+    """A start of refits with a cause."""
+    return CauseScore(effect, dict(values or {}), (), 0.0, 0, 0.0, {})
 
 
 def refit_with(cause: str, gained: float, *, patches: bool = False) -> Mock:
@@ -20,6 +28,7 @@ def refit_with(cause: str, gained: float, *, patches: bool = False) -> Mock:
     refit.patches.return_value, refit.may_vanish.return_value = patches, False
     refit.loses_videos_of.return_value = refit.loses_most_of.return_value = False
     refit.fallen_from.return_value = []
+    refit.start_with.side_effect = start_with
     refit.with_courses_of.side_effect = lambda _other: refit
     refit.continued.return_value = refit
     refit.freed.side_effect = lambda _base, **_how: refit

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from tests.discovery.fitted import fitted
-from tests.discovery.stand_ins import refit_with, refits_with
+from tests.discovery.stand_ins import refit_with, refits_with, start_with
 from vrdp_prob.discovery import stages
 from vrdp_prob.discovery.candidates.scores import CauseScore
 from vrdp_prob.discovery.selection import beginning as beginning_module
@@ -27,7 +27,7 @@ from vrdp_prob.models.effects.surface_tilt import SurfaceTilt
 from vrdp_prob.models.effects.wind import Wind
 from vrdp_prob.models.parameters import Prior
 
-TILTED = Beginning((SurfaceTilt(),), default_model(), {SurfaceTilt.name: frozenset({Wind.name})})
+TILTED = Beginning((SurfaceTilt(),), default_model(), {SurfaceTilt.name: (start_with(Wind()),)})
 
 
 def _search(best: Trial, rivals: Sequence[Sequence[Trial]], monkeypatch: pytest.MonkeyPatch) -> Search:
@@ -48,7 +48,7 @@ def test_what_happens_once_is_nothing_to_go_on_from_and_rivals_are_those_that_co
     assert told is not None
     assert told.causes == best.causes[:1]
     assert told.believed is model
-    assert told.rivals[SurfaceTilt.name] == {Wind.name}
+    assert [one.effect for one in told.rivals[SurfaceTilt.name]] == [Wind()]
     best.causes = best.causes[1:]
     assert stages._beginning(_search(best, [[near]], monkeypatch)) is None
 

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from tests.discovery.fitted import fitted
+from tests.discovery.stand_ins import start_with
 from vrdp_prob.discovery.candidates import proposals
 from vrdp_prob.discovery.candidates.kicked_at_contact import kicked_at_contact
 from vrdp_prob.discovery.candidates.proposals import hidden_things
@@ -19,6 +20,7 @@ from vrdp_prob.discovery.selection.trials import Trial
 from vrdp_prob.discovery.words import title
 from vrdp_prob.models.effects.external_impulse import ExternalImpulse
 from vrdp_prob.models.effects.hidden_obstacle import HiddenObstacle
+from vrdp_prob.models.effects.linear_drag import LinearDrag
 from vrdp_prob.models.effects.surface_tilt import SurfaceTilt
 from vrdp_prob.models.effects.wall import SecondWall, ThirdWall, Wall
 from vrdp_prob.models.model_file import known_effects
@@ -128,9 +130,23 @@ def test_a_disc_in_the_place_of_the_kick_explains_the_videos_as_well(kicked: Tri
     starts = hidden_things(kicked.fit, [HiddenObstacle()], 0.0)
     _, fit = fitted(WAY, 20.0, seed=SEED)
     least = fit.joint.log_density
-    found = [one for start in starts if (one := kicked.with_cause_in_place(start, least)) is not None]
+    found = [
+        one for start in starts if (one := kicked.with_cause_in_place(start, kicked.causes[-1], least)) is not None
+    ]
     assert found
     best = max(found, key=lambda one: float(one.log_density.sum()))
     assert best.names == ("hidden_obstacle",)
     assert not any(name.startswith("impulse") for one in best.fit.structures for name, _ in one.held)
     assert best.log_density.sum() > kicked.log_density.sum() - 15
+
+
+def test_a_disc_takes_the_place_of_kicks_beside_a_later_cause(kicked: Trial) -> None:
+    both = kicked.with_cause(start_with(LinearDrag(), {"linear_drag": 0.01}))
+    assert both is not None
+    starts = hidden_things(both.fit, [HiddenObstacle()], 0.0)
+    least = both.fit.joint.log_density - 1000.0
+    found = [one for start in starts if (one := both.with_cause_in_place(start, both.causes[0], least)) is not None]
+    assert {one.names for one in found} == {("linear_drag", "hidden_obstacle")}
+    assert all(not one.choices for one in found)
+    again = found[0].start_with(found[0].causes[-1])
+    assert again.start == {one.name: found[0].fit.value(one.name) for one in HiddenObstacle.parameters}

@@ -1,14 +1,16 @@
 """In which order the search tries causes."""
 
+from collections.abc import Sequence
 from itertools import pairwise
 from unittest.mock import Mock
 
 import numpy as np
 import pytest
 
-from tests.discovery.stand_ins import refit_with, refits_with, without_tracks
+from tests.discovery.stand_ins import refit_with, refits_with, start_with, without_tracks
 from vrdp_prob.discovery.candidates.scores import CauseScore
 from vrdp_prob.discovery.selection import comparison, courses, forward, lesser_models, refits
+from vrdp_prob.discovery.selection.beginning import Beginning
 from vrdp_prob.discovery.selection.comparison import Comparison
 from vrdp_prob.discovery.selection.courses import Courses
 from vrdp_prob.discovery.selection.extensions import Extensions
@@ -17,10 +19,14 @@ from vrdp_prob.discovery.selection.leavings import Leavings, Left
 from vrdp_prob.discovery.selection.lesser_models import LesserModels
 from vrdp_prob.discovery.selection.search import Search
 from vrdp_prob.discovery.selection.trials import Trial
+from vrdp_prob.inference import default_model
 from vrdp_prob.models.effects.bowl import Bowl
+from vrdp_prob.models.effects.effect import Effect
+from vrdp_prob.models.effects.hidden_obstacle import HiddenObstacle
 from vrdp_prob.models.effects.lens_distortion import LensDistortion
 from vrdp_prob.models.effects.linear_drag import LinearDrag
 from vrdp_prob.models.effects.surface_tilt import SurfaceTilt
+from vrdp_prob.models.effects.wall import Wall
 
 
 @pytest.fixture(autouse=True)
@@ -384,6 +390,46 @@ def test_rivals_are_those_that_came_close_on_the_model_on_which_they_were_tried(
     step = Step(plain, Left((clear,), (), np.ones(3)), (tilt, drag))
     assert Comparison(refits_with())._rivals(tilt, (better,), [_step(), step]) == ((),)
     assert asked == [[clear]]
+
+
+@pytest.mark.parametrize("wall_first", [True, False])
+@pytest.mark.parametrize("begun", [True, False], ids=["the search began with both", "found one after the other"])
+def test_what_else_a_body_may_have_met_is_a_rival_of_a_wall_beside_another_cause(
+    *, wall_first: bool, begun: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Walls and discs have no score: their fits begin where they were when they were tried."""
+    tilt, wall, disc = SurfaceTilt(), Wall(), HiddenObstacle()
+    plain, best, rival = refit_with("", 0.0), refit_with("tilt+wall", 90.0), refit_with("tilt+disc", 88.0)
+    order = (wall, tilt) if wall_first else (tilt, wall)
+    best.causes, best.names, rival.causes = order, tuple(one.name for one in order), (tilt, disc)
+    without = {wall: refit_with("tilt", 50.0), tilt: refit_with("wall", 40.0)}
+    base = plain if wall_first else without[wall]
+    tried = [refit_with("", size) for size in (80.0, 78.0)]
+    for one, cause in zip(tried, (wall, disc), strict=True):
+        one.causes = (*base.causes, cause)
+    tilted = refit_with("", 85.0)
+    tilted.causes = (tilt,)
+    met = Step(base, Left((), (), np.ones(3)), tuple(tried))
+    steps = [met, _step(tilted), _step()] if wall_first else [_step(tilted), met, _step()]
+    asked: list[tuple[Trial, Effect, Trial]] = []
+
+    def instead(
+        _self: Extensions, one: Trial, cause: Effect, lesser: Trial, starts: Sequence[CauseScore]
+    ) -> list[Trial]:
+        if starts:
+            asked.append((one, cause, lesser))
+            assert [start.effect for start in starts] == [disc]
+        return [rival] if starts else []
+
+    monkeypatch.setattr(Extensions, "instead", instead)
+    monkeypatch.setattr(Extensions, "made_of", lambda *_given: [])
+    monkeypatch.setattr(Leavings, "of", lambda _self, _trial: Left((), (), np.ones(3)))
+    beginning = Beginning(order, default_model(), {wall.name: (start_with(disc),), tilt.name: ()})
+    comparison = Comparison(refits_with(), beginning if begun else None)
+    lesser = tuple(without[one] for one in order)
+    found = comparison._rivals(best, lesser, [_step(), _step()] if begun else steps)
+    assert found[order.index(wall)] == (rival,)
+    assert asked == [(best, wall, without[wall])]
 
 
 def test_what_a_better_course_leaves_is_scored_though_the_cause_remains(monkeypatch: pytest.MonkeyPatch) -> None:

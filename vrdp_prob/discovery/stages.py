@@ -174,7 +174,7 @@ def _beginning(found: Search) -> Beginning | None:
     if not causes:
         return None
     rivals = {
-        cause.name: frozenset(one.causes[-1].name for one in others)
+        cause.name: tuple(one.start_with(one.causes[-1]) for one in others)
         for cause, others in zip(found.best.causes, found.near, strict=True)
     }
     return Beginning(causes, extended_model(found.best, found.overdispersion), rivals)

@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from vrdp_prob.discovery.candidates.scores import CauseScore
 from vrdp_prob.discovery.selection.refits import Refits
 from vrdp_prob.discovery.selection.trials import Trial, gain
 from vrdp_prob.inference.several_videos.second_look import explained, lost_videos
@@ -21,12 +22,12 @@ class Beginning:
     believed
         The model with them that believes what these videos tell.
     rivals
-        By the name of a cause: names of effects that could take its place in these videos.
+        By the name of a cause: effects that could take its place in these videos, as they were there.
     """
 
     causes: tuple[Effect, ...]
     believed: PhysicsModel
-    rivals: Mapping[str, frozenset[str]]
+    rivals: Mapping[str, tuple[CauseScore, ...]]
 
     def fitted(self, base: Trial, refits: Refits) -> Trial | None:
         """A model with the causes, fitted to all videos from the beginning; None where it brings too little.

@@ -1,9 +1,10 @@
 """The best model beside its likes: without each of its causes, and with another one in the place of each."""
 
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
 
+from vrdp_prob.discovery.candidates.scores import CauseScore
 from vrdp_prob.discovery.selection.beginning import Beginning
 from vrdp_prob.discovery.selection.forward import Step
 from vrdp_prob.discovery.selection.leavings import Left
@@ -73,44 +74,66 @@ class Comparison:
         found = []
         for cause, without in zip(best.causes, lesser, strict=True):
             step = _tried_at(cause, steps)
-            others = [one for one in step.tried if one.causes[-1].name not in best.names]
             if not step.tried:  # the search has begun with the cause
-                others = self._instead(
-                    without, self.refits.leavings.of(without), self._near(cause).difference(best.names)
-                )
+                near = [one for one in self._near(cause) if one.effect.name not in best.names]
+                others = self._instead(best, cause, without, self.refits.leavings.of(without), near)
             elif len(best.causes) > 1 or step is not steps[0]:
-                least = HOPEFUL * max(gain(one, step.base)[0] for one in step.tried)
-                close = {
-                    one.causes[-1].name
-                    for one in others
-                    if gain(one, step.base)[0] > least and not one.patches(one.causes[-1])
-                }
-                others = self._instead(without, step.left, close)
+                others = self._instead(best, cause, without, step.left, _close(step, best))
                 if len(best.causes) == 1:
                     made = {*best.names, *(one.causes[-1].name for one in others)}
                     others += [one for one in steps[0].tried if one.causes[-1].name not in made]
-            if cause is best.causes[-1] and isinstance(cause, ExternalImpulse):
+            else:
+                others = [one for one in step.tried if one.causes[-1].name not in best.names]
+            if isinstance(cause, ExternalImpulse):
                 made = {one.causes[-1].name for one in others}
-                hidden = in_processes(Trial.continued, self.refits.extensions.hidden_instead(best, without, known=made))
-                others += sorted(hidden, key=merit, reverse=True)
+                hidden = self.refits.extensions.hidden_instead(best, cause, without, known=made)
+                others += sorted(in_processes(Trial.continued, hidden), key=merit, reverse=True)
             found.append(tuple(one for one in others if not one.patches(one.causes[-1])))
         return tuple(found)
 
-    def _instead(self, without: Trial, left: Left, names: Collection[str]) -> list[Trial]:
-        """Models with one of some causes in the place of the one that a model lacks, by the scores in what is left."""
-        again = [one for one in left.scores if one.effect.name in names][:MOST_RIVALS]
-        return self.refits.extensions.made_of(without, again)
+    def _instead(
+        self, best: Trial, cause: Effect, without: Trial, left: Left, near: Sequence[CauseScore]
+    ) -> list[Trial]:
+        """Models with one of some others in the place of a cause.
 
-    def _near(self, cause: Effect) -> frozenset[str]:
-        """Names of effects that could take the place of a cause in the videos that the search begins with."""
-        return frozenset() if self.beginning is None else self.beginning.rivals.get(cause.name, frozenset())
+        They begin at their scores in what is left without it; walls and discs, which have none, where they were when
+        they were tried.
+        """
+        extensions, names = self.refits.extensions, {one.effect.name for one in near}
+        scored = [one for one in left.scores if one.effect.name in names][:MOST_RIVALS]
+        placed = [one for one in near if isinstance(one.effect, Wall | HiddenObstacle)][:MOST_RIVALS]
+        hidden = in_processes(Trial.continued, extensions.instead(best, cause, without, placed))
+        return [*extensions.made_of(without, scored), *sorted(hidden, key=merit, reverse=True)]
+
+    def _near(self, cause: Effect) -> tuple[CauseScore, ...]:
+        """Effects that could take the place of a cause in the videos that the search begins with."""
+        return () if self.beginning is None else self.beginning.rivals.get(cause.name, ())
+
+
+def _close(step: Step, best: Trial) -> list[CauseScore]:
+    """Starts with what was tried at a step and came close to the best there, but for causes of a model, best first."""
+    least = HOPEFUL * max(gain(one, step.base)[0] for one in step.tried)
+    found: dict[str, CauseScore] = {}
+    for one in sorted(step.tried, key=merit, reverse=True):
+        cause = one.causes[-1]
+        if cause.name not in best.names and gain(one, step.base)[0] > least and not one.patches(cause):
+            found.setdefault(cause.name, one.start_with(cause))
+    return list(found.values())
 
 
 def _tried_at(cause: Effect, steps: Sequence[Step]) -> Step:
-    """The step at which a cause was tried first; for a wall or a disc that kicks led to, that of these."""
-    led_to_by_kicks = isinstance(cause, Wall | HiddenObstacle)
-    for name in (cause.name, ExternalImpulse.name) if led_to_by_kicks else (cause.name,):
-        for step in steps:
-            if any(one.name == name for trial in step.tried for one in trial.beyond(step.base)):
-                return step
-    return steps[0]
+    """The step at which a cause was tried first.
+
+    A wall or a disc is tried again where kicks lead to it: then the last one, or that of the kicks.
+    """
+    if not isinstance(cause, Wall | HiddenObstacle):
+        return _first_with(cause.name, steps) or steps[0]
+    return _first_with(cause.name, steps[::-1]) or _first_with(ExternalImpulse.name, steps) or steps[0]
+
+
+def _first_with(name: str, steps: Sequence[Step]) -> Step | None:
+    """The first step at which an effect was tried; None where it never was."""
+    return next(
+        (step for step in steps if any(one.name == name for trial in step.tried for one in trial.beyond(step.base))),
+        None,
+    )

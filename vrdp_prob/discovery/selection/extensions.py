@@ -164,22 +164,38 @@ class Extensions:
         return replace(found, choices={**found.choices, effect.name: np.array(places)})
 
     def hidden_instead(
-        self, kicked: Trial, trial: Trial, p_value: float = 0.0, *, known: Collection[str] = ()
+        self, kicked: Trial, kicks: Effect, trial: Trial, p_value: float = 0.0, *, known: Collection[str] = ()
     ) -> list[Trial]:
-        """Fits with something unseen in the place of the kicks that a model ends with.
+        """Fits with something unseen in the place of the kicks of a model.
 
         Parameters
         ----------
-        kicked, trial
-            The model with kicks, and without.
+        kicked, kicks
+            The model, and its kicks.
+        trial
+            The model without them.
         p_value
             Of the kicks.
         known
             Names of causes whose fits are there already.
         """
         left = [effect for effect in self.leavings.further(kicked) if effect.name not in known]
-        starts = hidden_things(kicked.fit, left, p_value)
-        return self._all(partial(kicked.with_cause_in_place, least=trial.fit.joint.log_density), starts)
+        return self.instead(kicked, kicks, trial, hidden_things(kicked.fit, left, p_value))
+
+    def instead(self, best: Trial, cause: Effect, lesser: Trial, starts: Sequence[CauseScore]) -> list[Trial]:
+        """Fits with others in the place of a cause, from where that has brought the videos.
+
+        Parameters
+        ----------
+        best, cause
+            The model, and the cause.
+        lesser
+            The model without it.
+        starts
+            The others, with the values from which their fits begin.
+        """
+        least = lesser.fit.joint.log_density
+        return self._all(partial(best.with_cause_in_place, replaced=cause, least=least), starts)
 
     def _began_anew(self, trial: Trial, causes: Sequence[Effect], fitted: Callable[[], SharedFit]) -> Trial | None:
         """A trial with further causes by a fit from the beginning; None where videos have no world in common."""

@@ -189,20 +189,19 @@ class Trial:
         found = replace(found, fit=with_own_population(found.fit)).continued()
         return found if found.brought(base) > self.brought(base) else self
 
-    def with_cause_in_place(self, score: CauseScore, least: float) -> "Trial | None":
-        """The fit with a cause in the place of the last one, from where that has brought the videos.
+    def with_cause_in_place(self, score: CauseScore, replaced: Effect, least: float) -> "Trial | None":
+        """The fit with a cause in the place of another one, from where that has brought the videos.
 
         None where no world can begin there, or the log posterior does not come near to `least` at once.
         """
-        last = self.causes[-1]
-        left = self.fit.model.without_effect(last).with_effect(score.effect, self.fit.tracks)
-        choices = {name: one for name, one in self.choices.items() if name != last.name}
+        left = self.fit.model.without_effect(replaced).with_effect(score.effect, self.fit.tracks)
+        choices = {name: one for name, one in self.choices.items() if name != replaced.name}
         try:
             fit = with_own_population(
                 self.fit.under(
                     left,
                     start=score.start,
-                    held=self._held_without(last),
+                    held=self._held_without(replaced),
                     least=least,
                     effort=FIRST,
                     model_error=False,
@@ -210,8 +209,14 @@ class Trial:
             )
         except ImpossibleStartError:
             return None
-        causes = (*self.causes[:-1], score.effect)
-        return replace(self, causes=causes, fit=fit, choices=choices)
+        kept = (one for one in self.causes if one is not replaced)
+        return replace(self, causes=(*kept, score.effect), fit=fit, choices=choices)
+
+    def start_with(self, cause: Effect) -> CauseScore:
+        """A start of refits with one of its causes, which all videos share, as it is here."""
+        values = {one.name: self.fit.value(one.name) for one in cause.parameters}
+        start = {name: value for name, value in values.items() if value is not None}
+        return CauseScore(cause, start, (), 0.0, 0, 0.0, {})
 
     def _with_lasting(self, score: CauseScore) -> "Trial":
         """The fit with an effect that acts on all videos."""

@@ -354,8 +354,9 @@ def fit_together(
     structures = tuple(structure_of(one.likelihood.coordinates) for one in fits)
     names = None if shared is None else tuple(shared)
     climbing = CLIMBS[plan.optimiser]
-    found = _finished(joint, model, fits, structures, names, model_error=model_error, climbing=climbing)
-    return replace(found, joint=_with_modes(found.joint, fits))
+    with display.stage("Allowing for what the model leaves"):
+        found = _finished(joint, model, fits, structures, names, model_error=model_error, climbing=climbing)
+        return replace(found, joint=_with_modes(found.joint, fits))
 
 
 def _with_modes(joint: JointFit, fits: Sequence[MapFit]) -> JointFit:

@@ -14,7 +14,6 @@ import jsonschema
 import pytest
 from videos import SPEEDS, write_videos
 
-from tests.discovery.findings import named
 from vrdp_prob import InputError, cli
 from vrdp_prob.evaluation import evaluate
 from vrdp_prob.evaluation.document import table, to_document, write_evaluation
@@ -243,18 +242,3 @@ def test_bad_question_files_are_refused(
     file.write_text(json.dumps(scenes))
     with pytest.raises(InputError, match=message):
         evaluate(folder, file)
-
-
-@pytest.mark.slow
-def test_videos_are_scored_under_the_model_of_a_finding(
-    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    finding, model = named(), tmp_path / "model.toml"
-    finding.extended.write(model)
-    asked = ["--questions", str(folder / "questions.json"), "--scenes", "10:11", "--json", "--quiet"]
-    assert cli.run(["evaluate", str(folder), *asked, "--model", str(model), "--out", str(tmp_path / "scores")]) == 0
-    assert json.loads(capsys.readouterr().out)["scenes"] == 1
-    reported = ["report", str(folder), "--video", "video_00000", "--model", str(model), "--out", str(tmp_path / "one")]
-    assert cli.run([*reported, "--sampler", "laplace", "--quiet"]) == 0
-    document = json.loads((tmp_path / "one" / "report.json").read_text(encoding="utf-8"))
-    assert finding.extended.effects[-1].name in json.dumps(document["model"])

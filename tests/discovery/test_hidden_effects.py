@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tests.discovery.causes import CATALOGUE
 from tests.discovery.data_set import DataSet, Truth
 from tests.discovery.hidden import ROUGH, hide
 from tests.discovery.scales import scaled
@@ -18,6 +19,7 @@ from vrdp_prob import load_all
 from vrdp_prob.discovery.discover import discover
 from vrdp_prob.discovery.finding import Finding, Verdict
 from vrdp_prob.discovery.selection.search import gain_needed
+from vrdp_prob.inference import default_model
 from vrdp_prob.models.model_file import known_effects
 from vrdp_prob.models.physics import PhysicsModel
 
@@ -141,6 +143,26 @@ def test_a_cause_and_a_strength_that_a_seed_draws_are_found(seed: int, tmp_path:
     assert finding.verdict is Verdict.NAMED
     assert finding.causes[0].name == way
     assert finding.causes[0].gain.elpd_difference > gain_needed(len(SMOOTH))
+
+
+@pytest.mark.parametrize("seed", [2, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (1, 3, 4, 5, 6))])
+def test_any_cause_that_a_seed_draws_is_found_among_all(seed: int, tmp_path: Path) -> None:
+    """Nobody tells discovery which of the twenty it may be."""
+    generator = np.random.default_rng(seed)
+    way, effect_size = str(generator.choice(sorted(CATALOGUE))), float(generator.uniform(4.0, 8.0))
+    setting = Setting(videos=6, bodies=2)
+    _, finding = finding_of(tmp_path, [way], seed=seed, effect_size=effect_size, setting=setting)
+    assert finding.verdict is Verdict.NAMED
+    assert finding.causes[0].name == way
+    assert finding.causes[0].gain.elpd_difference > gain_needed(len(CATALOGUE))
+
+
+def test_a_cause_that_is_taken_out_of_the_catalogue_ends_as_unknown(tmp_path: Path) -> None:
+    way, given = "time_varying_friction", {effect.name for effect in default_model().effects}
+    others = [name for name in known_effects() if name != way and name not in given]
+    _, finding = finding_of(tmp_path, [way], seed=1, effect_size=6.0, setting=PAIRS, catalogue=others)
+    assert finding.verdict is Verdict.UNKNOWN
+    assert all(cause.probability < SURE / 2 for cause in finding.causes)
 
 
 def test_a_cause_needs_no_endless_gain_where_none_is_looked_for() -> None:

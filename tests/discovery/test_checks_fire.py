@@ -213,6 +213,14 @@ FIELDS: dict[str, tuple[Field, str]] = {
         lambda one: one.times[:, None, None] * speed(one) * left(one),
         "changes in the course of the video",
     ),
+    "acceleration along the velocity against the distance to other bodies": (
+        lambda one: -np.linalg.norm(towards_others(one), axis=-1)[..., None] * forward(one),
+        "Near others bodies are slowed along their velocity",
+    ),
+    "acceleration across the velocity against the distance to other bodies": (
+        lambda one: np.linalg.norm(towards_others(one), axis=-1)[..., None] * left(one),
+        "pushed to the left of their velocity",
+    ),
     "acceleration against the distance to other bodies": (towards_others, "attract each other"),
 }
 FIELDS_OF_BODIES: dict[str, tuple[Field, str]] = {

@@ -154,12 +154,14 @@ class _Searches:
         Models are nested: a search that makes a video less probable has lost its own way, and gains nothing.
         """
         search = partial(fit_alone, self.fit.fits[video].clues.tracks, seed=self.seed, plan=IN_DOUBT)
-        if video not in self._before:
-            self._before[video] = search(self.fit.model).modes[0].log_density
-        before, found = self._before[video], list[tuple[Causes, _Found]]()
+        found: list[tuple[Causes, _Found]] = []
         for first in range(0, len(candidates), AT_ONCE):
             some = candidates[first : first + AT_ONCE]
-            fits = in_processes(search, [self.fit.extended(*causes) for causes in some])
+            plain = [] if video in self._before else [self.fit.model]
+            fits = in_processes(search, [*plain, *(self.fit.extended(*causes) for causes in some)])
+            if plain:
+                self._before[video] = fits.pop(0).modes[0].log_density
+            before = self._before[video]
             told = [_Found(max(one.modes[0].log_density - before, 0.0), one.misfit.ratio < EXPLAINED) for one in fits]
             found += zip(some, told, strict=True)
             if any(one.explains for one in told):

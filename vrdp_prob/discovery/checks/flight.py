@@ -42,6 +42,7 @@ class Question:
 
 PUSH = ("push x", "push y")
 SHAKING = "push against time"
+DISTANCE = "the distance to other bodies"
 
 QUESTIONS = (
     Question(
@@ -138,6 +139,14 @@ QUESTIONS = (
         ),
     ),
     Question(
+        f"acceleration along the velocity against {DISTANCE}",
+        ("along others",),
+        lambda part: (
+            f"near others bodies are {opposite(part.estimate('along others'), 'slowed', 'sped up')} along their "
+            f"velocity, by {number(part.size)} m/s^2 (root mean square)"
+        ),
+    ),
+    Question(
         "acceleration across the velocity against speed",
         ("across", "across speed"),
         lambda part: (
@@ -194,7 +203,16 @@ QUESTIONS = (
         ("across", "across speed"),
     ),
     Question(
-        "acceleration against the distance to other bodies",
+        f"acceleration across the velocity against {DISTANCE}",
+        ("across others",),
+        lambda part: (
+            f"near others bodies are pushed to the {opposite(part.estimate('across others'), 'right', 'left')} of "
+            f"their velocity, {_sideways(part)}"
+        ),
+        ("across", "across speed"),
+    ),
+    Question(
+        f"acceleration against {DISTANCE}",
         ("others", "others square"),
         lambda part: f"bodies {_pull(part)} each other: {number(part.size)} m/s^2 (root mean square)",
     ),

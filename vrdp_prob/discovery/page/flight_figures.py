@@ -120,9 +120,16 @@ ASPECTS: Mapping[str, tuple[Aspect, ...]] = {
     "acceleration across the velocity against spin": (Aspect(ACROSS, "spin (rad/s)", lambda motion: motion.spin),),
     **{f"acceleration along the velocity against {name}": aspects for name, aspects in _kinds(ALONG).items()},
     **{f"acceleration across the velocity against {name}": aspects for name, aspects in _kinds(ACROSS).items()},
-    "acceleration against the distance to other bodies": (
-        Aspect(TOWARDS_OTHERS, "distance to the nearest body (m)", _distance),
-    ),
+    **{
+        f"{check} against the distance to other bodies": (
+            Aspect(component, "distance to the nearest body (m)", _distance),
+        )
+        for check, component in (
+            ("acceleration along the velocity", ALONG),
+            ("acceleration across the velocity", ACROSS),
+            ("acceleration", TOWARDS_OTHERS),
+        )
+    },
 }
 """What is drawn for a failing check of free flight, by its name."""
 GIVEN = {question.name: question.given for question in QUESTIONS}

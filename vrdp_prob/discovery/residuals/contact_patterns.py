@@ -88,7 +88,7 @@ class ContactScore:
             name: [video.rows(one) for video, one in zip(model.videos, parts, strict=True)]
             for name, parts in changes.items()
         }
-        score, places = joined(model.sharing(flight.rows), rows)
+        score, places = joined(model.sharing(flight.rows_beside_contacts), rows)
         return cls(clear, vague, all(motion.tracks.turning_told for motion in motions), score, places)
 
     @property

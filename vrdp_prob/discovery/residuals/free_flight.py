@@ -67,8 +67,14 @@ class FreeFlight:
 
     @cached_property
     def beside(self) -> ResidualModel:
-        """The residuals where every contact may leave any velocity and all patterns may show."""
-        return self.model.sharing(self.rows)
+        """The residuals where every contact may leave any velocity, and patterns may show."""
+        return self.model.sharing(self.rows_beside_contacts)
+
+    @property
+    def rows_beside_contacts(self) -> list[Float[np.ndarray, "_ pattern"]]:
+        """What the patterns do that may show where something else is asked."""
+        kept = [k for k, one in enumerate(self.patterns) if one.beside_contacts]
+        return [rows[:, kept] for rows in self.rows]
 
     def numbers(self, names: Sequence[str]) -> list[int]:
         """Places of patterns whose names begin with one of some names and are no longer words."""

@@ -20,6 +20,9 @@ FLAT = 0.01
 DECAY = 0.4
 """Share of the typical speed over which what acts on slow bodies alone fades."""
 
+CLOSENESS = f"sum {SOFTENING**2:.2g}/(r^2 + {SOFTENING:g}^2)"
+"""How near others are, as part of a formula: 1 for each that were at the very place of a body."""
+
 SYMBOLS = (
     "SI units; v velocity, u = v/|v|, n is u turned to the left, phi the direction of v, ex and ey along the axes, t "
     "time since the first frame, s way travelled, omega spin, r to each other body, m mass"
@@ -41,11 +44,15 @@ class Pattern:
         Accelerations for amplitude 1, of all bodies at all frames.
     formula
         The field as part of a formula in SI units (see `SYMBOLS`).
+    beside_contacts
+        Whether it may show where something else is asked; not where it is strongest as bodies meet, and would be taken
+        for what happens at contacts.
     """
 
     name: str
     field: Field
     formula: str
+    beside_contacts: bool = True
 
 
 @dataclass(frozen=True)
@@ -147,6 +154,7 @@ def patterns(scales: Scales) -> Iterator[Pattern]:
             )
     for name, factor, words in _factors(scales):
         yield Pattern(f"along {name}", _along(factor), f"{words} u")
+    yield Pattern("along others", _along(_closeness), f"{CLOSENESS} u", beside_contacts=False)
     yield Pattern("across", _across(lambda m: np.ones_like(m.speed)), "n")
     yield Pattern("across speed", _across(lambda m: m.speed), "|v| n")
     for axis in scales.axes:
@@ -158,6 +166,7 @@ def patterns(scales: Scales) -> Iterator[Pattern]:
         yield Pattern("across speed spin", _across(_turning(lambda m: m.spin)), "omega |v| n")
     for name, factor, words in _of_bodies(scales, scales.shapes):
         yield Pattern(f"across speed {name}", _across(_turning(factor)), f"{words} |v| n")
+    yield Pattern("across others", _across(_closeness), f"{CLOSENESS} n", beside_contacts=False)
     mass = "/m" if scales.weighed else ""
     softened = f"(r^2 + {SOFTENING:g}^2)"
     yield Pattern("others square", _towards_others(2, weighed=scales.weighed), f"sum r/{softened}^1.5{mass}")
@@ -277,13 +286,26 @@ def _towards_others(power: int, *, weighed: bool) -> Field:
     """Towards all other bodies that are there, falling with a power of their distance."""
 
     def field(motion: FittedMotion) -> Float[np.ndarray, "time body 2"]:
-        apart = motion.position[:, None] - motion.position[:, :, None]
-        squares = (apart**2).sum(axis=-1) + SOFTENING**2
+        apart, squares = _apart(motion)
         here = there(motion.tracks)[:, None, :, None]
         pull = (here * apart / squares[..., None] ** ((power + 1) / 2)).sum(axis=2)
         return pull / motion.mass[:, None] if weighed and power > 1 else pull
 
     return field
+
+
+def _apart(motion: FittedMotion) -> tuple[Float[np.ndarray, "time body other 2"], Float[np.ndarray, "time body other"]]:
+    """The way from each body to each one, and the softened squares of their distances."""
+    apart = motion.position[:, None] - motion.position[:, :, None]
+    return apart, (apart**2).sum(axis=-1) + SOFTENING**2
+
+
+def _closeness(motion: FittedMotion) -> Float[np.ndarray, "time body"]:
+    """How near others are that are there, see `CLOSENESS`."""
+    _, squares = _apart(motion)
+    others = there(motion.tracks)[:, None] & ~np.eye(squares.shape[1], dtype=bool)
+    found: np.ndarray = (others * SOFTENING**2 / squares).sum(axis=2)
+    return found
 
 
 def there(tracks: Tracks) -> Bool[np.ndarray, "time body"]:

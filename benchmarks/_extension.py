@@ -87,6 +87,12 @@ def _kept(path: Path, found: Callable[[], SharedFit]) -> SharedFit:
     return fit
 
 
+def first_part(tracks: Tracks, share: float) -> tuple[Tracks, Tracks]:
+    """A share of the frames of a video, and all of them, of the bodies that were seen by then."""
+    seen = tracks.until(tracks.times[int(share * len(tracks.times)) - 1])
+    return seen, replace(seen, data=tracks.data.sel(body=[body.id for body in seen.bodies]))
+
+
 def forecast(seen: Tracks, longer: Tracks, model: PhysicsModel) -> Float[np.ndarray, "time body 2"]:
     """Positions in m by the best fit to the first frames of a video, at the times of longer tracks of it."""
     fit = fit_map(seen, model, np.random.default_rng(0), model_error=False)

@@ -15,7 +15,7 @@ import argparse
 import os
 import sys
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")
@@ -23,7 +23,7 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 import numpy as np
 import torch
 from _answer_goals import GOALS, title
-from _extension import base_model, extended_model, forecast
+from _extension import base_model, extended_model, first_part, forecast
 from _finding_figures import copy_figures
 from _page import page_parser, publish, table_row
 from _resumable import Result, measured
@@ -121,11 +121,8 @@ def scored(task: Task) -> Result:
 
 def _forecast_errors(task: Task) -> dict[str, float]:
     """Mean squared error per axis in m^2: of the frames that are fitted, of the second after them, and of all later."""
-    times = task.tracks.times
-    last = times[int(SEEN_SHARE * len(times)) - 1]
-    seen = task.tracks.until(last)
-    known = [body.id for body in seen.bodies]
-    longer = replace(seen, data=task.tracks.data.sel(body=known))
+    seen, longer = first_part(task.tracks, SEEN_SHARE)
+    times, last = longer.times, seen.times[-1]
     squares = ((forecast(seen, longer, task.model) - longer.positions) ** 2).mean(axis=-1)
     parts = {"fitted": times <= last, "next": (times > last) & (times <= last + AHEAD), "later": times > last}
     return {name: float(np.nanmean(squares[part])) for name, part in parts.items()}

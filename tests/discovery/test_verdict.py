@@ -14,6 +14,7 @@ from vrdp_prob.discovery.selection import tried
 from vrdp_prob.discovery.selection.search import Search
 from vrdp_prob.discovery.selection.trials import Trial
 from vrdp_prob.inference import default_model
+from vrdp_prob.inference.map_fit import MapFit
 from vrdp_prob.inference.several_videos.fitting import SharedFit
 from vrdp_prob.models.effects.effect import Effect
 from vrdp_prob.models.effects.surface_tilt import SurfaceTilt
@@ -89,7 +90,6 @@ def test_a_model_that_does_not_explain_a_video_is_not_said_to_lack_nothing(*, la
         (Verdict.UNKNOWN, (), True, "spins", "anew"),
         (Verdict.UNKNOWN, (), True, "nothing", "before"),
         (Verdict.UNKNOWN, (), False, "courses", "before"),
-        (Verdict.UNKNOWN, ("tilt",), True, "courses", "before"),
         (Verdict.NONE, (), True, "courses", "before"),
     ],
     ids=[
@@ -97,7 +97,6 @@ def test_a_model_that_does_not_explain_a_video_is_not_said_to_lack_nothing(*, la
         "better spins",
         "nothing better",
         "most videos are lost",
-        "a cause beside it",
         "nothing is left",
     ],
 )
@@ -119,6 +118,24 @@ def test_all_videos_are_searched_anew_where_no_cause_explains_what_is_left(
     monkeypatch.setattr(stages, "with_other_spins", lambda _given, *, seed: better if better_by == "spins" else fit)
     found = stages.Stages(default_model(), (), 0, None)._with_better_courses(fit, before)
     assert found is {"anew": better, "before": fit}[taken]
+
+
+@pytest.mark.parametrize(
+    ("straying", "taken"), [([2], "anew"), ([], "before"), ([0, 1, 2], "before")], ids=["one", "none", "most"]
+)
+def test_beside_causes_the_few_videos_that_stray_are_searched_anew(
+    straying: list[int], taken: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    fit, better = create_autospec(SharedFit, instance=True), create_autospec(SharedFit, instance=True)
+    fit.fits, fit.with_other_courses.return_value = tuple(Mock(spec=MapFit) for _ in range(4)), better
+    before = create_autospec(outcome.Outcome, instance=True)
+    before.verdict, before.found = Verdict.UNKNOWN, _search(("tilt",))
+    before.found.best.unexplained.videos = straying
+    monkeypatch.setattr(stages, "explained", lambda _fits: True)
+    found = stages.Stages(default_model(), (), 0, None)._with_better_courses(fit, before)
+    assert found is {"anew": better, "before": fit}[taken]
+    if taken == "anew":
+        fit.with_other_courses.assert_called_once_with(seed=0, among=straying)
 
 
 @pytest.mark.parametrize("finds_better", [True, False])

@@ -19,7 +19,7 @@ from vrdp_prob.discovery.selection.trials import Trial
 from vrdp_prob.discovery.selection.tried import tried_causes
 from vrdp_prob.discovery.words import title
 from vrdp_prob.inference.several_videos.fitting import SharedFit, fit_together
-from vrdp_prob.inference.several_videos.second_look import explained, loses_single_videos
+from vrdp_prob.inference.several_videos.second_look import SHARE_ASTRAY, explained, loses_single_videos
 from vrdp_prob.inference.several_videos.spin_islands import with_other_spins
 from vrdp_prob.models.effects.effect import Effect
 from vrdp_prob.models.physics import PhysicsModel
@@ -136,14 +136,23 @@ class Stages:
         return fit
 
     def _with_better_courses(self, fit: SharedFit, outcome: Outcome) -> SharedFit:
-        """The fit with all videos searched anew, if it leaves something that no cause explains.
+        """The fit with videos searched anew, if something is left that no cause explains.
 
-        It is the same fit where the model does not explain most videos, or where the searches find nothing better.
+        Beside causes these are the few that stray under the best model, as on a wrong course of events or island of
+        yaw; where none was found, all. It is the same fit where the model does not explain most videos, or where the
+        searches find nothing better.
         """
-        if outcome.verdict is not Verdict.UNKNOWN or outcome.found.best.causes or not explained(fit.fits):
+        if outcome.verdict is not Verdict.UNKNOWN or not explained(fit.fits):
             return fit
-        with self._stage("Searching all videos anew"):
-            return with_other_spins(fit, seed=self.seed).with_other_courses(seed=self.seed)
+        best = outcome.found.best
+        if not best.causes:
+            with self._stage("Searching all videos anew"):
+                return with_other_spins(fit, seed=self.seed).with_other_courses(seed=self.seed)
+        straying = best.unexplained.videos
+        if not 0 < len(straying) <= SHARE_ASTRAY * len(fit.fits):
+            return fit
+        with self._stage("Searching videos that stray anew"):
+            return fit.with_other_courses(seed=self.seed, among=straying)
 
     def _lacks_something(self, fit: SharedFit, causes: Sequence[Effect]) -> bool:
         """Whether tracks show what videos are lost for, or most videos call for a law: no course is to blame then."""

@@ -93,6 +93,11 @@ class Unexplained:
         largest = (max(video, key=lambda one: one.size) for video in self.straying)
         return tuple(one for one in largest if one.size)
 
+    @property
+    def videos(self) -> list[int]:
+        """Numbers of the videos that stray."""
+        return [index for index, axes in enumerate(self.straying) if any(one.size for one in axes)]
+
     def independent(self) -> ResidualModel:
         """Residuals of the fit with them made independent.
 

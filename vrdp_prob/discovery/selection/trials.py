@@ -286,8 +286,8 @@ class Trial:
         at_contacts = sum(self._comes_with_contact(cause, video) for video in acting)
         if acting and at_contacts >= PATCHED * len(acting):
             return True
-        stray = [any(one.size for one in self.unexplained.straying[video]) for video in acting]
-        return len(acting) > 1 and sum(stray) > PATCHED * len(stray)
+        stray = set(self.unexplained.videos) & set(acting)
+        return len(acting) > 1 and len(stray) > PATCHED * len(acting)
 
     def _comes_with_contact(self, cause: Effect, video: int) -> bool:
         """Whether a body meets something when a cause kicks it."""

@@ -129,7 +129,8 @@ class _Searched:
 
 def _summary(finding: Finding) -> Result:
     document = to_document(finding)
-    return {key: document[key] for key in ("verdict", "sentence", "causes", "evidence", "evidence_after", "notes")}
+    kept = ("verdict", "sentence", "causes", "predicted", "evidence", "evidence_after", "notes")
+    return {key: document[key] for key in kept}
 
 
 def _findings(results: Sequence[Result], tasks: Mapping[str, Task]) -> list[str]:
@@ -146,10 +147,15 @@ def _row(result: Result) -> list[str]:
     cells.append(", ".join(f"`{one['name']}` {one['probability']:.2f}" for one in named) or "-")
     gains = [one["held_out_gain"] for one in named]
     cells.append(", ".join(map(_nats, gains)) or "-")
-    cells += [", ".join(_errors(one)[k] for one in gains) or "-" for k in range(len(ERRORS))]
-    cells.append(", ".join(_covered(one) for one in gains) or "-")
-    noise = _mm(gains[0]["noise_sd"]) if gains else "-"
-    return [*cells, noise, _failing(result), f"{result['seconds'] / 60:.0f}", f"`{result['version']}`"]
+    if gains:
+        cells += [", ".join(_errors(one)[k] for one in gains) for k in range(len(ERRORS))]
+        cells += [", ".join(_covered(one) for one in gains), _mm(gains[0]["noise_sd"])]
+    elif given := result.get("predicted"):
+        cells += [_mm(given[key]) for key in ERRORS]
+        cells += [f"{100 * given['coverage_90']:.0f} %", _mm(given["noise_sd"])]
+    else:
+        cells += ["-"] * (len(ERRORS) + 2)
+    return [*cells, _failing(result), f"{result['seconds'] / 60:.0f}", f"`{result['version']}`"]
 
 
 def _nats(gain: Result) -> str:

@@ -56,6 +56,14 @@ def test_the_gain_of_the_whole_model():
     assert to_document(nothing())["gain"] is None
 
 
+def test_how_well_the_model_given_predicts_is_told_where_nothing_is_named() -> None:
+    told = to_document(unknown())["predicted"]
+    assert told["noise_sd"] == 0.003
+    assert told["rmse"] == pytest.approx(0.0123)
+    assert len(told["pit"]) == 10
+    assert to_document(nothing())["predicted"] is None
+
+
 def test_evidence_bounds_and_notes():
     found = to_document(named())
     assert [entry["significant"] for entry in found["evidence"]] == [False, True, True, False, False, False]

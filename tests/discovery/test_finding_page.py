@@ -312,3 +312,13 @@ def test_a_description_without_accelerations_tells_of_none():
     without = replace(finding, description=replace(finding.description, size=None))
     assert "The missing acceleration is" in text_of(render(finding))
     assert "The missing acceleration is" not in text_of(render(without))
+
+
+def test_where_nothing_is_named_the_page_says_how_well_the_model_predicts() -> None:
+    held = unknown().predicted
+    assert held is not None
+    page = text_of(render(unknown()))
+    for words in ("How well left-out videos are predicted", "Error of predicted positions, mm", "measurement noise"):
+        assert words in page
+    assert f"{100 * held.coverage_90:.0f} %" in page
+    assert "How well left-out videos are predicted" not in text_of(render(named()))

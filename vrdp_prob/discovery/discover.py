@@ -10,6 +10,7 @@ from vrdp_prob.datasets.folder import some
 from vrdp_prob.discovery.checking import FEWEST_VIDEOS, check_searched, check_video_count
 from vrdp_prob.discovery.describe import describe
 from vrdp_prob.discovery.finding import Finding, FoundCause, UpperBound, Verdict
+from vrdp_prob.discovery.outcome import noise_of
 from vrdp_prob.discovery.page.figures import residual_figures
 from vrdp_prob.discovery.residuals.free_flight import NORMAL_95
 from vrdp_prob.discovery.selection.believed import extended_model, models_of_the_others
@@ -150,6 +151,8 @@ def discover(
         left_out=models_of_the_others(found.base, found.best, found.overdispersion),
         tried=tuple(tried),
         gain=outcome.gain,
+        predicted=found.base.held_out,
+        noise=noise_of(found.base),
     )
 
 

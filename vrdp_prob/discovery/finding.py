@@ -389,6 +389,9 @@ class Finding:
     gain
         What all named causes together add to the prediction of held-out videos, over the model that was given; None
         where nothing is named.
+    predicted, noise
+        How well the model that was given predicts held-out videos, and the noise (m) that is part of its errors; None
+        for a finding that was put together by hand.
     answers
         Answers to questions about the videos under both models; None where nothing was asked or nothing is named.
     fit
@@ -414,6 +417,8 @@ class Finding:
     left_out: Mapping[str, tuple[PhysicsModel, PhysicsModel]] = field(default_factory=dict)
     tried: tuple[TriedCause, ...] = ()
     gain: Gain | None = None
+    predicted: HeldOut | None = None
+    noise: float | None = None
 
     @property
     def named(self) -> tuple[FoundCause, ...]:

@@ -221,13 +221,18 @@ def _cause(
     )
 
 
+def noise_of(trial: Trial) -> float:
+    """Noise (m) of the video in the middle."""
+    return float(np.median([part.clues.noise for part in trial.fit.fits]))
+
+
 def _gain(before: Trial, after: Trial, overdispersion: Float[np.ndarray, "video"]) -> Gain:
     difference, error = gain(after, before, overdispersion)
     videos = after.fit.videos
     return Gain(
         before=before.held_out,
         after=after.held_out,
-        noise=float(np.median([part.clues.noise for part in after.fit.fits])),
+        noise=noise_of(after),
         elpd_difference=difference,
         elpd_se=error,
         by_video=dict(zip(videos, gains(after, before, overdispersion).tolist(), strict=True)),

@@ -44,6 +44,7 @@ def to_document(finding: Finding, *, model: Path | None = None) -> dict[str, Any
         "sentence": verdict_sentence(finding),
         "causes": [_cause(cause) for cause in finding.causes],
         "gain": None if finding.gain is None else _gain(finding.gain),
+        "predicted": None if finding.predicted is None else {**asdict(finding.predicted), "noise_sd": finding.noise},
         "tried": [_of_effect(one) for one in finding.tried],
         "evidence": _evidence(finding.checks),
         "evidence_after": _evidence(finding.checks_after),

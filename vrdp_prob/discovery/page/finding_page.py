@@ -10,7 +10,17 @@ from typing import Any
 from markupsafe import Markup
 
 from vrdp_prob.datasets.folder import some
-from vrdp_prob.discovery.finding import Check, Description, Estimate, Finding, FoundCause, Gain, UpperBound, Verdict
+from vrdp_prob.discovery.finding import (
+    Check,
+    Description,
+    Estimate,
+    Finding,
+    FoundCause,
+    Gain,
+    HeldOut,
+    UpperBound,
+    Verdict,
+)
 from vrdp_prob.discovery.page.changed_answers import rows
 from vrdp_prob.discovery.page.gain_figure import STRETCHES, error_figure, video_figure
 from vrdp_prob.discovery.page.summary import POSSIBLE, possible, summary, verdict_sentence
@@ -23,6 +33,7 @@ from vrdp_prob.discovery.page.wording import (
     effect_of,
     estimate_words,
     leading_and_own,
+    length_unit,
     number,
     own_words,
     p_words,
@@ -67,6 +78,7 @@ def render(finding: Finding) -> str:
         **_others(finding),
         "tried": _tried(finding),
         "coverage": _coverage(gains),
+        "predicted": None if named or finding.predicted is None else _predicted(finding.predicted, finding.noise),
         "ratios": _ratios(gains),
         "stretches": list(STRETCHES.values()),
         "even": EVEN_BAR,
@@ -162,16 +174,33 @@ def _ratios(gains: Sequence[tuple[str, Gain]]) -> list[dict[str, Any]]:
 def _coverage(gains: Sequence[tuple[str, Gain]]) -> list[dict[str, Any]]:
     """Calibration of the predictions, without and with each cause."""
     return [
-        {
-            "words": f"{word} {words}",
-            "half": _percent(held.coverage_50),
-            "most": _percent(held.coverage_90),
-            "tenths": _bars(held.pit),
-            "tenths_words": ", ".join(_percent(share) for share in held.pit),
-        }
+        _calibration(f"{word} {words}", held)
         for words, gain in gains
         for word, held in (("without", gain.before), ("with", gain.after))
     ]
+
+
+def _calibration(words: str, held: HeldOut) -> dict[str, Any]:
+    return {
+        "words": words,
+        "half": _percent(held.coverage_50),
+        "most": _percent(held.coverage_90),
+        "tenths": _bars(held.pit),
+        "tenths_words": ", ".join(_percent(share) for share in held.pit),
+    }
+
+
+def _predicted(held: HeldOut, noise: float | None) -> dict[str, Any]:
+    """How well the model that was given predicts left-out videos, where no cause makes it better."""
+    errors = {label: getattr(held, name) for name, label in STRETCHES.items()}
+    known = [one for one in (*errors.values(), noise) if one is not None and math.isfinite(one)]
+    factor, unit = length_unit(known)
+    return {
+        "unit": unit,
+        "errors": [UNDEFINED if one is None else number(factor * one) for one in errors.values()],
+        "noise": UNDEFINED if noise is None else number(factor * noise),
+        "coverage": [_calibration("the model that was given", held)],
+    }
 
 
 def _bars(shares: Sequence[float]) -> list[float]:

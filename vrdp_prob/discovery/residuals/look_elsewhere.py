@@ -11,8 +11,9 @@ TAIL = 0.05
 def independent_places(largest: Float[np.ndarray, "replica"], degrees: int, places: int) -> float:
     """Number of independent places that makes the largest chi-square of a scan as large as it is by chance.
 
-    Source: E. Gross and O. Vitells, Trial factors for the look elsewhere effect in high energy physics, Eur. Phys. J. C
-    70 (2010): the factor is read off where replications reach, the tail beyond is that of the single statistic.
+    What replications tell of low levels is carried to those beyond their reach, where the tail is that of the single
+    statistic, as in E. Gross and O. Vitells, Trial factors for the look elsewhere effect in high energy physics, Eur.
+    Phys. J. C 70 (2010); they count upcrossings.
 
     Parameters
     ----------

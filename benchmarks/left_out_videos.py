@@ -33,7 +33,7 @@ from vrdp_prob.models.simulator.rollout import compile_model
 from vrdp_prob.scene import Tracks
 
 RESULTS = Path("out/left_out_videos")
-CAUSES = ("surface_tilt", "linear_drag", "magnus_curl", "contact_friction", "rotating_table")
+CAUSES = ("surface_tilt", "linear_drag", "contact_friction")
 EFFECT_SIZE = 3.0
 
 

@@ -331,12 +331,17 @@ def test_a_search_ends_though_each_round_finds_a_better_course(monkeypatch: pyte
     assert limit == forward.COURSES_LEFT
 
 
-def test_a_search_ends_at_five_causes_and_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
-    models = [refit_with("+".join("abcde"[:count]), 10.0 * count) for count in range(forward.MOST_CAUSES + 1)]
+def _asked_of_each(models: Sequence[Mock], monkeypatch: pytest.MonkeyPatch) -> list[Trial]:
+    """The models on which causes are tried, as they come, each of which leads to the next one."""
     following = dict(pairwise(models))
-    asked = _asked(monkeypatch)
     monkeypatch.setattr(ForwardSelection, "chosen", lambda _self, trial, _step: (trial, following[trial]))
     monkeypatch.setattr(Leavings, "of", lambda _self, _trial: Left((), (), np.ones(3)))
+    return _asked(monkeypatch)
+
+
+def test_a_search_ends_at_five_causes_and_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
+    models = [refit_with("+".join("abcde"[:count]), 10.0 * count) for count in range(forward.MOST_CAUSES + 1)]
+    asked = _asked_of_each(models, monkeypatch)
     chain, steps, limit = _selection(needed=6.0).models(models[0])
     assert chain == models
     assert asked == models[:-1]
@@ -350,10 +355,7 @@ def test_causes_that_come_in_one_step_count_each_and_things_of_one_cause_once(mo
     models = [refit_with(name, 10.0 * count) for count, name in enumerate(names)]
     for one in models:
         one.cause_names = one.cause_names - {"second_wall"}
-    following = dict(pairwise(models))
-    asked = _asked(monkeypatch)
-    monkeypatch.setattr(ForwardSelection, "chosen", lambda _self, trial, _step: (trial, following[trial]))
-    monkeypatch.setattr(Leavings, "of", lambda _self, _trial: Left((), (), np.ones(3)))
+    asked = _asked_of_each(models, monkeypatch)
     chain, _, limit = _selection(needed=6.0).models(models[0])
     assert chain == models
     assert asked == models[:-1]

@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 from scipy.stats import chi2
 
-from vrdp_prob.discovery.checks.flight import PUSH, QUESTIONS, SHAKING, phases
+from vrdp_prob.discovery.checks.flight import DISTANCE, PUSH, QUESTIONS, SHAKING, phases
 from vrdp_prob.discovery.page.scatter import Banded, Points, with_bands, with_bars
 from vrdp_prob.discovery.page.seen import Figure, Seen
 from vrdp_prob.discovery.residuals.fitted_motion import FittedMotion
@@ -98,8 +98,9 @@ def _places(component: str) -> tuple[Aspect, ...]:
 
 
 def _kinds(component: str) -> dict[str, tuple[Aspect, ...]]:
-    """What bodies are."""
+    """What bodies are, and how near others are."""
     return {
+        DISTANCE: (Aspect(component, "distance to the nearest body (m)", _distance),),
         "shape": (Aspect(component, "shape", kind=lambda body: str(body.shape)),),
         "material": (Aspect(component, "material", kind=lambda body: body.material),),
         "mass": (Aspect(component, "mass (kg)", _mass),),
@@ -120,16 +121,7 @@ ASPECTS: Mapping[str, tuple[Aspect, ...]] = {
     "acceleration across the velocity against spin": (Aspect(ACROSS, "spin (rad/s)", lambda motion: motion.spin),),
     **{f"acceleration along the velocity against {name}": aspects for name, aspects in _kinds(ALONG).items()},
     **{f"acceleration across the velocity against {name}": aspects for name, aspects in _kinds(ACROSS).items()},
-    **{
-        f"{check} against the distance to other bodies": (
-            Aspect(component, "distance to the nearest body (m)", _distance),
-        )
-        for check, component in (
-            ("acceleration along the velocity", ALONG),
-            ("acceleration across the velocity", ACROSS),
-            ("acceleration", TOWARDS_OTHERS),
-        )
-    },
+    f"acceleration against {DISTANCE}": _kinds(TOWARDS_OTHERS)[DISTANCE],
 }
 """What is drawn for a failing check of free flight, by its name."""
 GIVEN = {question.name: question.given for question in QUESTIONS}

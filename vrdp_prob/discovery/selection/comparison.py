@@ -86,8 +86,7 @@ class Comparison:
                 others = [one for one in step.tried if one.causes[-1].name not in best.names]
             if isinstance(cause, ExternalImpulse):
                 made = {one.causes[-1].name for one in others}
-                hidden = self.refits.extensions.hidden_instead(best, cause, without, known=made)
-                others += sorted(in_processes(Trial.continued, hidden), key=merit, reverse=True)
+                others += _continued(self.refits.extensions.hidden_instead(best, cause, without, known=made))
             found.append(tuple(one for one in others if not one.patches(one.causes[-1])))
         return tuple(found)
 
@@ -102,12 +101,16 @@ class Comparison:
         extensions, names = self.refits.extensions, {one.effect.name for one in near}
         scored = [one for one in left.scores if one.effect.name in names][:MOST_RIVALS]
         placed = [one for one in near if isinstance(one.effect, Wall | HiddenObstacle)][:MOST_RIVALS]
-        hidden = in_processes(Trial.continued, extensions.instead(best, cause, without, placed))
-        return [*extensions.made_of(without, scored), *sorted(hidden, key=merit, reverse=True)]
+        return [*extensions.made_of(without, scored), *_continued(extensions.instead(best, cause, without, placed))]
 
     def _near(self, cause: Effect) -> tuple[CauseScore, ...]:
         """Effects that could take the place of a cause in the videos that the search begins with."""
         return () if self.beginning is None else self.beginning.rivals.get(cause.name, ())
+
+
+def _continued(trials: Sequence[Trial]) -> list[Trial]:
+    """Models after as many steps as their fits need, the best first."""
+    return sorted(in_processes(Trial.continued, trials), key=merit, reverse=True)
 
 
 def _close(step: Step, best: Trial) -> list[CauseScore]:

@@ -13,8 +13,9 @@ from vrdp_prob.discovery.candidates.dropped_frames import Dropped, dropped_frame
 from vrdp_prob.discovery.checks.battery import run_checks
 from vrdp_prob.discovery.selection.estimates import estimates, upper_bounds
 from vrdp_prob.discovery.selection.extensions import Extensions
+from vrdp_prob.discovery.selection.gains import gain
 from vrdp_prob.discovery.selection.leavings import Leavings
-from vrdp_prob.discovery.selection.trials import Trial, gain
+from vrdp_prob.discovery.selection.trials import Trial
 from vrdp_prob.inference import default_model, infer
 from vrdp_prob.inference.several_videos.fitting import fit_together
 from vrdp_prob.models.effects.dropped_frames import FRAME_TIME, MOST_DROPPED, DroppedFrames

@@ -14,7 +14,8 @@ from vrdp_prob.discovery.checks.battery import run_checks
 from vrdp_prob.discovery.residuals.jitter import alike_in_neighbours, jitter
 from vrdp_prob.discovery.residuals.residual_model import ResidualModel
 from vrdp_prob.discovery.selection.estimates import estimates
-from vrdp_prob.discovery.selection.trials import Trial, gain
+from vrdp_prob.discovery.selection.gains import gain
+from vrdp_prob.discovery.selection.trials import Trial
 from vrdp_prob.models.effects.clock_error import ClockError
 from vrdp_prob.models.effects.irregular_frames import IrregularFrames
 

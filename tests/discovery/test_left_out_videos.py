@@ -16,7 +16,8 @@ from vrdp_prob.discovery.residuals.residual_model import ResidualModel
 from vrdp_prob.discovery.selection import estimates, trials
 from vrdp_prob.discovery.selection.estimates import may_vanish
 from vrdp_prob.discovery.selection.forecast import SEEN_SHARE, _forecast, error_ratios, held_out
-from vrdp_prob.discovery.selection.trials import Trial, gain, gains, weights
+from vrdp_prob.discovery.selection.gains import gain, gains, weights
+from vrdp_prob.discovery.selection.trials import Trial
 from vrdp_prob.inference.map_fit import MapFit
 from vrdp_prob.inference.several_videos import fitting
 from vrdp_prob.inference.several_videos.agreement import following_ones

@@ -5,7 +5,8 @@ import pytest
 
 from tests.discovery.fitted import fitted, with_cause
 from vrdp_prob.discovery.selection.estimates import estimates
-from vrdp_prob.discovery.selection.trials import Trial, gain
+from vrdp_prob.discovery.selection.gains import gain
+from vrdp_prob.discovery.selection.trials import Trial
 from vrdp_prob.models.effects.clock_error import ClockError
 
 SIZE, SEED = 6.0, 1

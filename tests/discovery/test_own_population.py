@@ -9,7 +9,8 @@ from tests.discovery.fitted import fitted
 from tests.discovery.hidden import hide
 from tests.discovery.scenes import Setting
 from vrdp_prob.discovery.candidates.scores import score_causes
-from vrdp_prob.discovery.selection.trials import Trial, gain, gains, with_own_population
+from vrdp_prob.discovery.selection.gains import gain, gains
+from vrdp_prob.discovery.selection.trials import Trial, with_own_population
 from vrdp_prob.inference import default_model
 from vrdp_prob.inference.several_videos.fitting import SharedFit, fit_together
 from vrdp_prob.models.effects.body_friction import FRICTION_RATIO

@@ -10,7 +10,8 @@ from vrdp_prob.discovery.candidates.scores import score_causes
 from vrdp_prob.discovery.residuals import unexplained as module
 from vrdp_prob.discovery.residuals.residual_model import ResidualModel
 from vrdp_prob.discovery.residuals.unexplained import unexplained
-from vrdp_prob.discovery.selection.trials import Trial, gain
+from vrdp_prob.discovery.selection.gains import gain
+from vrdp_prob.discovery.selection.trials import Trial
 from vrdp_prob.inference.several_videos.fitting import SharedFit
 from vrdp_prob.inference.several_videos.population import with_learned_population
 from vrdp_prob.models.effects.external_impulse import ExternalImpulse

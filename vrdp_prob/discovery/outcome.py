@@ -11,9 +11,10 @@ from vrdp_prob.discovery.finding import Check, FoundCause, Gain, Verdict
 from vrdp_prob.discovery.selection.doubts import Doubt, doubts, with_doubts
 from vrdp_prob.discovery.selection.estimates import cause_sentence, estimates
 from vrdp_prob.discovery.selection.forecast import error_ratios
+from vrdp_prob.discovery.selection.gains import gain, gains, weights
 from vrdp_prob.discovery.selection.mimics import Unlisted, laws_of, without_mimics
 from vrdp_prob.discovery.selection.search import Search
-from vrdp_prob.discovery.selection.trials import Trial, gain, gains, weights
+from vrdp_prob.discovery.selection.trials import Trial
 from vrdp_prob.models.effects.effect import Effect
 from vrdp_prob.progress import ProgressDisplay
 

@@ -4,8 +4,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from vrdp_prob.discovery.candidates.scores import CauseScore
+from vrdp_prob.discovery.selection.gains import gain
 from vrdp_prob.discovery.selection.refits import Refits
-from vrdp_prob.discovery.selection.trials import Trial, gain
+from vrdp_prob.discovery.selection.trials import Trial
 from vrdp_prob.inference.several_videos.second_look import explained, lost_videos
 from vrdp_prob.models.effects.effect import Effect
 from vrdp_prob.models.physics import PhysicsModel

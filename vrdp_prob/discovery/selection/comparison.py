@@ -7,11 +7,12 @@ from functools import cached_property, partial
 from vrdp_prob.discovery.candidates.scores import CauseScore
 from vrdp_prob.discovery.selection.beginning import Beginning
 from vrdp_prob.discovery.selection.forward import Step
+from vrdp_prob.discovery.selection.gains import gain, merit
 from vrdp_prob.discovery.selection.leavings import Left
 from vrdp_prob.discovery.selection.lesser_models import LesserModels
 from vrdp_prob.discovery.selection.refits import Refits
 from vrdp_prob.discovery.selection.shortlist import HOPEFUL
-from vrdp_prob.discovery.selection.trials import Trial, gain, merit
+from vrdp_prob.discovery.selection.trials import Trial
 from vrdp_prob.inference.runs.parallel import in_processes
 from vrdp_prob.models.effects.effect import Effect
 from vrdp_prob.models.effects.external_impulse import ExternalImpulse

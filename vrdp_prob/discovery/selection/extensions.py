@@ -11,10 +11,11 @@ from vrdp_prob.discovery.candidates.dropped_frames import Dropped
 from vrdp_prob.discovery.candidates.proposals import hidden_things
 from vrdp_prob.discovery.candidates.scores import CauseScore, mends_any_course
 from vrdp_prob.discovery.candidates.surfaces import Placed
+from vrdp_prob.discovery.selection.gains import merit
 from vrdp_prob.discovery.selection.leavings import Leavings
 from vrdp_prob.discovery.selection.met_surfaces import fit_with_surfaces
 from vrdp_prob.discovery.selection.restamped import fit_with_dropped_frames
-from vrdp_prob.discovery.selection.trials import Trial, merit
+from vrdp_prob.discovery.selection.trials import Trial
 from vrdp_prob.inference.runs.parallel import in_processes
 from vrdp_prob.inference.several_videos.ascent import ImpossibleStartError
 from vrdp_prob.inference.several_videos.fitting import SharedFit, fit_together

@@ -8,10 +8,11 @@ import numpy as np
 
 from vrdp_prob.discovery.candidates.scores import mends_any_course
 from vrdp_prob.discovery.selection.beginning import Beginning
+from vrdp_prob.discovery.selection.gains import gain, merit
 from vrdp_prob.discovery.selection.leavings import Leavings, Left
 from vrdp_prob.discovery.selection.lesser_models import LesserModels
 from vrdp_prob.discovery.selection.refits import Refits
-from vrdp_prob.discovery.selection.trials import Trial, gain, merit
+from vrdp_prob.discovery.selection.trials import Trial
 
 MOST_CAUSES = 5
 CAUSES_LEFT = f"The search ended after {MOST_CAUSES} causes, the most that are looked for; there may be more."

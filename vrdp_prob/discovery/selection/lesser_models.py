@@ -7,8 +7,9 @@ from functools import partial
 import numpy as np
 from jaxtyping import Float
 
+from vrdp_prob.discovery.selection.gains import gain, merit
 from vrdp_prob.discovery.selection.refits import Refits
-from vrdp_prob.discovery.selection.trials import Trial, gain, merit
+from vrdp_prob.discovery.selection.trials import Trial
 from vrdp_prob.inference.several_videos.second_look import doubtful
 from vrdp_prob.models.effects.effect import Effect
 

@@ -18,8 +18,9 @@ from vrdp_prob.discovery.checks.bodies import REBOUND
 from vrdp_prob.discovery.checks.contacts import REBOUND_AT_WALLS
 from vrdp_prob.discovery.checks.measurement import GENERAL
 from vrdp_prob.discovery.finding import Check
+from vrdp_prob.discovery.selection.gains import gain, weights
 from vrdp_prob.discovery.selection.search import FALSE_ALARM, Search
-from vrdp_prob.discovery.selection.trials import EACH_PARAMETER, Trial, gain, weights
+from vrdp_prob.discovery.selection.trials import EACH_PARAMETER, Trial
 from vrdp_prob.inference.runs.parallel import in_processes
 from vrdp_prob.models.effects.effect import Effect
 from vrdp_prob.progress import ProgressDisplay, SilentProgress

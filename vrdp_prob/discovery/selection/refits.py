@@ -14,9 +14,10 @@ from vrdp_prob.discovery.candidates.surfaces import Placed, surfaces_unknown_to
 from vrdp_prob.discovery.selection.courses import Courses
 from vrdp_prob.discovery.selection.doubts import HELD_BY_BODIES, causes_with_own_check_failing
 from vrdp_prob.discovery.selection.extensions import Extensions, explaining
+from vrdp_prob.discovery.selection.gains import gain, merit, weights
 from vrdp_prob.discovery.selection.leavings import Leavings
 from vrdp_prob.discovery.selection.shortlist import CLOSE, SHORTLIST_LEVEL, shortlist
-from vrdp_prob.discovery.selection.trials import Trial, gain, merit, weights
+from vrdp_prob.discovery.selection.trials import Trial
 from vrdp_prob.inference.several_videos.second_look import (
     SHARE_ASTRAY,
     explained,

@@ -9,10 +9,11 @@ from jaxtyping import Float
 from vrdp_prob.discovery.selection.beginning import Beginning
 from vrdp_prob.discovery.selection.comparison import Comparison
 from vrdp_prob.discovery.selection.forward import OUT_OF_REACH, ForwardSelection, Step
+from vrdp_prob.discovery.selection.gains import gain, merit
 from vrdp_prob.discovery.selection.leavings import Left
 from vrdp_prob.discovery.selection.lesser_models import LesserModels
 from vrdp_prob.discovery.selection.refits import Refits
-from vrdp_prob.discovery.selection.trials import Trial, gain, merit, with_own_population
+from vrdp_prob.discovery.selection.trials import Trial, with_own_population
 from vrdp_prob.inference.several_videos.fitting import SharedFit
 from vrdp_prob.models.effects.effect import Effect
 from vrdp_prob.progress import ProgressDisplay, SilentProgress

@@ -5,9 +5,10 @@ from collections.abc import Collection
 import numpy as np
 
 from vrdp_prob.discovery.finding import TriedCause
+from vrdp_prob.discovery.selection.gains import gain, weights
 from vrdp_prob.discovery.selection.refits import ESTABLISHED
 from vrdp_prob.discovery.selection.search import Search
-from vrdp_prob.discovery.selection.trials import Trial, gain, weights
+from vrdp_prob.discovery.selection.trials import Trial
 from vrdp_prob.models.effects.effect import Effect
 
 

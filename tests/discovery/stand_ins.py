@@ -1,6 +1,7 @@
 """Stand-ins for refits, and for what makes them."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from itertools import pairwise
 from unittest.mock import Mock, create_autospec
 
 import numpy as np
@@ -8,6 +9,8 @@ import pytest
 
 from vrdp_prob.discovery.candidates.scores import CauseScore
 from vrdp_prob.discovery.selection import refits
+from vrdp_prob.discovery.selection.forward import ForwardSelection, Step
+from vrdp_prob.discovery.selection.leavings import Leavings, Left
 from vrdp_prob.discovery.selection.trials import Trial
 from vrdp_prob.models.effects.effect import Effect
 
@@ -36,6 +39,7 @@ def refit_with(cause: str, gained: float, *, patches: bool = False) -> Mock:
 
 
 def refits_with(needed: float = 0.0) -> refits.Refits:
+    """Refits of which none was made yet."""
     return refits.Refits((), seed=0, needed=needed, advance=lambda _count: None)
 
 
@@ -44,3 +48,43 @@ def without_tracks(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(refits.Refits, "_placed", lambda _self, _trial: [])
     monkeypatch.setattr(refits.Refits, "_dropped", lambda _self, _trial: [])
     monkeypatch.setattr(refits, "trusted", lambda _fits: np.ones(4, dtype=bool))
+
+
+def selection_with(needed: float = 0.0) -> ForwardSelection:
+    """A selection that has refitted nothing yet."""
+    return ForwardSelection(refits_with(needed))
+
+
+def asked_models(monkeypatch: pytest.MonkeyPatch) -> list[Trial]:
+    """The models on which causes are tried, as they come; none is."""
+    asked: list[Trial] = []
+
+    def tried(self: ForwardSelection, trial: Trial) -> Step:
+        asked.append(trial)
+        return self.untried(trial)
+
+    monkeypatch.setattr(ForwardSelection, "tried", tried)
+    return asked
+
+
+def judge_by_gain(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A cause is doubted that gains less than two nats."""
+
+    def doubted(_self: object, trial: Trial, lesser: Trial, _divisor: object) -> bool:
+        return bool((trial.log_density - lesser.log_density).sum() < 2.0)
+
+    monkeypatch.setattr(Leavings, "of", Mock())
+    monkeypatch.setattr(refits.Refits, "doubted", doubted)
+
+
+def asked_of_each(models: Sequence[Mock], monkeypatch: pytest.MonkeyPatch) -> list[Trial]:
+    """The models on which causes are tried, as they come, each of which leads to the next one."""
+    following = dict(pairwise(models))
+    monkeypatch.setattr(ForwardSelection, "chosen", lambda _self, trial, _step: (trial, following[trial]))
+    monkeypatch.setattr(Leavings, "of", lambda _self, _trial: Left((), (), np.ones(3)))
+    return asked_models(monkeypatch)
+
+
+def step_of(*tried: Trial) -> Step:
+    """A step in which some causes were tried."""
+    return Step(refit_with("", 0.0), Left((), (), np.ones(3)), tried)

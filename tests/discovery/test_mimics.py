@@ -10,6 +10,7 @@ from vrdp_prob.discovery.candidates.unlisted_law import UnlistedMotion, Unlisted
 from vrdp_prob.discovery.checks.bodies import REBOUND
 from vrdp_prob.discovery.checks.contacts import REBOUND_AT_WALLS
 from vrdp_prob.discovery.finding import Check
+from vrdp_prob.discovery.selection import mimics
 from vrdp_prob.discovery.selection.mimics import laws_of, without_mimics
 from vrdp_prob.discovery.selection.refits import Refits
 from vrdp_prob.discovery.selection.search import Search
@@ -46,6 +47,33 @@ def test_a_patch_that_follows_the_grain_of_a_table_is_not_named() -> None:
     assert unlisted.gain > 50
     assert found.best is found.base
     assert found.lesser == found.rivals == ()
+
+
+@pytest.mark.slow
+def test_some_of_many_videos_are_asked_what_follows_the_grain_of_a_table(monkeypatch: pytest.MonkeyPatch) -> None:
+    before = search_that_found(FrictionPatch(), "grain", 8.0, LONGER)
+    monkeypatch.setattr(mimics, "MOST", 3)
+    found, unlisted = without_mimics(before, [UnlistedMotion()], seed=0)
+    assert unlisted is not None
+    assert unlisted.mimics == ("friction_patch",)
+    assert unlisted.asked == 3
+    assert unlisted.gain > 50
+    assert found.best is found.base
+
+
+def test_models_beside_which_laws_are_put_are_those_of_some_of_many_videos(monkeypatch: pytest.MonkeyPatch) -> None:
+    found = search_that_found(SurfaceTilt(), "surface_tilt", 5.0, SMALL)
+    everywhere = mimics._Models.of(found)
+    assert everywhere.best is found.best
+    assert everywhere.asked is None
+    monkeypatch.setattr(mimics, "MOST", 2)
+    some = mimics._Models.of(found)
+    assert some.best.fit.videos == some.base.fit.videos == (found.base.fit.videos[0], found.base.fit.videos[2])
+    assert some.lesser == (some.base,)
+    assert some.asked == 2
+    np.testing.assert_allclose(some.overdispersion, found.overdispersion[[0, 2]] * 2 / 3)
+    monkeypatch.setattr(mimics, "happens_once", lambda _cause: True)
+    assert mimics._Models.of(found).best is found.best, "what happens once may be in a video that is left out"
 
 
 @pytest.mark.slow

@@ -336,4 +336,5 @@ def _unlisted_note(unlisted: Unlisted) -> str:
     laws = listed(f"{law.sentence[0].lower()}{law.sentence[1:].rstrip('.')}" for law in unlisted.laws)
     better = "better" if unlisted.gain > NORMAL_95 * unlisted.error else "at least as well, as far as they can tell,"
     size = f"{unlisted.gain:.0f} ± {unlisted.error:.0f} nats"
+    size += "" if unlisted.asked is None else f" in all, by {unlisted.asked} of them"
     return f"A model in which {laws} predicts left-out videos {better} ({size}){rest}."

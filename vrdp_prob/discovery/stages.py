@@ -4,8 +4,6 @@ from collections.abc import Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
 
-import numpy as np
-
 from vrdp_prob.discovery.candidates.dropped_frames import frames_unknown_to
 from vrdp_prob.discovery.candidates.scores import happens_once
 from vrdp_prob.discovery.candidates.surfaces import surfaces_unknown_to
@@ -15,6 +13,7 @@ from vrdp_prob.discovery.selection.beginning import Beginning
 from vrdp_prob.discovery.selection.believed import extended_model
 from vrdp_prob.discovery.selection.leavings import Leavings
 from vrdp_prob.discovery.selection.search import Search, gain_needed, search
+from vrdp_prob.discovery.selection.some_videos import evenly_spread
 from vrdp_prob.discovery.selection.trials import Trial
 from vrdp_prob.discovery.selection.tried import tried_causes
 from vrdp_prob.discovery.words import title
@@ -95,7 +94,7 @@ class Stages:
         These are the causes that were found or come near to one of these, and others that would bring enough in all
         videos if they brought as much in each. Whether they are to be doubted is asked of all videos.
         """
-        some = [videos[index] for index in np.linspace(0, len(videos) - 1, searched).round().astype(int)]
+        some = [videos[index] for index in evenly_spread(searched, len(videos))]
         fit = self._fit(some, self.catalogue)
         found = self._search(fit, self.catalogue)
         if not found.best.causes:

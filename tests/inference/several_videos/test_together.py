@@ -64,6 +64,16 @@ def test_the_joint_fit_is_a_maximum_of_the_joint_density() -> None:
     assert joint_density(fit, np.zeros((1, fit.joint.gaussian.dimension)))[0] == pytest.approx(fit.joint.log_density)
 
 
+def test_some_videos_of_a_fit_come_where_they_do_by_themselves() -> None:
+    all_three = fit_together([sliding(3), colliding(1), sliding(2)], model=BASE, model_error=False)
+    some, alone = all_three.of_some([1, 2]), fit_together([colliding(1), sliding(2)], model=BASE, model_error=False)
+    assert some.videos == alone.videos
+    assert some.joint.numbers.keys == alone.joint.numbers.keys
+    assert some.joint.log_density == pytest.approx(alone.joint.log_density, abs=0.1)
+    apart = (some.joint.gaussian.mean - alone.joint.gaussian.mean) / alone.joint.gaussian.sd
+    assert np.abs(apart).max() < 0.2
+
+
 def joint_density(fit: SharedFit, whitened: np.ndarray) -> np.ndarray:
     """Density of the vector of all numbers, put together here from the densities of the single videos."""
     gaussian, numbers = fit.joint.gaussian, fit.joint.numbers

@@ -3,7 +3,7 @@
 Kicks, patches and jumps of the clock can be put where a law that the catalogue does not hold leaves most, and predict
 left-out videos better than nothing does. What such a law does elsewhere remains then, and shows in the checks. So where
 something remains, causes are compared with a law of no particular cause (`unlisted_law`), beside them and in the place
-of each: of the motion, of the rebound, or of both, by what remains.
+of each: of the motion, of the rebound, or of both, by what remains. With many videos that is asked of some.
 """
 
 from collections.abc import Sequence
@@ -11,8 +11,9 @@ from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
+from jaxtyping import Float
 
-from vrdp_prob.discovery.candidates.scores import score_causes
+from vrdp_prob.discovery.candidates.scores import happens_once, score_causes
 from vrdp_prob.discovery.candidates.unlisted_law import UnlistedMotion, UnlistedRebound
 from vrdp_prob.discovery.checks.bodies import REBOUND
 from vrdp_prob.discovery.checks.contacts import REBOUND_AT_WALLS
@@ -20,6 +21,7 @@ from vrdp_prob.discovery.checks.measurement import GENERAL
 from vrdp_prob.discovery.finding import Check
 from vrdp_prob.discovery.selection.gains import gain, weights
 from vrdp_prob.discovery.selection.search import FALSE_ALARM, Search
+from vrdp_prob.discovery.selection.some_videos import evenly_spread
 from vrdp_prob.discovery.selection.trials import EACH_PARAMETER, Trial
 from vrdp_prob.inference.runs.parallel import in_processes
 from vrdp_prob.models.effects.effect import Effect
@@ -27,6 +29,8 @@ from vrdp_prob.progress import ProgressDisplay, SilentProgress
 
 BELIEVED = 0.5
 """Probability below which a cause is taken to follow something outside the catalogue."""
+MOST = 12
+"""Videos in which laws of no particular cause are looked for, which have a score of numbers that each video follows."""
 REBOUNDS = {REBOUND, REBOUND_AT_WALLS}
 """Checks of what the law of rebounds is about."""
 UNLISTED = float(np.log(FALSE_ALARM))
@@ -46,12 +50,15 @@ class Unlisted:
     gain, error
         Gain (nats) in the predictive density of left-out videos over what the causes of the catalogue explain, and its
         standard error.
+    asked
+        Number of the videos in which it was looked for, if these are not all: what is gained in all is in proportion.
     """
 
     laws: tuple[Effect, ...]
     mimics: tuple[str, ...]
     gain: float
     error: float
+    asked: int | None = None
 
 
 def laws_of(left: Sequence[Check]) -> tuple[Effect, ...]:
@@ -82,28 +89,96 @@ def without_mimics(
     -------
     The search with the best model of the other causes, and None where that law explains hardly more than the causes.
     """
-    best = found.best
     with_laws = partial(_with_laws, laws=tuple(laws), seed=seed)
     with (progress or SilentProgress()).stage("Looking outside the catalogue", total=None) as advance:
-        beside = with_laws(best)
+        models = _Models.of(found)
+        beside = with_laws(models.best)
         advance(1)
-        if beside is None or _merit(beside, best, found) < found.needed:
+        if beside is None or models.merit(beside) < found.needed:
             return found, None
-        alone = with_laws(found.base)
+        alone = with_laws(models.base)
         advance(1)
-        if alone is not None and _merit(alone, best, found) > 0:
-            gained = gain(alone, best, found.overdispersion)
-            return found.without(best.causes), Unlisted(_of(alone, laws), _names(best.causes), *gained)
-        others = [lesser for lesser in found.lesser if lesser is not found.base]
+        if alone is not None and models.merit(alone) > 0:
+            return found.without(found.best.causes), models.explained(alone, laws, found.best.causes)
+        others = [lesser for lesser in models.lesser if lesser is not models.base]
         refitted = in_processes(with_laws, others, advance=advance)
-    instead = {found.base: alone, **dict(zip(others, refitted, strict=True))}
+    instead = {models.base: alone, **dict(zip(others, refitted, strict=True))}
     mimics = [
         cause
-        for cause, lesser in zip(best.causes, found.lesser, strict=True)
-        if _believed(found, beside, lesser, instead[lesser], seed) < BELIEVED
+        for cause, lesser in zip(found.best.causes, models.lesser, strict=True)
+        if models.believed(beside, lesser, instead[lesser], found.needed, seed) < BELIEVED
     ]
-    explained = Unlisted(_of(beside, laws), _names(mimics), *gain(beside, best, found.overdispersion))
-    return found.without(mimics), explained
+    return found.without(mimics), models.explained(beside, laws, mimics)
+
+
+@dataclass(frozen=True)
+class _Models:
+    """The models that a search has found, fitted to the videos in which laws are put beside them.
+
+    Parameters
+    ----------
+    best, base
+        That with all causes, and that with none.
+    lesser
+        For each cause: the one without it.
+    overdispersion
+        Factor of each video by which gains are divided: so much less where a video stands for several.
+    asked
+        Number of the videos, if these are not all.
+    """
+
+    best: Trial
+    base: Trial
+    lesser: tuple[Trial, ...]
+    overdispersion: Float[np.ndarray, "video"]
+    asked: int | None = None
+
+    @classmethod
+    def of(cls, found: Search) -> "_Models":
+        """Those of a search; in some of the videos where these are many, unless what happens once in one is asked."""
+        videos = len(found.base.fit.fits)
+        if videos <= MOST or any(happens_once(cause) for cause in found.best.causes):
+            return cls(found.best, found.base, found.lesser, found.overdispersion)
+        chosen = evenly_spread(MOST, videos)
+        models = list(dict.fromkeys([found.best, found.base, *found.lesser]))
+        fitted = dict(zip(models, in_processes(partial(Trial.of_some, chosen=chosen), models), strict=True))
+        overdispersion = found.overdispersion[chosen] * MOST / videos
+        lesser = tuple(fitted[one] for one in found.lesser)
+        return cls(fitted[found.best], fitted[found.base], lesser, overdispersion, MOST)
+
+    def merit(self, trial: Trial) -> float:
+        """By how much (nats) a model with laws is more probable than the best one without."""
+        return self._gain(trial)[0] + trial.log_prior - self.best.log_prior + UNLISTED
+
+    def explained(self, trial: Trial, laws: Sequence[Effect], mimics: Sequence[Effect]) -> Unlisted:
+        """What the laws of a model explain, and which causes they explain away."""
+        names = tuple(cause.cause_name() for cause in mimics)
+        return Unlisted(tuple(law for law in laws if law.name in trial.names), names, *self._gain(trial), self.asked)
+
+    def believed(self, beside: Trial, lesser: Trial, instead: Trial | None, needed: float, seed: int) -> float:
+        """Probability of a cause, with the laws beside it or not, against models without it.
+
+        Parameters
+        ----------
+        beside
+            The best model with the laws.
+        lesser, instead
+            The model without the cause, and that with the laws in its place, if any can begin.
+        needed
+            Gain (nats) that a cause must bring.
+        seed
+            Of the draws of videos.
+        """
+        compared = [(self.best, 0.0), (beside, UNLISTED), (lesser, needed)]
+        if instead is not None:
+            compared.append((instead, needed + UNLISTED))
+        trials = [trial for trial, _ in compared]
+        log_prior = [trial.log_prior + odds for trial, odds in compared]
+        shares = weights(trials, log_prior, np.random.default_rng(seed), overdispersion=self.overdispersion)
+        return float(shares[:2].sum())
+
+    def _gain(self, trial: Trial) -> tuple[float, float]:
+        return gain(trial, self.best, self.overdispersion)
 
 
 def _with_laws(trial: Trial, laws: Sequence[Effect], seed: int) -> Trial | None:
@@ -114,28 +189,3 @@ def _with_laws(trial: Trial, laws: Sequence[Effect], seed: int) -> Trial | None:
         promising = [one for one in scores if one.size / 2 > EACH_PARAMETER * len(law.parameters) - UNLISTED]
         found = (found.with_cause(promising[0]) if promising else None) or found
     return None if found is trial else found.continued()
-
-
-def _names(causes: Sequence[Effect]) -> tuple[str, ...]:
-    return tuple(cause.cause_name() for cause in causes)
-
-
-def _of(trial: Trial, laws: Sequence[Effect]) -> tuple[Effect, ...]:
-    """The laws that are part of a model."""
-    return tuple(law for law in laws if law.name in trial.names)
-
-
-def _merit(trial: Trial, other: Trial, found: Search) -> float:
-    """By how much (nats) a model with the law is more probable than one without."""
-    return gain(trial, other, found.overdispersion)[0] + trial.log_prior - other.log_prior + UNLISTED
-
-
-def _believed(found: Search, beside: Trial, lesser: Trial, instead: Trial | None, seed: int) -> float:
-    """Probability of a cause, with the law beside it or not, against models without it."""
-    compared = [(found.best, 0.0), (beside, UNLISTED), (lesser, found.needed)]
-    if instead is not None:
-        compared.append((instead, found.needed + UNLISTED))
-    trials = [trial for trial, _ in compared]
-    log_prior = [trial.log_prior + odds for trial, odds in compared]
-    shares = weights(trials, log_prior, np.random.default_rng(seed), overdispersion=found.overdispersion)
-    return float(shares[:2].sum())

@@ -77,6 +77,11 @@ class Trial:
     choices: Mapping[str, Float[np.ndarray, "video"]] = field(default_factory=dict)
     stated: Mapping[str, Parameter] = field(default_factory=dict)
 
+    def of_some(self, chosen: Sequence[int]) -> "Trial":
+        """The model fitted to some of its videos alone, which believes of bodies what all say."""
+        choices = {name: one[list(chosen)] for name, one in self.choices.items()}
+        return replace(self, fit=self.fit.of_some(chosen), choices=choices)
+
     @cached_property
     def cavities(self) -> dict[str, Cavity]:
         """What all videos but one say, and how probable that one is then."""

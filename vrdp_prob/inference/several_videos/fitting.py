@@ -111,6 +111,21 @@ class SharedFit:
         fits = [replace(part, clues=Clues.of(tracks)) for part, tracks in zip(self.fits, videos, strict=True)]
         return replace(self, fits=tuple(fits))
 
+    def of_some(self, chosen: Sequence[int]) -> "SharedFit":
+        """The fit of some of its videos, from where all have brought them.
+
+        Parameters
+        ----------
+        chosen
+            Numbers of the videos.
+        """
+        gaussian = replace(self.joint.gaussian, locals=tuple(self.joint.gaussian.locals[index] for index in chosen))
+        videos = tuple(self.joint.videos[index] for index in chosen)
+        there = replace(self.joint, videos=videos, gaussian=gaussian, alternatives=())
+        fits = tuple(self.fits[index] for index in chosen)
+        structures = tuple(self.structures[index] for index in chosen)
+        return replace(self, joint=there, fits=fits, structures=structures).under(self.model, model_error=False)
+
     @kept
     def under(
         self,

@@ -14,6 +14,7 @@ from jaxtyping import Bool, Float
 from scipy.optimize import minimize
 
 from vrdp_prob.errors import InputError
+from vrdp_prob.inference.runs.journal import kept
 from vrdp_prob.inference.runs.parallel import in_parallel
 from vrdp_prob.inference.search.noise_fit import NOISE_FIELDS, best_noise
 from vrdp_prob.inference.several_videos.arrow import Expansion, Expansions
@@ -139,6 +140,7 @@ class _Ridges:
         return self.ends[way]
 
 
+@kept
 def climb(
     numbers: SharedNumbers,
     videos: Sequence[LinkedVideo],

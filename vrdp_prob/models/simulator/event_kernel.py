@@ -178,6 +178,8 @@ def end_pieces(world, pairs, tape, cluster, horizon):
 def stop(world, cluster, body, t, moves):
     """Let a body stop to move, or only to spin; what moves with it as slowly stops too."""
     y = world.polynomial[body, 0]
+    if moves:  # how short steps had to be before says nothing of those behind
+        world.clock[body, STEP] = math.inf
     if not moves:
         y[5] = 0.0
     elif world.phase[body, MOVING] == SLIPPING:

@@ -31,9 +31,11 @@ from vrdp_prob.models.simulator.world_kernel import (
     ENDING_BODY,
     FIXED,
     LENGTH,
+    MOVING,
     ORIGIN,
     REFERENCE_X,
     REFERENCE_Y,
+    SLIPPING,
     STEP,
     STOPS,
     UNTIL,
@@ -44,6 +46,11 @@ SMALLEST_STEP = 1e-12
 """Step in s below which the motion counts as not solvable."""
 APPROACH = 0.5
 """Longest step of bodies on bent paths, in units of the time in which friction alone would stop one of them."""
+APPROACH_TO_ROLLING = 0.8
+"""The same of spheres that slip, in units of the time until they roll.
+
+Which way they slip at last hardly matters: what friction takes from the velocity then, it gives to the spin.
+"""
 
 
 @compiled
@@ -97,7 +104,9 @@ def reach_of_step(world, cluster, body):
     """
     phase = world.phase[body]
     slow = phase[REFERENCE_X] ** 2 + phase[REFERENCE_Y] ** 2 < (4.0 * lingering(world, body)) ** 2
-    return APPROACH if lingers(world, cluster, body) and not slow else 1.25
+    if slow or not lingers(world, cluster, body):
+        return 1.25
+    return APPROACH_TO_ROLLING if phase[MOVING] == SLIPPING else APPROACH
 
 
 @compiled

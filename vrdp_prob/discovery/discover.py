@@ -42,7 +42,7 @@ from vrdp_prob.models.effects.effect import Effect
 from vrdp_prob.models.model_file import known_effects
 from vrdp_prob.models.physics import PhysicsModel
 from vrdp_prob.models.simulator.rollout import compile_model
-from vrdp_prob.progress import ProgressDisplay
+from vrdp_prob.progress import ProgressDisplay, SilentProgress
 from vrdp_prob.report.wording import counted, listed
 from vrdp_prob.scene import Shape, Tracks
 from vrdp_prob.workers import check_processes
@@ -117,8 +117,11 @@ def discover(
         outcome = stages.outcome(timed, asked)
         found, causes = outcome.found, outcome.causes
         tried = tried_causes(found, _names_of(found, causes), seed=seed)
-        found = found if asked is None else found.asking(looked_for)
-        beside = [] if asked is None else asked.sentences(found)
+        beside = []
+        if asked is not None:
+            found = found.asking(looked_for)
+            with (progress or SilentProgress()).stage("Asking what is left"):
+                beside = asked.sentences(found)
     doubtful, bounds = outcome.verdict is Verdict.UNKNOWN, _bounds(found, causes)
     return Finding(
         verdict=outcome.verdict,

@@ -110,6 +110,13 @@ def test_what_is_left_of_what_a_cause_nearly_explains_is_details_of_its_law(
     assert len(list(details_left([cause], found))) == 1
 
 
+def test_what_a_cause_takes_away_is_weighed_where_both_p_values_are_below_any_number(trial: Trial) -> None:
+    """As of many videos, where even details of a law are beyond doubt."""
+    without, details = (Check(RUBBING, 1.0, 0.0, False, "", log_p_value=nats) for nats in (-50_000.0, -2_000.0))
+    assert not list(doubts(trial, ContactFriction(), [details], without=lambda: [without]))
+    assert list(doubts(trial, ContactFriction(), [without], without=lambda: [details]))
+
+
 def test_a_cause_whose_own_checks_are_mended_leaves_no_details() -> None:
     assert not list(details_left([ContactFriction(), SurfaceTilt()], [*left(RUBBING, 0.2), *left("push", 1e-9)]))
 
@@ -120,26 +127,30 @@ def test_own_checks_are_asked_of_the_model_without_the_very_cause_fitted_to_its_
     asked: list[list[Check]] = []
     checks = {RUBBING: left(RUBBING, 1e-97), KICK: left(KICK, 1e-97)}
 
+    def model(left_of_it: list[Check]) -> Mock:
+        return create_autospec(Trial, instance=True, fit=Mock(left=left_of_it, fits=()))
+
     def lesser(name: str) -> Mock:
         one = create_autospec(Trial, instance=True)
-        one.continued.return_value = create_autospec(Trial, instance=True, fit=checks[name])
+        one.continued.return_value = model(checks[name])
         return one
 
-    def made(fit: list[Check], *, seed: int) -> tuple[Check, ...]:
+    def made(fit: Mock, *, seed: int) -> tuple[Check, ...]:
         assert seed == 0
-        asked.append(fit)
-        return tuple(fit)
+        asked.append(fit.left)
+        return tuple(fit.left)
 
     friction, kick = ContactFriction(), ExternalImpulse()
-    best = create_autospec(Trial, instance=True, causes=(friction, kick), fit=Mock())
+    best = model([*left(RUBBING, 2e-4), *left(KICK, 2e-4)])
+    best.causes = (friction, kick)
     found = create_autospec(Search, instance=True, best=best, lesser=(lesser(RUBBING), lesser(KICK)))
     found.refits = Mock(leavings=Leavings((), 0))
     monkeypatch.setattr(leavings_module, "run_checks", made)
+    monkeypatch.setattr(leavings_module, "trusted", lambda fits: np.ones(len(fits), dtype=bool))
     monkeypatch.setattr(doubts_module, "surprise", lambda _fit, _cause: 1.0)
     for _ in range(2):  # asked again, the fit is not made again
-        doubted = outcome._doubted(found, [*left(RUBBING, 2e-4), *left(KICK, 2e-4)])
-        assert list(doubted) == [kick]
-    assert asked == [checks[RUBBING]]
+        assert list(outcome._doubted(found)) == [kick]
+    assert asked == [best.fit.left, checks[RUBBING]]
     found.lesser[0].continued.assert_called_once_with()
 
 
@@ -152,10 +163,13 @@ def test_checks_and_causes_go_by_their_names(trial: Trial) -> None:
 
 def test_what_is_left_without_a_cause_may_clear_it(trial: Trial) -> None:
     """A fit without it that has lost its videos sees p = 1e-20; one that has found them sees what it is worth."""
-    after = left(RUBBING, 7e-4)
-    assert list(doubts(trial, ContactFriction(), after, without=lambda: left(RUBBING, 1e-20)))
-    assert outcome._leaving_details(trial, [ContactFriction()], after, left(RUBBING, 1e-50)) == [ContactFriction()]
-    assert outcome._leaving_details(trial, [ContactFriction()], after, left(RUBBING, 1e-20)) == []
+    best, rough, well = trial, *(create_autospec(Trial, instance=True) for _ in range(2))
+    checks = {best: left(RUBBING, 7e-4), rough: left(RUBBING, 1e-20), well: left(RUBBING, 1e-50)}
+    found = create_autospec(Search, instance=True, best=best, refits=Mock())
+    found.refits.leavings.own = lambda model, _cause: checks[model]
+    assert list(doubts(trial, ContactFriction(), checks[best], without=lambda: checks[rough]))
+    assert outcome._leaving_details(found, [ContactFriction()], well) == [ContactFriction()]
+    assert outcome._leaving_details(found, [ContactFriction()], rough) == []
 
 
 @pytest.mark.slow

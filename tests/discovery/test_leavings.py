@@ -7,8 +7,9 @@ import pytest
 
 from vrdp_prob.discovery import stages
 from vrdp_prob.discovery.candidates.scores import CauseScore, Site
-from vrdp_prob.discovery.finding import Verdict
+from vrdp_prob.discovery.finding import Check, Verdict
 from vrdp_prob.discovery.outcome import Outcome
+from vrdp_prob.discovery.selection import leavings as leavings_module
 from vrdp_prob.discovery.selection.leavings import Leavings, Left
 from vrdp_prob.discovery.selection.search import Search
 from vrdp_prob.discovery.selection.trials import Trial
@@ -64,6 +65,30 @@ def test_a_wrong_course_calls_for_a_cause_in_its_video_and_a_law_in_most(
     assert leavings.suspects(trial) == suspects
     assert leavings.most_call_for_a_law(trial, 2.0) is is_law
     assert not leavings.most_call_for_a_law(trial, 5.0)
+
+
+def test_laws_are_judged_by_videos_that_have_not_lost_their_course_and_what_happens_once_by_all(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    trial = create_autospec(Trial, instance=True)
+    trial.fit = Mock(fits=(1, 2, 3), part=Mock(side_effect=tuple))
+    asked: list[object] = []
+    of_all, of_some = (Check(name, 1.0, 0.5, False, "") for name in ("of all", "of some"))
+
+    def run(fit: object, *, seed: int) -> tuple[Check, ...]:
+        assert seed == 0
+        asked.append(fit)
+        return (of_all if fit is trial.fit else of_some,)
+
+    monkeypatch.setattr(leavings_module, "run_checks", run)
+    monkeypatch.setattr(leavings_module, "trusted", lambda _fits: np.array([True, False, True]))
+    leavings = Leavings((), 0)
+    for _ in range(2):
+        assert leavings.own(trial, SurfaceTilt()) == (of_some,)
+        assert leavings.own(trial, ExternalImpulse()) == (of_all,)
+    assert asked == [(0, 2), trial.fit]
+    monkeypatch.setattr(leavings_module, "trusted", lambda _fits: np.ones(3, dtype=bool))
+    assert Leavings((), 0).own(trial, SurfaceTilt()) == (of_all,)
 
 
 @pytest.mark.parametrize(

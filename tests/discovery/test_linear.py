@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.special import log_ndtr
 
 from vrdp_prob.discovery.residuals.linear import LinearFit, LinearVideo, Score
 
@@ -65,3 +66,11 @@ def test_what_strengths_have_in_common_is_no_difference() -> None:
     np.testing.assert_allclose(apart.estimate[0], -apart.estimate[1])
     assert score.within(np.eye(3)[1:]).degrees == 2
     np.testing.assert_array_equal(score.within(np.eye(3)).gradient, score.gradient)
+
+
+@pytest.mark.parametrize("chi_square", [3.0, 1_300.0, 1_400.0, 1e6])
+def test_what_a_statistic_tells_is_known_where_its_p_value_is_below_any_number(chi_square: float) -> None:
+    """With one degree it is that of a normal, with two an exponential."""
+    one, two = (Score(np.full(count, np.sqrt(chi_square / count)), np.eye(count)) for count in (1, 2))
+    assert one.log_p_value == pytest.approx(np.log(2) + log_ndtr(-np.sqrt(chi_square)), rel=1e-5)
+    assert two.log_p_value == pytest.approx(-chi_square / 2)

@@ -136,7 +136,7 @@ def discover(
         notes=(
             *_notes(found, causes, outcome.reasons, outcome.unlisted, doubtful=doubtful),
             *([found.limit] if found.limit else []),
-            *details_left(found.best.causes, outcome.after),
+            *details_left(found.best.causes, found.refits.leavings.checks_of_trusted(found.best)),
             *rivals_outside((cause.effect for cause in causes if cause.named), outcome.checks),
             *mass_scale_notes(_told(found, causes), videos),
             *beside,

@@ -1,5 +1,7 @@
 """What discovery found: the verdict, the causes with their probabilities and gains, the evidence and the bounds."""
 
+import math
+import sys
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
@@ -215,6 +217,8 @@ class Check:
         What was seen, for a reader.
     rival
         What else would leave the same, in a sentence; empty where nothing is known that would, or the videos tell.
+    log_p_value
+        Natural logarithm of the p-value where that may be smaller than any number of the machine; else None.
     """
 
     name: str
@@ -223,6 +227,12 @@ class Check:
     significant: bool
     sentence: str
     rival: str = ""
+    log_p_value: float | None = None
+
+    @property
+    def nats(self) -> float:
+        """What it tells against the model, by its p-value."""
+        return -(math.log(max(self.p_value, sys.float_info.min)) if self.log_p_value is None else self.log_p_value)
 
 
 @dataclass(frozen=True)

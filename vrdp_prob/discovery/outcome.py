@@ -76,12 +76,12 @@ def outcome_of(found: Search, *, seed: int, progress: ProgressDisplay | None) ->
     not_named: list[FoundCause] = []
     reasons: list[Doubt] = []
     cleared: set[Effect] = set()
-    while doubted := {cause: some for cause, some in _doubted(found, after).items() if cause not in cleared}:
+    while doubted := {cause: some for cause, some in _doubted(found).items() if cause not in cleared}:
         other = next((one for cause in doubted if (one := found.with_rival(cause, _credible)) is not None), None)
         left = found.without(list(doubted)) if other is None else other
         left, after_left, further = _without_mimics(left, seed=seed, progress=progress)
         if other is None:
-            if details := _leaving_details(found.best, doubted, after, after_left):
+            if details := _leaving_details(found, doubted, left.best if left.best.causes else left.base):
                 cleared.update(details)
                 continue
             reasons += [one for some in doubted.values() for one in some]
@@ -115,23 +115,27 @@ def _without_mimics(
     return left, after if left is found else _checks_after(left), told
 
 
-def _doubted(found: Search, after: Sequence[Check]) -> dict[Effect, tuple[Doubt, ...]]:
+def _doubted(found: Search) -> dict[Effect, tuple[Doubt, ...]]:
     """The causes of the best model that are doubted, and why."""
-    reasons = {
-        cause: tuple(doubts(found.best, cause, after, without=partial(found.refits.leavings.checks_at_the_end, lesser)))
-        for cause, lesser in zip(found.best.causes, found.lesser, strict=True)
-    }
+    leavings, best = found.refits.leavings, found.best
+    reasons = {}
+    for cause, lesser in zip(best.causes, found.lesser, strict=True):
+        without = partial(leavings.own_at_the_end, lesser, cause)
+        reasons[cause] = tuple(doubts(best, cause, leavings.own(best, cause), without=without))
     return {cause: some for cause, some in reasons.items() if some}
 
 
-def _leaving_details(
-    trial: Trial, doubted: Iterable[Effect], after: Sequence[Check], without: Sequence[Check]
-) -> list[Effect]:
-    """The causes of a model that are cleared by the checks of the model without all that are doubted.
+def _leaving_details(found: Search, doubted: Iterable[Effect], without: Trial) -> list[Effect]:
+    """The causes of the best model that are cleared by the checks of the model without all that are doubted.
 
     The one without a cause is fitted roughly when that is doubted, and sees little through what lost videos leave.
     """
-    return [cause for cause in doubted if not any(doubts(trial, cause, after, without=lambda: without))]
+    own, best = found.refits.leavings.own, found.best
+    return [
+        cause
+        for cause in doubted
+        if not any(doubts(best, cause, own(best, cause), without=partial(own, without, cause)))
+    ]
 
 
 def _credible(trial: Trial) -> bool:

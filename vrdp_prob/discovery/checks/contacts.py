@@ -4,6 +4,7 @@ How bodies rebound from each other shows in their fitted restitutions (see `body
 is asked here, since one body meets walls at many speeds.
 """
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
@@ -80,7 +81,7 @@ def _slip_check(score: Score, where: str) -> Iterator[Check]:
     size, sd = float(alone.estimate[0]), float(alone.sd[0])
     word = opposite(size, "along", "against")
     found = f"{where.capitalize()} a tangential impulse acts {word} the slip, {number(abs(size))} of the normal one."
-    yield _check(RUBBING_OF[where], size, score.p_value, found, f"{number(NORMAL_95 * sd)} of the normal one")
+    yield _check(RUBBING_OF[where], size, score.log_p_value, found, f"{number(NORMAL_95 * sd)} of the normal one")
 
 
 def _rub_check(score: Score, where: str) -> Iterator[Check]:
@@ -93,7 +94,7 @@ def _rub_check(score: Score, where: str) -> Iterator[Check]:
     excess = float((score.estimate[known] ** 2 / variance - 1).sum() / (1 / variance).sum())
     size = float(np.sqrt(max(excess, 0.0)))
     found = f"{where.capitalize()} tangential impulses act, {number(size)} of the normal ones (root mean square)."
-    yield _check(RUBBING_OF[where], size, score.p_value, found, f"{number(visible)} of the normal ones")
+    yield _check(RUBBING_OF[where], size, score.log_p_value, found, f"{number(visible)} of the normal ones")
 
 
 def _turn_check(score: Score, where: str) -> Iterator[Check]:
@@ -105,7 +106,7 @@ def _turn_check(score: Score, where: str) -> Iterator[Check]:
         f"normal one, {opposite(size, 'along', 'against')} the slip."
     )
     visible = f"{number(NORMAL_95 * float(score.sd[0]))} of the normal impulse"
-    yield _check(TURNING[where], size, score.p_value, found, visible)
+    yield _check(TURNING[where], size, score.log_p_value, found, visible)
 
 
 def _bounce_check(score: Score) -> Iterator[Check]:
@@ -119,7 +120,7 @@ def _bounce_check(score: Score) -> Iterator[Check]:
         f"{number(size)}."
     )
     visible = f"a power of {number(NORMAL_95 * sd)} of the approach speed"
-    yield _check(REBOUND_AT_WALLS, size, power.p_value, found, visible)
+    yield _check(REBOUND_AT_WALLS, size, power.log_p_value, found, visible)
 
 
 def _distance_check(score: Score, contacts: ContactScore) -> Iterator[Check]:
@@ -137,7 +138,7 @@ def _distance_check(score: Score, contacts: ContactScore) -> Iterator[Check]:
         f"Bodies touch {number(abs(size))} m {opposite(size, 'nearer', 'farther apart')} than the sum of their radii, "
         f"{number(100 * abs(share))} % of it."
     )
-    check = _check(DISTANCE, size, score.p_value, found, f"{number(NORMAL_95 * sd)} m")
+    check = _check(DISTANCE, size, score.log_p_value, found, f"{number(NORMAL_95 * sd)} m")
     yield replace(check, rival=_lasting_instead(score, contacts.durations("last", AT_CONTACTS)))
 
 
@@ -147,7 +148,7 @@ def _duration_check(score: Score, where: str) -> Iterator[Check]:
         return
     size, sd = float(score.estimate[0]), float(score.sd[0])
     found = f"{where.capitalize()} bodies touch for {number(size)} s, and give way meanwhile."
-    yield _check(DURATION[where], size, float(norm.sf(size / sd)), found, f"{number(ONE_SIDED_95 * sd)} s")
+    yield _check(DURATION[where], size, float(norm.logsf(size / sd)), found, f"{number(ONE_SIDED_95 * sd)} s")
 
 
 def _lasting_instead(distance: Score, duration: Score) -> str:
@@ -178,6 +179,7 @@ def _momentum_check(score: Score, contacts: int) -> Iterator[Check]:
     yield Check(MOMENTUM, excess, score.p_value, False, sentence)
 
 
-def _check(name: str, size: float, p_value: float, found: str, visible: str) -> Check:
+def _check(name: str, size: float, log_p_value: float, found: str, visible: str) -> Check:
+    p_value = math.exp(log_p_value)
     sentence = found if p_value < SEEN else f"Nothing seen; {visible} would have shown."
-    return Check(name, size, p_value, False, sentence)
+    return Check(name, size, p_value, False, sentence, log_p_value=log_p_value)

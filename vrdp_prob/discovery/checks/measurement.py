@@ -67,7 +67,7 @@ def _lens_check(flight: FreeFlight) -> Iterator[Check]:
         else f"Nothing seen; {number(NORMAL_95 * float(lens.of([0], [1, 2]).sd[0]) * far**3)} m at {number(far)} m "
         "from the middle would have shown."
     )
-    yield Check(DISTORTION, edge, lens.p_value, False, sentence)
+    yield Check(DISTORTION, edge, lens.p_value, False, sentence, log_p_value=lens.log_p_value)
 
 
 def _bent(motion: FittedMotion, middle: Float[np.ndarray, "2"]) -> Float[np.ndarray, "time body 2 3"]:

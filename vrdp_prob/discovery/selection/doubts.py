@@ -34,8 +34,6 @@ SURPRISING = 0.01
 NEARLY_ALL = 0.9
 """Share of what each of its own checks that fail tells without a cause (nats, by the p-value) that the cause must take
 away for what is left to be details of its law: a strength that differs between bodies, say."""
-LEAST_P_VALUE = 1e-300
-"""P-values below count as this one."""
 OWN_CHECKS: Mapping[str, tuple[str, ...]] = {
     SpeedDependentRestitution.name: (REBOUND, REBOUND_AT_WALLS),
     ContactFriction.name: (RUBBING, RUBBING_AT_WALLS),
@@ -127,13 +125,9 @@ def _own(cause: Effect, left: Sequence[Check]) -> tuple[list[Check], float]:
 
 def _nearly_explained(own: Sequence[Check], without: Sequence[Check]) -> bool:
     """Whether a cause takes away nearly all that each of its checks which fail still tells without it."""
-    before = {one.name: one.p_value for one in without}
+    before = {one.name: one.nats for one in without}
     failing = [one for one in own if len(own) * one.p_value < SURPRISING]
-    return all(_nats(one.p_value) <= (1 - NEARLY_ALL) * _nats(before.get(one.name, 1.0)) for one in failing)
-
-
-def _nats(p_value: float) -> float:
-    return -math.log(max(p_value, LEAST_P_VALUE))
+    return all(one.nats <= (1 - NEARLY_ALL) * before.get(one.name, 0.0) for one in failing)
 
 
 def causes_with_own_check_failing(checks: Sequence[Check]) -> set[str]:

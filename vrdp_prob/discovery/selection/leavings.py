@@ -12,7 +12,7 @@ from vrdp_prob.discovery.finding import Check
 from vrdp_prob.discovery.residuals.overdispersion import overdispersion
 from vrdp_prob.discovery.selection.shortlist import SHORTLIST_LEVEL
 from vrdp_prob.discovery.selection.trials import Trial
-from vrdp_prob.inference.several_videos.second_look import SHARE_ASTRAY
+from vrdp_prob.inference.several_videos.second_look import SHARE_ASTRAY, trusted
 from vrdp_prob.models.effects.effect import Effect
 
 LOUD = 20.0
@@ -55,6 +55,7 @@ class Leavings:
     seed: int
     _left: dict[Trial, Left] = field(default_factory=dict)
     _checks: dict[Trial, tuple[Check, ...]] = field(default_factory=dict)
+    _checks_of_trusted: dict[Trial, tuple[Check, ...]] = field(default_factory=dict)
     _ended: dict[Trial, Trial] = field(default_factory=dict)
 
     def of(self, trial: Trial) -> Left:
@@ -80,11 +81,30 @@ class Leavings:
             self._checks[trial] = run_checks(trial.fit, seed=self.seed)
         return self._checks[trial]
 
-    def checks_at_the_end(self, trial: Trial) -> tuple[Check, ...]:
-        """Checks of what a model leaves whose fit was not followed to its end, since it is worse in any case."""
+    def checks_of_trusted(self, trial: Trial) -> tuple[Check, ...]:
+        """Checks of what a model leaves in the videos whose fits are not far worse than those of the others.
+
+        What a video that has lost its course of events leaves at contacts is no law.
+        """
+        reliable = np.flatnonzero(trusted(trial.fit.fits))
+        if len(reliable) == len(trial.fit.fits):
+            return self.checks(trial)
+        if trial not in self._checks_of_trusted:
+            self._checks_of_trusted[trial] = run_checks(trial.fit.part(reliable.tolist()), seed=self.seed)
+        return self._checks_of_trusted[trial]
+
+    def own(self, trial: Trial, cause: Effect) -> tuple[Check, ...]:
+        """Checks of what a model leaves of what a cause does.
+
+        Where one that happens once has happened again, the fit is far worse than those of other videos.
+        """
+        return self.checks(trial) if happens_once(cause) else self.checks_of_trusted(trial)
+
+    def own_at_the_end(self, trial: Trial, cause: Effect) -> tuple[Check, ...]:
+        """The same of a model whose fit was not followed to its end, since it is worse in any case."""
         if trial not in self._ended:
             self._ended[trial] = trial.continued()
-        return self.checks(self._ended[trial])
+        return self.own(self._ended[trial], cause)
 
     def something(self, trial: Trial) -> bool:
         """Whether a model leaves what chance explains less well than some cause may."""

@@ -119,12 +119,26 @@ class SharedFit:
         chosen
             Numbers of the videos.
         """
+        return self.part(chosen).under(self.model, model_error=False)
+
+    def part(self, chosen: Sequence[int]) -> "SharedFit":
+        """Some of its videos as they are in it, with what all say of the numbers that they share.
+
+        Parameters
+        ----------
+        chosen
+            Numbers of the videos.
+
+        Returns
+        -------
+        No maximum by itself, whose log density is NaN.
+        """
         gaussian = replace(self.joint.gaussian, locals=tuple(self.joint.gaussian.locals[index] for index in chosen))
         videos = tuple(self.joint.videos[index] for index in chosen)
-        there = replace(self.joint, videos=videos, gaussian=gaussian, alternatives=())
+        joint = replace(self.joint, videos=videos, gaussian=gaussian, log_density=math.nan, alternatives=())
         fits = tuple(self.fits[index] for index in chosen)
         structures = tuple(self.structures[index] for index in chosen)
-        return replace(self, joint=there, fits=fits, structures=structures).under(self.model, model_error=False)
+        return replace(self, joint=joint, fits=fits, structures=structures)
 
     @kept
     def under(

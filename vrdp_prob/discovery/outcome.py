@@ -81,7 +81,7 @@ def outcome_of(found: Search, *, seed: int, progress: ProgressDisplay | None) ->
         left = found.without(list(doubted)) if other is None else other
         left, after_left, further = _without_mimics(left, seed=seed, progress=progress)
         if other is None:
-            if details := _leaving_details(found, doubted, left.best if left.best.causes else left.base):
+            if details := _leaving_details(found, doubted, left.best):
                 cleared.update(details)
                 continue
             reasons += [one for some in doubted.values() for one in some]
@@ -98,8 +98,8 @@ def outcome_of(found: Search, *, seed: int, progress: ProgressDisplay | None) ->
 
 
 def _checks_after(found: Search) -> tuple[Check, ...]:
-    """The checks of the best model; those of the base model where it has no causes."""
-    return found.refits.leavings.checks(found.best if found.best.causes else found.base)
+    """The checks of the best model, which is the base model where it has no causes."""
+    return found.refits.leavings.checks(found.best)
 
 
 def _without_mimics(

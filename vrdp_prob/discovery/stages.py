@@ -13,7 +13,6 @@ from vrdp_prob.discovery.selection.beginning import Beginning
 from vrdp_prob.discovery.selection.believed import extended_model
 from vrdp_prob.discovery.selection.leavings import Leavings
 from vrdp_prob.discovery.selection.search import Search, gain_needed, search
-from vrdp_prob.discovery.selection.some_videos import evenly_spread
 from vrdp_prob.discovery.selection.trials import Trial
 from vrdp_prob.discovery.selection.tried import tried_causes
 from vrdp_prob.discovery.words import title
@@ -25,6 +24,7 @@ from vrdp_prob.models.physics import PhysicsModel
 from vrdp_prob.progress import Advance, ProgressDisplay, SilentProgress
 from vrdp_prob.report.wording import listed
 from vrdp_prob.scene import Tracks
+from vrdp_prob.spread import evenly_spread
 
 
 @dataclass(frozen=True)

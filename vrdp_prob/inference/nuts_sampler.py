@@ -32,6 +32,7 @@ from vrdp_prob.inference.samplers.rate_steps import RateSteps
 from vrdp_prob.inference.samplers.shaping import Shaped, shaped, starting_places
 from vrdp_prob.models.simulator.work import metered, work_sentence
 from vrdp_prob.progress import ProgressDisplay, SilentProgress
+from vrdp_prob.spread import evenly_spread
 
 GROUPS = 2
 """Groups of chains per mode..."""
@@ -227,9 +228,9 @@ def _in_proportion(
     shape = (RESULTS, len(labels), mixture.dimension)
     drawn = _Drawn(np.empty(shape), np.empty(shape), missed)
     for points, where, by_chain, by_time in zip(by_result, regions, drawn.by_chain, drawn.by_time, strict=True):
-        for mode, count in zip(held, wanted, strict=True):
+        for mode, count in zip(held, wanted.tolist(), strict=True):
             chain, time = np.nonzero(where == mode)
-            chosen = np.linspace(0, len(chain) - 1, count).round().astype(int)
+            chosen = evenly_spread(count, len(chain))
             chain, time = chain[chosen], time[chosen]
             by_chain[labels == mode] = points[chain, time]
             earlier = np.argsort(time, kind="stable")

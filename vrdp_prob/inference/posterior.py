@@ -21,6 +21,7 @@ from vrdp_prob.models.physics import PhysicsModel
 from vrdp_prob.models.scenery import Scenery
 from vrdp_prob.models.simulator.worlds import Worlds
 from vrdp_prob.scene import Tracks
+from vrdp_prob.spread import evenly_spread
 
 Kind = TypeVar("Kind", bound="Posterior")
 PairFunction = Callable[[np.ndarray, np.ndarray], np.ndarray]
@@ -86,7 +87,7 @@ class Posterior:
         if count is None or count >= total:
             chosen = np.arange(total)
         elif generator is None:
-            chosen = np.linspace(0, total - 1, count).round().astype(int)
+            chosen = evenly_spread(count, total)
         else:
             chosen = np.sort(generator.choice(total, size=count, replace=False))
         draws = self.data["posterior"].to_dataset().stack(world=("chain", "draw")).isel(world=chosen)

@@ -13,6 +13,7 @@ from vrdp_prob.inference.map_fit import MapFit
 from vrdp_prob.inference.named_draws import flat_draws, named_draws, named_fields
 from vrdp_prob.inference.predictive import drawn_lateness, replicated, replicated_angles
 from vrdp_prob.models.likelihood import Likelihood
+from vrdp_prob.spread import evenly_spread
 
 PRIOR_DRAWS = 500
 PREDICTIVE_DRAWS = 200
@@ -112,7 +113,7 @@ def _predictive(
     """Positions, and angles where some were measured, as they would be measured; NaN before a body's release."""
     draws = points.shape[1]
     per_chain = min(draws, max(1, PREDICTIVE_DRAWS // len(points)))
-    chosen = np.linspace(0, draws - 1, per_chain).round().astype(int)
+    chosen = evenly_spread(per_chain, draws)
     worlds = flat_draws(points[:, chosen])
     axes, sizes = (*SAMPLE, "time", "body"), (len(points), per_chain, *likelihood.tracks.seen.shape)
     late = drawn_lateness(likelihood, worlds, generator)

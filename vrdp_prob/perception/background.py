@@ -12,6 +12,8 @@ import numpy as np
 from jaxtyping import Float, UInt8
 from numpy.polynomial import legendre
 
+from vrdp_prob.spread import evenly_spread
+
 _SAMPLED_FRAMES = 41
 _GRID_STEP = 6
 """Pixels between the points to which the surface is fitted."""
@@ -46,7 +48,7 @@ class Background:
 
 def estimate_background(frames: UInt8[np.ndarray, "frame height width 3"]) -> Background:
     """Estimate the empty floor of a video of a fixed camera."""
-    chosen = np.linspace(0, len(frames) - 1, min(_SAMPLED_FRAMES, len(frames))).round().astype(int)
+    chosen = evenly_spread(min(_SAMPLED_FRAMES, len(frames)), len(frames))
     sample = np.sort(frames[chosen], axis=0)
     median = sample[len(sample) // 2].astype(np.float32)
     surface, spread = _smooth_surface(median)

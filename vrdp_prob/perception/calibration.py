@@ -24,6 +24,7 @@ from vrdp_prob.progress import ProgressDisplay, SilentProgress
 from vrdp_prob.scene.body import Body
 from vrdp_prob.scene.camera import REST_HEIGHT, Camera
 from vrdp_prob.scene.tracks import Tracks
+from vrdp_prob.spread import evenly_spread
 
 _FRAMES_PER_VIDEO = 16
 _SMALLEST_BLOB = 4e-4
@@ -140,7 +141,7 @@ def _read(path: Path, tracks: Tracks, size: PictureSize | None, views: list[View
     if len(usable) == 0:
         raise InputError(f"{path}: no known position falls into the video; check that times and video belong together.")
     background = estimate_background(video.frames)
-    chosen = usable[np.linspace(0, len(usable) - 1, min(_FRAMES_PER_VIDEO, len(usable))).round().astype(int)]
+    chosen = usable[evenly_spread(min(_FRAMES_PER_VIDEO, len(usable)), len(usable))]
     for index in chosen:
         picture = video.frames[frame_of[index]]
         seen = tracks.seen[index]

@@ -11,6 +11,7 @@ from vrdp_prob.perception.placing import Sighting, Track
 from vrdp_prob.perception.region import Window, apparent_radius, paint
 from vrdp_prob.perception.solids import Pose
 from vrdp_prob.perception.tracking import Tracker
+from vrdp_prob.spread import evenly_spread
 
 _MOST_VIEWS = 16
 _LOST = 0.1
@@ -49,7 +50,7 @@ def best_views(tracker: Tracker, tracks: Sequence[Track], track: Track) -> list[
     ranked = sorted(track.sightings, key=lambda frame: -round(track.sightings[frame].visible, 2))
     least = track.sightings[ranked[0]].visible - _LOST
     best = [frame for frame in ranked if track.sightings[frame].visible >= least]
-    places = np.linspace(0, len(best) - 1, min(_MOST_VIEWS, len(best))).round().astype(int)
+    places = evenly_spread(min(_MOST_VIEWS, len(best)), len(best))
     return [_view(tracker, tracks, track, best[place]) for place in places]
 
 

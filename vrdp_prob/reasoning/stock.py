@@ -14,6 +14,7 @@ from vrdp_prob.reasoning.deviations import DeviationModel
 from vrdp_prob.reasoning.posterior_like import PosteriorLike
 from vrdp_prob.reasoning.released import Released
 from vrdp_prob.reasoning.sight import Sight
+from vrdp_prob.spread import evenly_spread
 
 
 class Stock:
@@ -81,7 +82,7 @@ class Stock:
         """Which of all draws are not in the first batch, in random order."""
         total = len(self._everything)
         # as `Posterior.worlds` chooses them
-        first = np.linspace(0, total - 1, len(self._batches[0])).round().astype(int)
+        first = evenly_spread(len(self._batches[0]), total)
         return Seeded(self.posterior.seed).numbers(Purpose.ORDER).permutation(np.setdiff1d(np.arange(total), first))
 
     def _batch(self, drawn: Worlds, number: int) -> Batch:

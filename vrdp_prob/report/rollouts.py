@@ -13,6 +13,7 @@ from vrdp_prob.reasoning.vocabulary import ChangeWord
 from vrdp_prob.reasoning.worlds import PosteriorWorlds
 from vrdp_prob.report.content import FACTUAL, FUTURE, Collisions, PairShare, WorldContent
 from vrdp_prob.scene import Tracks
+from vrdp_prob.spread import evenly_spread
 
 MOST_FRAMES = 500
 """Most moments of a world that travel inside the page; longer recordings are thinned."""
@@ -142,4 +143,4 @@ def measured_course(tracks: Tracks) -> Float[np.ndarray, "time body 2"]:
 
 def _evenly(count: int, wanted: int) -> np.ndarray:
     """Indices of evenly chosen things, the first and the last among them; integers with axis `kept`."""
-    return np.linspace(0, count - 1, min(count, wanted)).round().astype(int)
+    return evenly_spread(min(count, wanted), count)

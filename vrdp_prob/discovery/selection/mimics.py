@@ -8,7 +8,7 @@ of each: of the motion, of the rebound, or of both, by what remains. With many v
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import partial
+from functools import cached_property, partial
 
 import numpy as np
 from jaxtyping import Float
@@ -21,11 +21,11 @@ from vrdp_prob.discovery.checks.measurement import GENERAL
 from vrdp_prob.discovery.finding import Check
 from vrdp_prob.discovery.selection.gains import gain, weights
 from vrdp_prob.discovery.selection.search import FALSE_ALARM, Search
-from vrdp_prob.discovery.selection.some_videos import evenly_spread
 from vrdp_prob.discovery.selection.trials import EACH_PARAMETER, Trial
 from vrdp_prob.inference.runs.parallel import in_processes
 from vrdp_prob.models.effects.effect import Effect
 from vrdp_prob.progress import ProgressDisplay, SilentProgress
+from vrdp_prob.spread import evenly_spread
 
 BELIEVED = 0.5
 """Probability below which a cause is taken to follow something outside the catalogue."""
@@ -117,34 +117,56 @@ class _Models:
 
     Parameters
     ----------
-    best, base
-        That with all causes, and that with none.
-    lesser
-        For each cause: the one without it.
-    overdispersion
-        Factor of each video by which gains are divided: so much less where a video stands for several.
-    asked
-        Number of the videos, if these are not all.
+    found
+        The search.
+    chosen
+        Numbers of the videos; all where None.
     """
 
-    best: Trial
-    base: Trial
-    lesser: tuple[Trial, ...]
-    overdispersion: Float[np.ndarray, "video"]
-    asked: int | None = None
+    found: Search
+    chosen: Sequence[int] | None
 
     @classmethod
     def of(cls, found: Search) -> "_Models":
         """Those of a search; in some of the videos where these are many, unless what happens once in one is asked."""
         videos = len(found.base.fit.fits)
-        if videos <= MOST or any(happens_once(cause) for cause in found.best.causes):
-            return cls(found.best, found.base, found.lesser, found.overdispersion)
-        chosen = evenly_spread(MOST, videos)
-        models = list(dict.fromkeys([found.best, found.base, *found.lesser]))
-        fitted = dict(zip(models, in_processes(partial(Trial.of_some, chosen=chosen), models), strict=True))
-        overdispersion = found.overdispersion[chosen] * MOST / videos
-        lesser = tuple(fitted[one] for one in found.lesser)
-        return cls(fitted[found.best], fitted[found.base], lesser, overdispersion, MOST)
+        all_asked = videos <= MOST or any(happens_once(cause) for cause in found.best.causes)
+        return cls(found, None if all_asked else evenly_spread(MOST, videos).tolist())
+
+    @property
+    def asked(self) -> int | None:
+        """Number of the videos, if these are not all."""
+        return None if self.chosen is None else len(self.chosen)
+
+    @cached_property
+    def best(self) -> Trial:
+        """That with all causes."""
+        return self._fitted([self.found.best])[0]
+
+    @property
+    def base(self) -> Trial:
+        """That with none."""
+        return self._others[self.found.base]
+
+    @property
+    def lesser(self) -> tuple[Trial, ...]:
+        """For each cause: the one without it."""
+        return tuple(self._others[one] for one in self.found.lesser)
+
+    @cached_property
+    def overdispersion(self) -> Float[np.ndarray, "video"]:
+        """Factor of each video by which gains are divided: so much less where a video stands for several."""
+        of_all = self.found.overdispersion
+        return of_all if self.chosen is None else of_all[list(self.chosen)] * len(self.chosen) / len(of_all)
+
+    @cached_property
+    def _others(self) -> dict[Trial, Trial]:
+        """By those that the search has fitted: these without some cause, of which most searches ask none."""
+        models = list(dict.fromkeys([self.found.base, *self.found.lesser]))
+        return dict(zip(models, self._fitted(models), strict=True))
+
+    def _fitted(self, models: Sequence[Trial]) -> Sequence[Trial]:
+        return models if self.chosen is None else in_processes(partial(Trial.of_some, chosen=self.chosen), models)
 
     def merit(self, trial: Trial) -> float:
         """By how much (nats) a model with laws is more probable than the best one without."""

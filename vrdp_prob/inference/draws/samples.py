@@ -11,6 +11,7 @@ from torch import Tensor
 
 from vrdp_prob.inference.draws.diagnostics import Reported, Statistics, chain_statistics
 from vrdp_prob.inference.draws.triangles import lower_root
+from vrdp_prob.spread import evenly_spread
 
 R_HAT_GOAL = 1.01
 ESS_GOAL = 400.0
@@ -144,7 +145,7 @@ class Samples:
         """About `draws` draws, evenly spaced within the chains."""
         chains, length = self.points.shape[:2]
         per_chain = min(length, max(1, -(-draws // chains)))
-        chosen = np.linspace(0, length - 1, per_chain).round().astype(int)
+        chosen = evenly_spread(per_chain, length)
         return replace(
             self,
             points=self.points[:, chosen],

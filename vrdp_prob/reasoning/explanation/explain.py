@@ -21,6 +21,7 @@ from vrdp_prob.reasoning.run import World
 from vrdp_prob.reasoning.verdict import YES, Verdict, verdicts
 from vrdp_prob.reasoning.worlds import PosteriorWorlds
 from vrdp_prob.scene.naming import names
+from vrdp_prob.spread import evenly_spread
 
 UNCERTAIN = 0.2
 """Entropy in nats from which on an answer is explained: a choice at 0.95, say."""
@@ -56,7 +57,7 @@ def explain(facts: Facts, asked: PreparedQuestion) -> Explanation:
 def _part(facts: Facts, asked: PreparedQuestion, place: int, verdict: Verdict, twins: Twins | None) -> Part:
     valid = np.flatnonzero(verdict.valid)
     everything = verdict.codes[valid]
-    chosen = valid[np.linspace(0, len(valid) - 1, min(len(valid), MOST_DRAWS)).round().astype(int)]
+    chosen = valid[evenly_spread(min(len(valid), MOST_DRAWS), len(valid))]
     codes, worlds = verdict.codes[chosen], sorted(verdict.run.looked_at, key=str)
     wanted = YES if asked.options else int(np.bincount(everything).argmax())
     generator = Seeded(facts.posterior.seed if isinstance(facts, PosteriorWorlds) else 0, place).numbers(

@@ -22,6 +22,7 @@ from vrdp_prob.discovery.selection import leavings as leavings_module
 from vrdp_prob.discovery.selection.doubts import (
     OWN_CHECKS,
     Doubt,
+    Without,
     causes_with_own_check_failing,
     details_left,
     doubts,
@@ -106,15 +107,28 @@ def test_what_is_left_of_what_a_cause_nearly_explains_is_details_of_its_law(
 ) -> None:
     """A strength that differs from body to body, say; but what happens once may have happened again."""
     found, without = ([one for pair in some.items() for one in left(*pair)] for some in (after, before))
-    assert bool(list(doubts(trial, cause, found, without=lambda: without))) is is_doubted
+    assert bool(list(doubts(trial, cause, found, without=lambda: Without(without)))) is is_doubted
     assert len(list(details_left([cause], found))) == 1
 
 
 def test_what_a_cause_takes_away_is_weighed_where_both_p_values_are_below_any_number(trial: Trial) -> None:
     """As of many videos, where even details of a law are beyond doubt."""
     without, details = (Check(RUBBING, 1.0, 0.0, False, "", log_p_value=nats) for nats in (-50_000.0, -2_000.0))
-    assert not list(doubts(trial, ContactFriction(), [details], without=lambda: [without]))
-    assert list(doubts(trial, ContactFriction(), [without], without=lambda: [details]))
+    assert not list(doubts(trial, ContactFriction(), [details], without=lambda: Without([without])))
+    assert list(doubts(trial, ContactFriction(), [without], without=lambda: Without([details])))
+
+
+def test_what_a_cause_takes_away_is_weighed_in_units_of_one_noise(trial: Trial) -> None:
+    """Without a cause that moves bodies by ten times the noise, a fit believes in as much more noise."""
+    without, details = (Check(RUBBING, 1.0, 0.0, False, "", log_p_value=nats) for nats in (-600.0, -200.0))
+    assert list(doubts(trial, ContactFriction(), [details], without=lambda: Without([without])))
+    assert not list(doubts(trial, ContactFriction(), [details], without=lambda: Without([without], noise=0.1)))
+
+
+def test_a_test_of_scatter_tells_the_same_whatever_the_noise(trial: Trial) -> None:
+    before, after = left(REBOUND, 1e-10), left(REBOUND, 1e-3)
+    cause = SpeedDependentRestitution()
+    assert list(doubts(trial, cause, after, without=lambda: Without(before, noise=0.1)))
 
 
 def test_a_cause_whose_own_checks_are_mended_leaves_no_details() -> None:
@@ -128,7 +142,7 @@ def test_own_checks_are_asked_of_the_model_without_the_very_cause_fitted_to_its_
     checks = {RUBBING: left(RUBBING, 1e-97), KICK: left(KICK, 1e-97)}
 
     def model(left_of_it: list[Check]) -> Mock:
-        return create_autospec(Trial, instance=True, fit=Mock(left=left_of_it, fits=()))
+        return create_autospec(Trial, instance=True, noise=1.0, fit=Mock(left=left_of_it, fits=()))
 
     def lesser(name: str) -> Mock:
         one = create_autospec(Trial, instance=True)
@@ -163,11 +177,12 @@ def test_checks_and_causes_go_by_their_names(trial: Trial) -> None:
 
 def test_what_is_left_without_a_cause_may_clear_it(trial: Trial) -> None:
     """A fit without it that has lost its videos sees p = 1e-20; one that has found them sees what it is worth."""
-    best, rough, well = trial, *(create_autospec(Trial, instance=True) for _ in range(2))
+    best, rough, well = trial, *(create_autospec(Trial, instance=True, noise=1.0) for _ in range(2))
     checks = {best: left(RUBBING, 7e-4), rough: left(RUBBING, 1e-20), well: left(RUBBING, 1e-50)}
     found = create_autospec(Search, instance=True, best=best, refits=Mock())
     found.refits.leavings.own = lambda model, _cause: checks[model]
-    assert list(doubts(trial, ContactFriction(), checks[best], without=lambda: checks[rough]))
+    found.refits.leavings.at_the_end = lambda model: model
+    assert list(doubts(trial, ContactFriction(), checks[best], without=lambda: Without(checks[rough])))
     assert outcome._leaving_details(found, [ContactFriction()], well) == [ContactFriction()]
     assert outcome._leaving_details(found, [ContactFriction()], rough) == []
 

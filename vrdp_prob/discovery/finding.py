@@ -218,7 +218,8 @@ class Check:
     rival
         What else would leave the same, in a sentence; empty where nothing is known that would, or the videos tell.
     log_p_value
-        Natural logarithm of the p-value where that may be smaller than any number of the machine; else None.
+        Natural logarithm of the p-value of a test in units of the noise, which may be smaller than any number of the
+        machine; else None.
     """
 
     name: str
@@ -233,6 +234,10 @@ class Check:
     def nats(self) -> float:
         """What it tells against the model, by its p-value."""
         return -(math.log(max(self.p_value, sys.float_info.min)) if self.log_p_value is None else self.log_p_value)
+
+    def nats_with_noise(self, share: float) -> float:
+        """What it would tell if the model believed in a share of its noise; as much of a test that asks for none."""
+        return self.nats if self.log_p_value is None else self.nats / share**2
 
 
 @dataclass(frozen=True)

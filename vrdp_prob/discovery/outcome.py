@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Float
 
 from vrdp_prob.discovery.finding import Check, FoundCause, Gain, Verdict
-from vrdp_prob.discovery.selection.doubts import Doubt, doubts, with_doubts
+from vrdp_prob.discovery.selection.doubts import Doubt, Without, doubts, with_doubts
 from vrdp_prob.discovery.selection.estimates import cause_sentence, estimates
 from vrdp_prob.discovery.selection.forecast import error_ratios
 from vrdp_prob.discovery.selection.gains import gain, gains, weights
@@ -120,7 +120,7 @@ def _doubted(found: Search) -> dict[Effect, tuple[Doubt, ...]]:
     leavings, best = found.refits.leavings, found.best
     reasons = {}
     for cause, lesser in zip(best.causes, found.lesser, strict=True):
-        without = partial(leavings.own_at_the_end, lesser, cause)
+        without = partial(_without, found, lesser, cause)
         reasons[cause] = tuple(doubts(best, cause, leavings.own(best, cause), without=without))
     return {cause: some for cause, some in reasons.items() if some}
 
@@ -130,12 +130,19 @@ def _leaving_details(found: Search, doubted: Iterable[Effect], without: Trial) -
 
     The one without a cause is fitted roughly when that is doubted, and sees little through what lost videos leave.
     """
-    own, best = found.refits.leavings.own, found.best
+    leavings, best = found.refits.leavings, found.best
     return [
         cause
         for cause in doubted
-        if not any(doubts(best, cause, own(best, cause), without=partial(own, without, cause)))
+        if not any(doubts(best, cause, leavings.own(best, cause), without=partial(_without, found, without, cause)))
     ]
+
+
+def _without(found: Search, lesser: Trial, cause: Effect) -> Without:
+    """What the best model leaves without a cause, of what that does."""
+    leavings = found.refits.leavings
+    ended = leavings.at_the_end(lesser)
+    return Without(leavings.own(ended, cause), found.best.noise / ended.noise)
 
 
 def _credible(trial: Trial) -> bool:

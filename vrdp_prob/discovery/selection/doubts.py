@@ -67,12 +67,33 @@ class Doubt:
     sentence: str
 
 
+@dataclass(frozen=True)
+class Without:
+    """What a model leaves without a cause.
+
+    Parameters
+    ----------
+    checks
+        Its checks.
+    noise
+        The noise that the model with the cause believes in, in units of that of this one: residuals that no cause
+        explains are noise to a model, in units of which they tell less.
+    """
+
+    checks: Sequence[Check] = ()
+    noise: float = 1.0
+
+    def tells(self) -> dict[str, float]:
+        """Nats by the names of the checks, in units of the noise of the model with the cause."""
+        return {one.name: one.nats_with_noise(self.noise) for one in self.checks}
+
+
 def doubts(
     trial: Trial,
     cause: Effect,
     left: Sequence[Check] = (),
     *,
-    without: Callable[[], Sequence[Check]] = tuple,
+    without: Callable[[], Without] = Without,
 ) -> Iterator[Doubt]:
     """Reasons to doubt a cause of a model.
 
@@ -85,8 +106,8 @@ def doubts(
     left
         Checks of what the model leaves.
     without
-        Makes the checks of what it leaves without the cause, which are asked for where one fails of a cause that lasts.
-        Without any of them what fails still is no detail.
+        Finds what it leaves without the cause, which is asked for where a check fails of one that lasts. Without any of
+        its checks what fails still is no detail.
     """
     of_parameters = surprise(trial.fit, cause)
     if of_parameters < SURPRISING:
@@ -123,9 +144,9 @@ def _own(cause: Effect, left: Sequence[Check]) -> tuple[list[Check], float]:
     return own, len(own) * own[0].p_value if own else 1.0
 
 
-def _nearly_explained(own: Sequence[Check], without: Sequence[Check]) -> bool:
+def _nearly_explained(own: Sequence[Check], without: Without) -> bool:
     """Whether a cause takes away nearly all that each of its checks which fail still tells without it."""
-    before = {one.name: one.nats for one in without}
+    before = without.tells()
     failing = [one for one in own if len(own) * one.p_value < SURPRISING]
     return all(one.nats <= (1 - NEARLY_ALL) * before.get(one.name, 0.0) for one in failing)
 

@@ -100,11 +100,11 @@ class Leavings:
         """
         return self.checks(trial) if happens_once(cause) else self.checks_of_trusted(trial)
 
-    def own_at_the_end(self, trial: Trial, cause: Effect) -> tuple[Check, ...]:
-        """The same of a model whose fit was not followed to its end, since it is worse in any case."""
+    def at_the_end(self, trial: Trial) -> Trial:
+        """A model whose fit was not followed to its end, since it is worse in any case, at its end."""
         if trial not in self._ended:
             self._ended[trial] = trial.continued()
-        return self.own(self._ended[trial], cause)
+        return self._ended[trial]
 
     def something(self, trial: Trial) -> bool:
         """Whether a model leaves what chance explains less well than some cause may."""

@@ -30,7 +30,7 @@ from vrdp_prob.inference.several_videos.second_look import (
 from vrdp_prob.models.effects.effect import Effect
 from vrdp_prob.models.parameters import Parameter, Scope
 from vrdp_prob.models.physics import PhysicsModel
-from vrdp_prob.models.unknowns import Held, Owned
+from vrdp_prob.models.unknowns import NOISE, Held, Owned
 
 EACH_PARAMETER = 1.0
 """Nats by which a cause is believed less for each of its parameters.
@@ -127,6 +127,12 @@ class Trial:
         """What a model would bring (nats) that explains all lost videos, where all that this one leaves is noise."""
         lost = [self.fit.fits[index] for index in lost_videos(self.fit.fits)]
         return sum(2.0 * float(one.clues.tracks.seen.sum()) * math.log(one.misfit.ratio) for one in lost)
+
+    @property
+    def noise(self) -> float:
+        """Scale of the noise that all videos share; 1 where they share none."""
+        shared = self.fit.value(NOISE)
+        return 1.0 if shared is None else shared
 
     @property
     def log_prior(self) -> float:
@@ -332,13 +338,16 @@ class Trial:
         return self if fit is self.fit else replace(self, fit=fit)
 
     def without(self, *causes: Effect) -> "Trial":
-        """The fit without some of its causes."""
+        """The fit without some of its causes, to which the videos' own numbers follow before those that they share.
+
+        Without a law that all follow, nothing that they share can be read from where they are.
+        """
         model, gone = self.fit.model, {cause.name for cause in causes}
         for cause in causes:
             model = model.without_effect(cause)
         left = self.with_stated_population(model)
         choices = {name: one for name, one in self.choices.items() if name not in gone}
-        fit = self.fit.under(left, held=self._held_without(*causes), effort=FIRST, model_error=False)
+        fit = self.fit.under(left, held=self._held_without(*causes), least=-math.inf, effort=FIRST, model_error=False)
         kept = tuple(one for one in self.causes if one.name not in gone)
         return replace(self, causes=kept, fit=with_own_population(fit), choices=choices)
 

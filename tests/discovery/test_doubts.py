@@ -111,6 +111,16 @@ def test_what_is_left_of_what_a_cause_nearly_explains_is_details_of_its_law(
     assert len(list(details_left([cause], found))) == 1
 
 
+def test_a_cause_is_doubted_that_acts_the_other_way_about_than_its_law(
+    trial: Trial, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A restitution that grows with the speed stands for contacts that stick where they are slow, say."""
+    monkeypatch.setattr(doubts_module, "has_sign_of_law", lambda *_given: 0.004)
+    (doubt,) = doubts(trial, SpeedDependentRestitution())
+    assert doubt.credible == pytest.approx(0.4)
+    assert "the sign that its law does not have" in doubt.sentence
+
+
 def test_what_a_cause_takes_away_is_weighed_where_both_p_values_are_below_any_number(trial: Trial) -> None:
     """As of many videos, where even details of a law are beyond doubt."""
     without, details = (Check(RUBBING, 1.0, 0.0, False, "", log_p_value=nats) for nats in (-50_000.0, -2_000.0))

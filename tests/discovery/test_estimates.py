@@ -6,11 +6,18 @@ from typing import ClassVar
 
 import numpy as np
 import pytest
+from scipy.stats import norm
 
 from tests.discovery.fitted import fitted
 from vrdp_prob.discovery.finding import Estimate
 from vrdp_prob.discovery.selection import estimates as module
-from vrdp_prob.discovery.selection.estimates import cause_sentence, estimates, mass_scale_notes, surprise
+from vrdp_prob.discovery.selection.estimates import (
+    cause_sentence,
+    estimates,
+    has_sign_of_law,
+    mass_scale_notes,
+    surprise,
+)
 from vrdp_prob.discovery.selection.reach import Reach
 from vrdp_prob.models.effects.air_drag import AirDrag
 from vrdp_prob.models.effects.body_friction import BodyFriction
@@ -88,6 +95,31 @@ def test_a_strength_may_surprise_but_not_a_place() -> None:
     assert surprise(fit, AirDrag()) == 1.0
     assert surprise(fit, _Placed()) < 1e-6
     assert surprise(fit, _Beside()) == 1.0
+
+
+class _Falling(Effect):
+    """The air drag with a law that speeds bodies up."""
+
+    name: ClassVar = "falling"
+    vanishes_at: ClassVar = {AIR_DRAG.name: 0.0}
+    sign_of_law: ClassVar = -1
+    parameters: ClassVar = (AIR_DRAG,)
+
+
+class _Rising(_Falling):
+    """The air drag with its law."""
+
+    name: ClassVar = "rising"
+    sign_of_law: ClassVar = +1
+
+
+def test_a_strength_may_have_the_sign_that_its_law_has_not() -> None:
+    _, fit = fitted(seed=1)
+    drag = estimates(fit, AirDrag())[AIR_DRAG.name]
+    right, wrong = has_sign_of_law(fit, _Rising()), has_sign_of_law(fit, _Falling())
+    assert right == pytest.approx(norm.cdf(drag.mean / drag.sd))
+    assert right + wrong == pytest.approx(1.0)
+    assert has_sign_of_law(fit, AirDrag()) == 1.0
 
 
 @pytest.mark.parametrize(("far", "high"), [(0.9, 1.8), (0.01, 1.2)], ids=["farther", "nearer"])

@@ -14,7 +14,7 @@ from vrdp_prob.discovery.checks.contacts import DISTANCE, DURATION, REBOUND_AT_W
 from vrdp_prob.discovery.checks.kicks import KICK
 from vrdp_prob.discovery.checks.measurement import DISTORTION
 from vrdp_prob.discovery.finding import Check
-from vrdp_prob.discovery.selection.estimates import surprise
+from vrdp_prob.discovery.selection.estimates import has_sign_of_law, surprise
 from vrdp_prob.discovery.selection.trials import Trial
 from vrdp_prob.discovery.words import title
 from vrdp_prob.models.effects.clock_error import ClockError
@@ -115,6 +115,13 @@ def doubts(
             of_parameters / SURPRISING,
             f"The parameters of '{title(cause.name)}' are far from what was expected of this cause: it may stand for "
             "something that it has as its limit, and its probability counts that.",
+        )
+    of_sign = has_sign_of_law(trial.fit, cause, trial.unexplained)
+    if of_sign < SURPRISING:
+        yield Doubt(
+            of_sign / SURPRISING,
+            f"The strength of '{title(cause.name)}' has the sign that its law does not have: something else acts as it "
+            "would the other way about, and its probability counts that.",
         )
     own, by_chance = _own(cause, left)
     if by_chance < SURPRISING and (happens_once(cause) or not _nearly_explained(own, without())):

@@ -5,6 +5,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 import numpy as np
 from jaxtyping import Float
+from scipy.special import ndtr
 from scipy.stats import chi2
 
 from vrdp_prob.discovery.candidates.scores import CauseScore, Largest, telling_rows
@@ -191,6 +192,25 @@ def surprise(fit: SharedFit, effect: Effect) -> float:
     ]
     squares = sum(((float(mean) - prior.mean) / prior.sd) ** 2 for prior, mean in found)
     return float(chi2.sf(squares, len(found))) if found else 1.0
+
+
+def has_sign_of_law(fit: SharedFit, effect: Effect, unexplained: Unexplained | None = None) -> float:
+    """Probability that the strength of an effect has the sign of its law; 1 where it may have either or none.
+
+    Parameters
+    ----------
+    fit
+        Fit of a model with the effect.
+    effect
+        The effect.
+    unexplained
+        What the fit leaves to chance, which widens what is known.
+    """
+    if effect.sign_of_law is None:
+        return 1.0
+    found = estimates(fit, effect, unexplained=unexplained)
+    strength = next((found[name] for name in effect.vanishes_at if name in found), None)
+    return 1.0 if strength is None else float(ndtr(effect.sign_of_law * strength.mean / strength.sd))
 
 
 def cause_sentence(effect: Effect, found: Mapping[str, Estimate]) -> str:

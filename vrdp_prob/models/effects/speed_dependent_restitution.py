@@ -43,6 +43,7 @@ class SpeedDependentRestitution(Effect):
         "The faster two bodies meet, the smaller the share of the speed with which they part.",
         "The faster two bodies meet, the larger the share of the speed with which they part.",
     )
+    sign_of_law: ClassVar = +1
     law: ClassVar = "e = r1 r2 (1 + v_n / restitution_speed)^-restitution_exponent, at most 1"
     source: ClassVar = (
         "Johnson, Contact Mechanics (1985), section 11.5: e falls as v^(-1/4) where bodies yield plastically"

@@ -152,7 +152,7 @@ def test_own_checks_are_asked_of_the_model_without_the_very_cause_fitted_to_its_
     checks = {RUBBING: left(RUBBING, 1e-97), KICK: left(KICK, 1e-97)}
 
     def model(left_of_it: list[Check]) -> Mock:
-        return create_autospec(Trial, instance=True, noise=1.0, fit=Mock(left=left_of_it, fits=()))
+        return create_autospec(Trial, instance=True, noise=1.0, unexplained=None, fit=Mock(left=left_of_it, fits=()))
 
     def lesser(name: str) -> Mock:
         one = create_autospec(Trial, instance=True)
@@ -171,7 +171,8 @@ def test_own_checks_are_asked_of_the_model_without_the_very_cause_fitted_to_its_
     found.refits = Mock(leavings=Leavings((), 0))
     monkeypatch.setattr(leavings_module, "run_checks", made)
     monkeypatch.setattr(leavings_module, "trusted", lambda fits: np.ones(len(fits), dtype=bool))
-    monkeypatch.setattr(doubts_module, "surprise", lambda _fit, _cause: 1.0)
+    for asked_of_parameters in ("surprise", "has_sign_of_law"):
+        monkeypatch.setattr(doubts_module, asked_of_parameters, lambda *_given: 1.0)
     for _ in range(2):  # asked again, the fit is not made again
         assert list(outcome._doubted(found)) == [kick]
     assert asked == [best.fit.left, checks[RUBBING]]

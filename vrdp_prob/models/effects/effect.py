@@ -122,7 +122,7 @@ class Effect:
     signed_sentences: ClassVar[tuple[str, str] | None] = None
     """The sentence where the strength, the one parameter in `vanishes_at`, is positive, and where it is negative."""
     sign_of_law: ClassVar[int | None] = None
-    """Sign that the strength, the one parameter in `vanishes_at`, has by its law: the other one tells of another law."""
+    """Sign of its one strength where that tells of something else with the other one; None where its law has both."""
     law: ClassVar[str]
     """The law as text, for reports and model files."""
     source: ClassVar[str]

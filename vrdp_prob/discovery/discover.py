@@ -14,7 +14,7 @@ from vrdp_prob.discovery.outcome import noise_of
 from vrdp_prob.discovery.page.figures import residual_figures
 from vrdp_prob.discovery.residuals.free_flight import NORMAL_95
 from vrdp_prob.discovery.selection.believed import extended_model, models_of_the_others
-from vrdp_prob.discovery.selection.doubts import Doubt, details_left, rivals_outside
+from vrdp_prob.discovery.selection.doubts import details_left, rivals_outside
 from vrdp_prob.discovery.selection.estimates import mass_scale_notes, upper_bounds
 from vrdp_prob.discovery.selection.mimics import Unlisted
 from vrdp_prob.discovery.selection.search import Search
@@ -272,7 +272,7 @@ def _without_strengths(bounds: Sequence[UpperBound]) -> list[UpperBound]:
 def _notes(
     found: Search,
     causes: Sequence[FoundCause],
-    doubted: Sequence[Doubt],
+    doubted: Sequence[str],
     unlisted: Sequence[Unlisted],
     *,
     doubtful: bool,
@@ -289,7 +289,7 @@ def _notes(
         notes.append(
             "The joint fit ended before it had converged: some video is at the edge between two courses of events."
         )
-    notes += [one.sentence for one in doubted]
+    notes += doubted
     largest = found.best.unexplained.accelerated
     if largest:
         sizes = [f"{one.size:.2g}" for one in sorted(largest, key=lambda one: one.size)]

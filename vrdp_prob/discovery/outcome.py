@@ -1,6 +1,6 @@
 """What a search for causes has found, and what is believed of it: doubts, probabilities and the verdict."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Float
 
 from vrdp_prob.discovery.finding import Check, FoundCause, Gain, Verdict
-from vrdp_prob.discovery.selection.doubts import Doubt, Without, doubts, with_doubts
+from vrdp_prob.discovery.selection.doubts import Doubt, Without, doubts, unasked_turns, with_doubts
 from vrdp_prob.discovery.selection.estimates import cause_sentence, estimates
 from vrdp_prob.discovery.selection.forecast import error_ratios
 from vrdp_prob.discovery.selection.gains import gain, gains, weights
@@ -46,7 +46,7 @@ class Outcome:
     gain
         Of the best model over the one that was given; None where it has no causes.
     reasons, unlisted
-        Why causes are doubted, and what outside the catalogue explains others away.
+        Why causes are doubted, in sentences, and what outside the catalogue explains others away.
     """
 
     found: Search
@@ -55,17 +55,19 @@ class Outcome:
     verdict: Verdict
     causes: tuple[FoundCause, ...]
     gain: Gain | None
-    reasons: tuple[Doubt, ...]
+    reasons: tuple[str, ...]
     unlisted: tuple[Unlisted, ...]
 
 
-def outcome_of(found: Search, *, seed: int, progress: ProgressDisplay | None) -> Outcome:
+def outcome_of(found: Search, *, asked: Collection[str], seed: int, progress: ProgressDisplay | None) -> Outcome:
     """Put the causes that a search has found in doubt, and say what is believed of them.
 
     Parameters
     ----------
     found
         The search.
+    asked
+        Names of the causes that are looked for, in some videos at least.
     seed
         Seed of all randomness.
     progress
@@ -74,7 +76,7 @@ def outcome_of(found: Search, *, seed: int, progress: ProgressDisplay | None) ->
     checks = found.refits.leavings.checks(found.base)
     found, after, unlisted = _without_mimics(found, seed=seed, progress=progress)
     not_named: list[FoundCause] = []
-    reasons: list[Doubt] = []
+    reasons: list[str] = []
     cleared: set[Effect] = set()
     while doubted := {cause: some for cause, some in _doubted(found).items() if cause not in cleared}:
         other = next((one for cause in doubted if (one := found.with_rival(cause, _credible)) is not None), None)
@@ -84,10 +86,11 @@ def outcome_of(found: Search, *, seed: int, progress: ProgressDisplay | None) ->
             if details := _leaving_details(found, doubted, left.best):
                 cleared.update(details)
                 continue
-            reasons += [one for some in doubted.values() for one in some]
+            reasons += [one.sentence for some in doubted.values() for one in some]
         not_named += [one for one in _causes(found, doubted, seed) if not one.named]
         found, after = left, after_left
         unlisted += further
+    reasons += unasked_turns(found.best, asked)
     verdict = Verdict.UNKNOWN if unlisted or reasons else _verdict(found, checks, after)
     causes = _in_order([*_causes(found, {}, seed), *not_named])
     if verdict is Verdict.UNKNOWN:

@@ -165,7 +165,7 @@ class Stages:
 
     def _believed(self, found: Search) -> Outcome:
         """What is believed of what is found."""
-        return outcome_of(found, seed=self.seed, progress=self.progress)
+        return outcome_of(found, asked=set(_cause_names(self.catalogue)), seed=self.seed, progress=self.progress)
 
     @property
     def _needed(self) -> float:

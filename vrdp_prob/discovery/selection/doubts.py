@@ -1,7 +1,7 @@
 """Reasons to doubt that what was found is the cause that it is called."""
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -23,11 +23,14 @@ from vrdp_prob.models.effects.contact_radius_error import ContactRadiusError
 from vrdp_prob.models.effects.dropped_frames import DroppedFrames
 from vrdp_prob.models.effects.effect import Effect
 from vrdp_prob.models.effects.external_impulse import ExternalImpulse
+from vrdp_prob.models.effects.hidden_obstacle import HiddenObstacle
 from vrdp_prob.models.effects.irregular_frames import IrregularFrames
 from vrdp_prob.models.effects.lens_distortion import LensDistortion
 from vrdp_prob.models.effects.mass_dependent_friction import MassDependentFriction
 from vrdp_prob.models.effects.material_friction import MaterialFriction
 from vrdp_prob.models.effects.speed_dependent_restitution import SpeedDependentRestitution
+from vrdp_prob.models.effects.wall import Wall
+from vrdp_prob.report.wording import listed
 
 SURPRISING = 0.01
 """Probability below which parameters of a cause, or what is left of what it acts on, say that it is something else."""
@@ -47,6 +50,8 @@ OWN_CHECKS: Mapping[str, tuple[str, ...]] = {
     MaterialFriction.name: (friction_against("material"),),
 }
 """By the name of a cause: the checks that ask for what it does, and for nothing else."""
+TURNED_ONCE = (Wall.name, HiddenObstacle.name, ExternalImpulse.name)
+"""Causes that leave the same where but one body is turned, and but once."""
 HELD_BY_BODIES = frozenset({SpeedDependentRestitution.name, MassDependentFriction.name, MaterialFriction.name})
 """Causes of which most lies in numbers that bodies have of their own anyway, so that residuals hardly show them."""
 
@@ -131,6 +136,24 @@ def doubts(
             f"With '{title(cause.name)}' the check of {own[0].name} fails still, which asks for just what this cause "
             f"does: its law is another one{otherwise}, and its probability counts that.",
         )
+
+
+def unasked_turns(trial: Trial, asked: Collection[str]) -> Iterator[str]:
+    """What else may have turned a body once, of which nobody asked, in sentences.
+
+    Parameters
+    ----------
+    trial
+        A model.
+    asked
+        Names of the causes that are looked for.
+    """
+    others = listed(f"'{title(name)}'" for name in TURNED_ONCE if name not in asked)
+    for cause in trial.causes:
+        if others and cause.cause_name() in TURNED_ONCE and trial.turns(cause) == 1:
+            yield (
+                f"'{title(cause.name)}' turns one body once, as another cause would that was not looked for: {others}."
+            )
 
 
 def details_left(causes: Iterable[Effect], left: Sequence[Check]) -> Iterator[str]:

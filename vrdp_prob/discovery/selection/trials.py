@@ -30,6 +30,7 @@ from vrdp_prob.inference.several_videos.second_look import (
 from vrdp_prob.models.effects.effect import Effect
 from vrdp_prob.models.parameters import Parameter, Scope
 from vrdp_prob.models.physics import PhysicsModel
+from vrdp_prob.models.simulator.events import RolloutEventKind
 from vrdp_prob.models.unknowns import NOISE, Held, Owned
 
 EACH_PARAMETER = 1.0
@@ -281,6 +282,15 @@ class Trial:
     def acting(self, cause: Effect) -> list[int]:
         """Videos on which a cause acts that happens once."""
         return [int(video) for video in np.flatnonzero(self.choices[cause.name])]
+
+    def turns(self, cause: Effect) -> int:
+        """How often bodies are turned by a cause that kicks them once, or that puts something in their way."""
+        if happens_once(cause):
+            return len(self.acting(cause))
+        restitutions = self.fit.model.obstacle_restitutions
+        its_own = [restitutions.index(name) for name in cause.obstacle_restitutions]
+        met = [part.rollout.events.of_kind(RolloutEventKind.OBSTACLE).second for part in self.fit.fits]
+        return sum(int(np.isin(some, its_own).sum()) for some in met)
 
     def patches(self, cause: Effect) -> bool:
         """Whether a cause mends the fit of videos and explains none of them.

@@ -21,23 +21,28 @@ from vrdp_prob.discovery.selection import doubts as doubts_module
 from vrdp_prob.discovery.selection import leavings as leavings_module
 from vrdp_prob.discovery.selection.doubts import (
     OWN_CHECKS,
+    TURNED_ONCE,
     Doubt,
     Without,
     causes_with_own_check_failing,
     details_left,
     doubts,
+    unasked_turns,
     with_doubts,
 )
 from vrdp_prob.discovery.selection.leavings import Leavings
 from vrdp_prob.discovery.selection.search import Search
 from vrdp_prob.discovery.selection.trials import Trial
+from vrdp_prob.discovery.words import title
 from vrdp_prob.inference.several_videos.fitting import SharedFit
 from vrdp_prob.models.effects.contact_friction import ContactFriction
 from vrdp_prob.models.effects.effect import Effect
 from vrdp_prob.models.effects.external_impulse import ExternalImpulse
+from vrdp_prob.models.effects.hidden_obstacle import SecondHiddenObstacle
 from vrdp_prob.models.effects.linear_drag import LinearDrag
 from vrdp_prob.models.effects.speed_dependent_restitution import SpeedDependentRestitution
 from vrdp_prob.models.effects.surface_tilt import SurfaceTilt
+from vrdp_prob.models.effects.wall import Wall
 from vrdp_prob.models.model_file import known_effects
 
 
@@ -139,6 +144,19 @@ def test_a_test_of_scatter_tells_the_same_whatever_the_noise(trial: Trial) -> No
     before, after = left(REBOUND, 1e-10), left(REBOUND, 1e-3)
     cause = SpeedDependentRestitution()
     assert list(doubts(trial, cause, after, without=lambda: Without(before, noise=0.1)))
+
+
+@pytest.mark.parametrize("cause", [Wall(), SecondHiddenObstacle(), ExternalImpulse()])
+def test_what_turns_one_body_once_may_be_what_nobody_asked_for(cause: Effect) -> None:
+    trial = create_autospec(Trial, instance=True, causes=(SurfaceTilt(), cause))
+    asked = {cause.cause_name(), "surface_tilt"}
+    trial.turns.return_value = 1
+    (sentence,) = unasked_turns(trial, asked)
+    others = {title(name) for name in known_effects() if name in TURNED_ONCE and name != cause.cause_name()}
+    assert all(f"'{other}'" in sentence for other in others)
+    assert not list(unasked_turns(trial, {*asked, *TURNED_ONCE}))
+    trial.turns.return_value = 2
+    assert not list(unasked_turns(trial, asked))
 
 
 def test_a_cause_whose_own_checks_are_mended_leaves_no_details() -> None:

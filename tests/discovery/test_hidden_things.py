@@ -138,6 +138,7 @@ def test_a_disc_in_the_place_of_the_kick_explains_the_videos_as_well(kicked: Tri
     assert best.names == ("hidden_obstacle",)
     assert not any(name.startswith("impulse") for one in best.fit.structures for name, _ in one.held)
     assert best.log_density.sum() > kicked.log_density.sum() - 15
+    assert best.turns(HiddenObstacle()) == kicked.turns(ExternalImpulse()) == 1
 
 
 def test_a_disc_takes_the_place_of_kicks_beside_a_later_cause(kicked: Trial) -> None:

@@ -148,11 +148,12 @@ def unasked_turns(trial: Trial, asked: Collection[str]) -> Iterator[str]:
     asked
         Names of the causes that are looked for.
     """
-    others = listed(f"'{title(name)}'" for name in TURNED_ONCE if name not in asked)
+    others = [f"'{title(name)}'" for name in TURNED_ONCE if name not in asked]
     for cause in trial.causes:
         if others and cause.cause_name() in TURNED_ONCE and trial.turns(cause) == 1:
             yield (
-                f"'{title(cause.name)}' turns one body once, as another cause would that was not looked for: {others}."
+                f"'{title(cause.name)}' turns one body once, as another cause would that was not looked for: "
+                f"{listed(others)}."
             )
 
 

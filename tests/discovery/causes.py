@@ -157,6 +157,11 @@ def contact_friction(videos: Videos, strength: float, generator: np.random.Gener
     return governed(videos, contact_friction=strength)
 
 
+def springing_contacts(videos: Videos, strength: float, generator: np.random.Generator) -> Videos:
+    """Strength: friction coefficient of contacts that spring back across by 0.6 of their sliding where they stick."""
+    return governed(videos, contact_friction=strength, tangential_restitution=0.6)
+
+
 def speed_dependent_restitution(videos: Videos, strength: float, generator: np.random.Generator) -> Videos:
     """Strength: power with which restitution falls."""
     return governed(videos, restitution_power=strength, restitution_speed=0.5)
@@ -261,6 +266,7 @@ VARIANTS: dict[str, Cause] = {
         "hidden_obstacle", obstacle_met_often, "m", places.LARGEST_DISC, least=0.2, placed=True
     ),
     "restitution_between_walls": Cause("speed_dependent_restitution", speed_dependent_restitution, "1", 1.0),
+    "springing_contacts": Cause("contact_friction", springing_contacts, "1", 1.0),
     "wall_met_often": Cause("wall", wall_met_often, "m", 1.0, least=0.3, placed=True),
 }
 """Other ways in which a cause of the catalogue shows; the name to find is the cause's."""

@@ -106,7 +106,7 @@ def part(state, i, j, things, laws, slowest):
     impulse = (1 + share) * closing / mobility(things, i, j, lever_i, lever_j)
     apply(state, i, things, impulse, nx, ny, lever_i)
     apply(state, j, things, -impulse, nx, ny, lever_j)
-    rub(state, i, j, things, laws.contact_friction * impulse, (nx, ny, px, py))
+    rub(state, i, j, things, laws, laws.contact_friction * impulse, (nx, ny, px, py))
     if presses and gap < 0:
         total = things.inverse_mass[i] + things.inverse_mass[j]
         for thing, sign in ((i, 1.0), (j, -1.0)):
@@ -115,15 +115,15 @@ def part(state, i, j, things, laws, slowest):
 
 
 @njit(cache=True)
-def rub(state, i, j, things, limit, contact):
-    """Tangential impulse of a contact, in place: against the sliding, at most the limit, at most what stops it."""
+def rub(state, i, j, things, laws, limit, contact):
+    """Tangential impulse of a contact, in place: against the sliding, at most the limit, at most what turns it back."""
     if limit == 0.0:
         return
     nx, ny, px, py = contact
     tx, ty = -ny, nx
     speed_i, lever_i = slip_at(state, i, px, py, tx, ty)
     speed_j, lever_j = slip_at(state, j, px, py, tx, ty)
-    stopping = (speed_j - speed_i) / mobility(things, i, j, lever_i, lever_j)
-    impulse = min(max(stopping, -limit), limit)
+    turning = (1 + laws.tangential_restitution) * (speed_j - speed_i) / mobility(things, i, j, lever_i, lever_j)
+    impulse = min(max(turning, -limit), limit)
     apply(state, i, things, impulse, tx, ty, lever_i)
     apply(state, j, things, -impulse, tx, ty, lever_j)

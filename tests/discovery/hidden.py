@@ -12,7 +12,7 @@ from tests.discovery.scenes import ROLLING, SLIDING, Setting
 from tests.discovery.videos import Video
 from vrdp_prob.scene import Shape, Wall
 
-SPINNING = ("magnus_curl", "contact_friction")
+SPINNING = ("magnus_curl", "contact_friction", "springing_contacts")
 """Causes that act by the spin, which is seen only where angles are measured."""
 MET_OFTEN = ("obstacle_met_often", "wall_met_often")
 """Hidden things that many bodies shall meet, so that these must come about."""
@@ -147,6 +147,11 @@ def _lens(video: Video) -> dict[str, float]:
 
 
 _RESTITUTION = _laws(restitution_exponent="restitution_power", restitution_speed="restitution_speed")
+_RUBBING = _laws(
+    contact_friction="contact_friction",
+    wall_friction="contact_friction",
+    tangential_restitution="tangential_restitution",
+)
 _OF_THE_TABLE: Mapping[str, Callable[[Video], dict[str, float]]] = {
     "surface_tilt": _laws(tilt_x="tilt_x", tilt_y="tilt_y"),
     "linear_drag": _laws(linear_drag="linear_drag"),
@@ -161,7 +166,8 @@ _OF_THE_TABLE: Mapping[str, Callable[[Video], dict[str, float]]] = {
     "time_varying_friction": _laws(friction_trend="friction_trend"),
     "mass_dependent_friction": _exponent,
     "slip_to_roll": _laws(slip_friction="slip_friction"),
-    "contact_friction": _laws(contact_friction="contact_friction", wall_friction="contact_friction"),
+    "contact_friction": _RUBBING,
+    "springing_contacts": _RUBBING,
     "speed_dependent_restitution": _RESTITUTION,
     "restitution_between_walls": _RESTITUTION,
     "hidden_obstacle": _disc,

@@ -39,6 +39,7 @@ class Laws(NamedTuple):
     friction_trend: float = 0.0
     slip_friction: float = 0.0
     contact_friction: float = 0.0
+    tangential_restitution: float = 0.0
     restitution_power: float = 0.0
     restitution_speed: float = 0.5
     kick_time: float = np.inf

@@ -205,6 +205,13 @@ def test_rubbing_is_limited_by_the_normal_impulse_and_by_sticking(coefficient: f
     assert turning.sum() == pytest.approx(0.02 * before[0, 5])
 
 
+def test_contacts_that_stick_spring_back_across() -> None:
+    laws = Laws(contact_friction=5.0, tangential_restitution=0.6)
+    video = sliding((0, 0, 1, 0), (1, 0, 0, 0), spin=np.array([6.0, 0.0]), laws=laws)
+    before, after = (states[:, 3] + np.array([0.2, -0.2]) * states[:, 5] for states in move(video, TIMES).around[0])
+    assert after[1] - after[0] == pytest.approx(-0.6 * (before[1] - before[0]))
+
+
 def crowd(seed: int) -> Video:
     """Six bodies of all shapes that meet often, without friction or loss."""
     setting = Setting(videos=1, bodies=6, frames=60, late=0.0)

@@ -216,6 +216,7 @@ class _Simulation:
         tangent = np.array([-normal[1], normal[0]])
         coefficient = "contact_friction" if max(i, j) < self.count else "wall_friction"
         limit = self.scene.parameters.get(coefficient, 0.0) * size
+        share = 1 + self.scene.parameters.get("tangential_restitution", 0.0)
         rolling = [(body, state) for body, state in zip((i, j), states, strict=True) if self._rolls(body)]
         slide = np.array(
             [tangent @ (relative + inverse @ normal * size), sum(state[6:8] @ normal for _, state in rolling)]
@@ -223,7 +224,7 @@ class _Simulation:
         softness = np.array([tangent @ inverse @ tangent, sum(2.5 * self.inverse_mass[body] for body, _ in rolling)])
         speed = np.hypot(*slide)
         across, upward = [
-            -sliding * min(1 / soft, limit / speed) if sliding else 0.0
+            -sliding * min(share / soft, limit / speed) if sliding else 0.0
             for sliding, soft in zip(slide, softness, strict=True)
         ]
         impulse = size * normal + across * tangent

@@ -14,6 +14,7 @@ from vrdp_prob.models.effects.contact_friction import ContactFriction
 from vrdp_prob.models.effects.linear_drag import LinearDrag
 from vrdp_prob.models.effects.slip_to_roll import SlipToRoll
 from vrdp_prob.models.effects.surface_tilt import SurfaceTilt
+from vrdp_prob.models.effects.tangential_restitution import TangentialRestitution
 from vrdp_prob.models.physics import PhysicsModel
 from vrdp_prob.models.simulator.rollout import simulate
 from vrdp_prob.models.simulator.worlds import Worlds
@@ -31,12 +32,14 @@ STRENGTHS = {
     "linear_drag": (0, 0.3),
     "contact_friction": (0, 0.5),
     "wall_friction": (0, 0.5),
+    "tangential_restitution": (0, 1),
     "slip_friction": (0.1, 0.4),
     "pair_strength": (-0.02, 0.02),
     "pair_softening": (0.05, 0.2),
 }
 SLIPPING = EXTENDED.with_effect(SlipToRoll())
-MODELS = {"base": PhysicsModel.base(), "extended": EXTENDED, "slipping": SLIPPING}
+SPRINGING = SLIPPING.with_effect(TangentialRestitution())
+MODELS = {"base": PhysicsModel.base(), "extended": EXTENDED, "slipping": SLIPPING, "springing": SPRINGING}
 EXACT = 1e-6
 """Farthest deviation in m that is allowed."""
 

@@ -52,28 +52,39 @@ class ContactFriction(Effect):
     ) -> Scalar:
         """Impulse in kg m/s on the second body along the tangent."""
         slide = contact.tangential_speed_after_normal
-        coefficient = _coefficient(first, second, parameters)
-        return -slide * _impulse_per_slide(contact, contact.tangential_inverse_mass, coefficient)
+        coefficient = friction_coefficient(first, second, parameters)
+        return -slide * impulse_per_slide(contact, contact.tangential_inverse_mass, coefficient)
 
     def vertical_impulse(
         self, contact: ContactView, first: BodyView, second: BodyView, parameters: Mapping[str, Scalar]
     ) -> Scalar:
         """Upward impulse in kg m/s on the second body."""
-        coefficient = _coefficient(first, second, parameters)
-        return -contact.vertical_speed * _impulse_per_slide(contact, contact.vertical_inverse_mass, coefficient)
+        coefficient = friction_coefficient(first, second, parameters)
+        return -contact.vertical_speed * impulse_per_slide(contact, contact.vertical_inverse_mass, coefficient)
 
 
-def _coefficient(first: BodyView, second: BodyView, parameters: Mapping[str, Scalar]) -> Scalar:
+def friction_coefficient(first: BodyView, second: BodyView, parameters: Mapping[str, Scalar]) -> Scalar:
     """Friction coefficient of what touches."""
     both_move = first.inverse_mass * second.inverse_mass > 0.0
     return where(both_move, parameters["contact_friction"], parameters["wall_friction"])
 
 
-def _impulse_per_slide(contact: ContactView, inverse_mass: Scalar, coefficient: Scalar) -> Scalar:
-    """Impulse in kg by the speed of sliding in one direction that it stops: what ends it, or what friction can give.
+def impulse_per_slide(contact: ContactView, inverse_mass: Scalar, coefficient: Scalar, share: Scalar = 1.0) -> Scalar:
+    """Impulse in kg by the speed of sliding in one direction that it changes, or what friction can give.
 
     While a body slides friction acts against the whole sliding, along the tangent and up or down.
+
+    Parameters
+    ----------
+    contact
+        The contact.
+    inverse_mass
+        Change of that speed per impulse, in 1/kg.
+    coefficient
+        Friction coefficient of what touches.
+    share
+        Change of the speed in units of it: 1 where it ends.
     """
     slide = length(contact.tangential_speed_after_normal, contact.vertical_speed)
     limit = coefficient * contact.normal_impulse
-    return minimum(1 / maximum(inverse_mass, LEAST_INVERSE_MASS), limit / maximum(slide, SLOWEST_SLIDE))
+    return minimum(share / maximum(inverse_mass, LEAST_INVERSE_MASS), limit / maximum(slide, SLOWEST_SLIDE))

@@ -280,8 +280,8 @@ def _notes(
     notes = []
     if doubtful and causes:
         notes.append(
-            "Something outside the catalogue is, or may be, at work. Causes may only follow it, as likely as not, which "
-            "their probabilities count."
+            "Something outside the catalogue is, or may be, at work. Causes may only follow it, as likely as not, "
+            "which their probabilities count."
         )
     notes += [_unlisted_note(one) for one in unlisted]
     notes += _not_explained(found.best.fit.fits)

@@ -48,7 +48,7 @@ class Background:
 
 def estimate_background(frames: UInt8[np.ndarray, "frame height width 3"]) -> Background:
     """Estimate the empty floor of a video of a fixed camera."""
-    chosen = evenly_spread(min(_SAMPLED_FRAMES, len(frames)), len(frames))
+    chosen = evenly_spread(_SAMPLED_FRAMES, len(frames))
     sample = np.sort(frames[chosen], axis=0)
     median = sample[len(sample) // 2].astype(np.float32)
     surface, spread = _smooth_surface(median)

@@ -141,7 +141,7 @@ def _read(path: Path, tracks: Tracks, size: PictureSize | None, views: list[View
     if len(usable) == 0:
         raise InputError(f"{path}: no known position falls into the video; check that times and video belong together.")
     background = estimate_background(video.frames)
-    chosen = usable[evenly_spread(min(_FRAMES_PER_VIDEO, len(usable)), len(usable))]
+    chosen = usable[evenly_spread(_FRAMES_PER_VIDEO, len(usable))]
     for index in chosen:
         picture = video.frames[frame_of[index]]
         seen = tracks.seen[index]

@@ -50,7 +50,7 @@ def best_views(tracker: Tracker, tracks: Sequence[Track], track: Track) -> list[
     ranked = sorted(track.sightings, key=lambda frame: -round(track.sightings[frame].visible, 2))
     least = track.sightings[ranked[0]].visible - _LOST
     best = [frame for frame in ranked if track.sightings[frame].visible >= least]
-    places = evenly_spread(min(_MOST_VIEWS, len(best)), len(best))
+    places = evenly_spread(_MOST_VIEWS, len(best))
     return [_view(tracker, tracks, track, best[place]) for place in places]
 
 

@@ -63,7 +63,7 @@ def _factual(worlds: PosteriorWorlds, count: int) -> WorldContent | None:
     if not len(fine):
         return None
     tracks = worlds.posterior.tracks
-    draws, frames = fine[_evenly(len(fine), count)], _evenly(len(tracks.times), MOST_FRAMES)
+    draws, frames = fine[evenly_spread(count, len(fine))], evenly_spread(MOST_FRAMES, len(tracks.times))
     return WorldContent(
         FACTUAL,
         None,
@@ -78,7 +78,7 @@ def _factual(worlds: PosteriorWorlds, count: int) -> WorldContent | None:
 def _simulated(
     world: WorldDraws, effective_draws: float, count: int, kind: str, body: str | None = None
 ) -> WorldContent:
-    draws, frames = _evenly(len(world.trajectory), count), _evenly(len(world.times), MOST_FRAMES)
+    draws, frames = evenly_spread(count, len(world.trajectory)), evenly_spread(MOST_FRAMES, len(world.times))
     return WorldContent(
         kind,
         body,
@@ -139,8 +139,3 @@ def measured_course(tracks: Tracks) -> Float[np.ndarray, "time body 2"]:
         for axis in range(2):
             course[:, body, axis] = np.interp(tracks.times, tracks.times[seen], course[seen, body, axis])
     return course
-
-
-def _evenly(count: int, wanted: int) -> np.ndarray:
-    """Indices of evenly chosen things, the first and the last among them; integers with axis `kept`."""
-    return evenly_spread(min(count, wanted), count)

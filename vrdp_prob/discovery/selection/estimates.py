@@ -208,8 +208,7 @@ def has_sign_of_law(fit: SharedFit, effect: Effect, unexplained: Unexplained | N
     """
     if effect.sign_of_law is None:
         return 1.0
-    found = estimates(fit, effect, unexplained=unexplained)
-    strength = next((found[name] for name in effect.vanishes_at if name in found), None)
+    strength = _strength(effect, estimates(fit, effect, unexplained=unexplained))
     return 1.0 if strength is None else float(ndtr(effect.sign_of_law * strength.mean / strength.sd))
 
 
@@ -223,11 +222,16 @@ def cause_sentence(effect: Effect, found: Mapping[str, Estimate]) -> str:
 
 def _signed_sentence(effect: Effect, found: Mapping[str, Estimate]) -> str:
     """The sentence for the sign of the strength, where its 95 % interval has but one."""
-    strength = next((found[name] for name in effect.vanishes_at if name in found), None)
+    strength = _strength(effect, found)
     if effect.signed_sentences is None or strength is None or strength.q025 <= 0 <= strength.q975:
         return effect.sentence
     positive, negative = effect.signed_sentences
     return positive if strength.mean > 0 else negative
+
+
+def _strength(effect: Effect, found: Mapping[str, Estimate]) -> Estimate | None:
+    """The strength of an effect that all videos share, if there is one."""
+    return next((found[name] for name in effect.vanishes_at if name in found), None)
 
 
 def _unit(unit: str) -> str:

@@ -44,26 +44,33 @@ class ContactFriction(Effect):
         "also as spheres roll, up to sticking"
     )
     source: ClassVar = "Coulomb friction in an impact: J. B. Keller, Impact with friction, J. Appl. Mech. 53 (1986)"
-    parameters: ClassVar = (CONTACT_FRICTION, WALL_FRICTION)
+    parameters: ClassVar[tuple[Parameter, ...]] = (CONTACT_FRICTION, WALL_FRICTION)
     vanishes_at: ClassVar = {"contact_friction": 0.0, "wall_friction": 0.0}
 
     def tangential_impulse(
         self, contact: ContactView, first: BodyView, second: BodyView, parameters: Mapping[str, Scalar]
     ) -> Scalar:
         """Impulse in kg m/s on the second body along the tangent."""
-        slide = contact.tangential_speed_after_normal
-        coefficient = friction_coefficient(first, second, parameters)
-        return -slide * impulse_per_slide(contact, contact.tangential_inverse_mass, coefficient)
+        slide, inverse_mass = contact.tangential_speed_after_normal, contact.tangential_inverse_mass
+        coefficient = _coefficient(first, second, parameters)
+        return -slide * self._impulse_per_slide(contact, inverse_mass, coefficient, parameters)
 
     def vertical_impulse(
         self, contact: ContactView, first: BodyView, second: BodyView, parameters: Mapping[str, Scalar]
     ) -> Scalar:
         """Upward impulse in kg m/s on the second body."""
-        coefficient = friction_coefficient(first, second, parameters)
-        return -contact.vertical_speed * impulse_per_slide(contact, contact.vertical_inverse_mass, coefficient)
+        slide, inverse_mass = contact.vertical_speed, contact.vertical_inverse_mass
+        coefficient = _coefficient(first, second, parameters)
+        return -slide * self._impulse_per_slide(contact, inverse_mass, coefficient, parameters)
+
+    def _impulse_per_slide(
+        self, contact: ContactView, inverse_mass: Scalar, coefficient: Scalar, parameters: Mapping[str, Scalar]
+    ) -> Scalar:
+        """Impulse in kg by the speed of sliding in one direction."""
+        return impulse_per_slide(contact, inverse_mass, coefficient)
 
 
-def friction_coefficient(first: BodyView, second: BodyView, parameters: Mapping[str, Scalar]) -> Scalar:
+def _coefficient(first: BodyView, second: BodyView, parameters: Mapping[str, Scalar]) -> Scalar:
     """Friction coefficient of what touches."""
     both_move = first.inverse_mass * second.inverse_mass > 0.0
     return where(both_move, parameters["contact_friction"], parameters["wall_friction"])

@@ -7,10 +7,9 @@ from vrdp_prob.models.effects.contact_friction import (
     CONTACT_FRICTION,
     WALL_FRICTION,
     ContactFriction,
-    friction_coefficient,
     impulse_per_slide,
 )
-from vrdp_prob.models.effects.effect import BodyView, ContactView, Effect
+from vrdp_prob.models.effects.effect import ContactView
 from vrdp_prob.models.parameters import Parameter, Prior, Transform
 from vrdp_prob.models.simulator.formula import Scalar
 from vrdp_prob.models.simulator.mathematics import maximum, minimum
@@ -25,7 +24,7 @@ TANGENTIAL_RESTITUTION = Parameter(
 )
 
 
-class TangentialRestitution(Effect):
+class TangentialRestitution(ContactFriction):
     """What gives way along the tangent while bodies stick springs back when they part.
 
     It is what friction does beyond sticking, and acts beside `ContactFriction`, whose coefficients it has.
@@ -46,28 +45,10 @@ class TangentialRestitution(Effect):
     vanishes_at: ClassVar = {"tangential_restitution": 0.0}
     sign_of_law: ClassVar = +1
 
-    def tangential_impulse(
-        self, contact: ContactView, first: BodyView, second: BodyView, parameters: Mapping[str, Scalar]
+    def _impulse_per_slide(
+        self, contact: ContactView, inverse_mass: Scalar, coefficient: Scalar, parameters: Mapping[str, Scalar]
     ) -> Scalar:
-        """Impulse in kg m/s on the second body along the tangent, beyond that of friction up to sticking."""
-        coefficient = friction_coefficient(first, second, parameters)
-        slide = contact.tangential_speed_after_normal
-        return -slide * _beyond_sticking(contact, contact.tangential_inverse_mass, coefficient, parameters)
-
-    def vertical_impulse(
-        self, contact: ContactView, first: BodyView, second: BodyView, parameters: Mapping[str, Scalar]
-    ) -> Scalar:
-        """The same upwards."""
-        coefficient = friction_coefficient(first, second, parameters)
-        return -contact.vertical_speed * _beyond_sticking(
-            contact, contact.vertical_inverse_mass, coefficient, parameters
-        )
-
-
-def _beyond_sticking(
-    contact: ContactView, inverse_mass: Scalar, coefficient: Scalar, parameters: Mapping[str, Scalar]
-) -> Scalar:
-    """Impulse in kg by the speed of sliding, beyond what ends that."""
-    share = minimum(2.0, maximum(0.0, 1 + parameters["tangential_restitution"]))
-    springing = impulse_per_slide(contact, inverse_mass, coefficient, share)
-    return springing - impulse_per_slide(contact, inverse_mass, coefficient)
+        """Impulse in kg by the speed of sliding, beyond that of friction up to sticking."""
+        share = minimum(2.0, maximum(0.0, 1 + parameters["tangential_restitution"]))
+        springing = impulse_per_slide(contact, inverse_mass, coefficient, share)
+        return springing - impulse_per_slide(contact, inverse_mass, coefficient)

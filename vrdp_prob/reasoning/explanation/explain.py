@@ -57,7 +57,7 @@ def explain(facts: Facts, asked: PreparedQuestion) -> Explanation:
 def _part(facts: Facts, asked: PreparedQuestion, place: int, verdict: Verdict, twins: Twins | None) -> Part:
     valid = np.flatnonzero(verdict.valid)
     everything = verdict.codes[valid]
-    chosen = valid[evenly_spread(min(len(valid), MOST_DRAWS), len(valid))]
+    chosen = valid[evenly_spread(MOST_DRAWS, len(valid))]
     codes, worlds = verdict.codes[chosen], sorted(verdict.run.looked_at, key=str)
     wanted = YES if asked.options else int(np.bincount(everything).argmax())
     generator = Seeded(facts.posterior.seed if isinstance(facts, PosteriorWorlds) else 0, place).numbers(

@@ -41,13 +41,26 @@ class Grazing(LinkedVideo):
         return values
 
 
+@dataclass(frozen=True)
+class Sticking(Grazing):
+    """What just sticks at a friction of 1, and would leave its track with any less, of which all else would have less.
+
+    The other shared number is as good as any friction.
+    """
+
+    def _residuals(self, points: np.ndarray) -> np.ndarray:
+        strength, friction, own = points.T
+        slides = 100.0 * np.maximum(1 - friction, 0.0)
+        return np.stack([5 * (strength - 1), friction + own, own, slides], axis=1)
+
+
 def expand(video: LinkedVideo, shared: np.ndarray, local: np.ndarray, *, central: bool) -> Expansion:
     """That of residuals, on the side of the edge where the point is."""
     point = video.points(shared, local)
     residuals, derivative = jacobian(video.data.residuals, point, np.ones(3), central=central)
     derivative[-1], residuals = 0.0, residuals[:-1]
-    gradient = derivative[:-1].T @ residuals
-    return Expansion(gradient[:1], gradient[1:], derivative[:, :1], derivative[:, 1:])
+    gradient, count = derivative[:-1].T @ residuals, len(shared)
+    return Expansion(gradient[:count], gradient[count:], derivative[:, :count], derivative[:, count:])
 
 
 def grazing() -> tuple[SharedNumbers, Grazing]:
@@ -73,6 +86,24 @@ def test_a_ridge_is_followed_along_an_edge(monkeypatch: pytest.MonkeyPatch, *, b
     most = -((BEST - 2) ** 2) / (2 * 0.3**2) - (BEST + 1) ** 2 / 4
     assert found.log_density > most - 0.5
     assert not found.converged  # at an edge the density is no Gaussian
+
+
+def test_where_one_shared_number_is_at_an_edge_the_others_go_on(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(joint_fit, "expand", expand)
+    keys = ("strength", "friction")
+    entries = tuple(Coordinate(name, None, Transform.IDENTITY, Prior(0.0, 10.0)) for name in keys)
+    own = Coordinate("own", 0, Transform.IDENTITY, Prior(0.0, 1.0))
+    likelihood = Likelihood(sliding(0), PhysicsModel.base(), Coordinates((*entries, own), {}))
+    video = Sticking(likelihood, np.arange(2), np.arange(2), np.zeros(2))
+    numbers = SharedNumbers(tuple((name, ()) for name in keys), entries, None)
+    begin = np.array([0.0, 1.001])
+    found = ascent.climb(numbers, [video], begin, [np.array([-0.5])])
+    assert found.gaussian.mean == pytest.approx([1.0, 1.0], abs=0.01)
+    slopes = joint_fit.expand_all(numbers, [video], begin, [np.array([-0.5])])
+    whole = ascent._improved(
+        numbers, ascent._Ridges([video]), ascent.State.at([video], begin, [np.array([-0.5])]), slopes.shared_step
+    )
+    assert np.abs(whole.shared - begin).max() < 0.1  # all together they would leave the edge
 
 
 @pytest.mark.parametrize("hindered", [True, False])

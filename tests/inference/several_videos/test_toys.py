@@ -118,6 +118,12 @@ def test_an_arrow_is_the_whole_matrix() -> None:
     own_step = expansions[1].local_step + expansions[1].slope @ arrow.shared_step
     assert own_step == pytest.approx(step[shared + 2 : shared + 6], rel=1e-6)
     assert arrow.expected_gain == pytest.approx(-gradient @ step / 2, rel=1e-6)
+    rest = np.delete(np.arange(len(whole)), 1)
+    held = -np.linalg.solve(whole[np.ix_(rest, rest)], gradient[rest])
+    along, promised = arrow.step_without(1)
+    assert along == pytest.approx([held[0], 0.0, held[1]], rel=1e-6)
+    own_alone = sum(one.promised for one in expansions)
+    assert promised + own_alone == pytest.approx(-gradient[rest] @ held / 2, rel=1e-6)
     gaussian: ArrowGaussian = arrow.gaussian(
         np.zeros(shared), [np.zeros(own) for own in owns], np.zeros(shared, dtype=bool)
     )

@@ -274,6 +274,14 @@ class Expansions:
         """Newton step of the shared numbers when all own ones follow."""
         return -self._solve(self.gradient)
 
+    def step_without(self, number: int) -> tuple[Float[np.ndarray, "shared"], float]:
+        """Newton step of the shared numbers with one of them held, and the gain (nats) that it promises."""
+        moved = np.delete(np.arange(len(self.gradient)), number)
+        root, step = upper_root(self._triangle[:, moved]), np.zeros(len(self.gradient))
+        pulled = solve_triangular(root, self.gradient[moved], trans="T")
+        step[moved] = -solve_triangular(root, pulled)
+        return step, float(pulled @ pulled) / 2
+
     @property
     def expected_gain(self) -> float:
         """Gain in log density (nats) that the Newton step promises."""

@@ -194,6 +194,8 @@ def climb(
             own = trial
             trial = _improved(numbers, ridges, own, inner.shared_step, expected)
             if trial is own:
+                trial = _with_one_held(numbers, ridges, own, inner)
+            if trial is own:
                 refused = own.total(numbers)
         brought = trial.total(numbers) - state.total(numbers)
         if brought < max(TOLERANCE, min(effort.enough, HALF * expected)):
@@ -258,6 +260,21 @@ def _improved(
         lost = np.array(state.values) - np.array(trial.values)
         hindering = [int(index) for index in np.argsort(-lost) if lost[index] > most]
         ridges.hindering[share] = hindering
+    return state
+
+
+def _with_one_held(numbers: SharedNumbers, ridges: _Ridges, state: State, slopes: Expansions) -> State:
+    """The state after the common step that promises most with one shared number held, of those that bring something.
+
+    A number may be at an edge of some video, which no way along its own numbers avoids: where a contact just sticks,
+    friction that is any less lets it slide. What the others promise without it is not to be lost for that.
+    """
+    held = [slopes.step_without(number) for number in range(len(numbers))] if len(numbers) > 1 else []
+    worth = [one for one in held if one[1] > max(HALF * slopes.expected_gain, EXPECTED)]
+    for step, expected in sorted(worth, key=lambda one: one[1], reverse=True):
+        found = _improved(numbers, ridges, state, step, expected)
+        if found is not state:
+            return found
     return state
 
 

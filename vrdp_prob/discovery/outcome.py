@@ -224,7 +224,13 @@ def _cause(
     *,
     named: bool,
 ) -> FoundCause:
-    values = estimates(trial.fit, effect, unexplained=trial.unexplained, overdispersion=overdispersion)
+    values = estimates(
+        trial.fit,
+        effect,
+        unexplained=trial.unexplained,
+        overdispersion=overdispersion,
+        known=trial.marginals(effect, overdispersion),
+    )
     return FoundCause(
         name=effect.cause_name(),
         probability=min(max(probability, 0.0), 1.0),

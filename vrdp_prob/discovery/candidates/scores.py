@@ -30,6 +30,9 @@ REPLICATIONS = 400
 """Scans of noise, of which each scan of what is left is one by chance."""
 SITE_LEVEL = 1e-3
 """An effect that happens once in a video is there if chance makes a statistic as large, anywhere, less often."""
+OTHER_SIZE = 0.8
+"""Share of the largest statistic from which on another size of what is looked for (the radius of a patch) is a start of
+its own; a scan is coarse, and what lies on the way of few bodies may be as large as one likes."""
 LEAST_START = 0.01
 """Smallest value of a positive strength at which a refit begins, as a share of its default."""
 
@@ -107,6 +110,8 @@ class CauseScore:
         Number of bodies or videos among which the sites were chosen.
     by_video
         What each video has of the statistic, if videos share the strength; empty where that is not told apart.
+    other_starts
+        Further first guesses, at other sizes of the cause that promise nearly as much.
     """
 
     effect: Effect
@@ -118,6 +123,7 @@ class CauseScore:
     largest: Mapping[str, Largest]
     places: int = 1
     by_video: tuple[float, ...] = ()
+    other_starts: tuple[Mapping[str, float], ...] = ()
 
     def few_videos(self, level: float) -> list[int]:
         """The fewest videos without which chance makes as large a statistic as is left more often than at a level.
@@ -223,14 +229,18 @@ def _scan_shared(
     ]
     alone = _p_value(scores[best], names, effect)
     p_value = anywhere(alone, _places(blocks, degrees, generator))
-    estimate = dict(zip(names, scores[best].estimate.tolist(), strict=True))
-    start = dict(points[best]) | (_starting(effect, estimate) if len(estimate) == len(names) else {})
+    start, *others = (
+        _start(effect, points[place], names, scores[place]) for place in _best_of_each_size(effect, points, statistics)
+    )
     largest = _largest([zip(names, score.estimate, score.sd, strict=True) for score in scores], effect)
     strengths = scores[best].estimate
     by_video = tuple(
         -float(left @ block[:, best] @ strengths) for left, block in zip(model.linear.left, blocks, strict=True)
     )
-    return CauseScore(effect, start, (), float(statistics[best]), degrees, p_value, largest, by_video=by_video)
+    chi_square = float(statistics[best])
+    return CauseScore(
+        effect, start, (), chi_square, degrees, p_value, largest, by_video=by_video, other_starts=tuple(others)
+    )
 
 
 def _scan_frames(model: ResidualModel, effect: Effect) -> CauseScore | None:
@@ -316,6 +326,23 @@ def _one_sided(score: Score, names: Sequence[str], effect: Effect) -> Score:
             break
         left.remove(min(negative, key=lambda k: score.gradient[k]))
     return score if len(left) == len(names) else Score(score.information @ bounded, score.information)
+
+
+def _best_of_each_size(
+    effect: Effect, points: Sequence[Mapping[str, float]], statistics: Float[np.ndarray, "point"]
+) -> list[int]:
+    """The best search point, and the best ones of other sizes that promise nearly as much, the best first."""
+    sizes = [one.name for one in effect.parameters if one.transform is Transform.LOG]
+    best: dict[tuple[float | None, ...], int] = {}
+    for place in np.argsort(-statistics, kind="stable").tolist():
+        best.setdefault(tuple(points[place].get(name) for name in sizes), place)
+    return [place for place in best.values() if statistics[place] >= OTHER_SIZE * statistics.max()]
+
+
+def _start(effect: Effect, point: Mapping[str, float], names: Sequence[str], score: Score) -> dict[str, float]:
+    """Where a refit begins at a search point."""
+    estimate = dict(zip(names, score.estimate.tolist(), strict=True))
+    return dict(point) | (_starting(effect, estimate) if len(estimate) == len(names) else {})
 
 
 def _starting(effect: Effect, estimate: Mapping[str, float]) -> dict[str, float]:

@@ -1,7 +1,7 @@
 """Fits of a model with further causes: from their scores, from the beginning, or in the place of kicks."""
 
 import math
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -102,7 +102,8 @@ class Extensions:
             or (nothing_explains and _broke_off(one) and promised.get(one.causes[-1].name, 0.0) > SHORT * leading)
         ]
         rest = [one for one in found if one not in close]
-        followed = in_processes(partial(_followed_to_the_end, trial, self.seed), close)
+        of_causes = {one.effect.name: one for one in scores}
+        followed = in_processes(partial(_followed_to_the_end, trial, of_causes, self.seed), close)
         return sorted([*followed, *rest], key=merit, reverse=True)
 
     def _all(self, refit: Callable[[CauseScore], Trial | None], scores: Sequence[CauseScore]) -> list[Trial]:
@@ -218,6 +219,6 @@ def _broke_off(one: Trial) -> bool:
     return not one.fit.joint.converged
 
 
-def _followed_to_the_end(trial: Trial, seed: int, one: Trial) -> Trial:
-    """A refit of a model after as many steps as it needs, freed of videos that hold it back."""
-    return one.continued().freed(trial, seed=seed)
+def _followed_to_the_end(trial: Trial, scores: Mapping[str, CauseScore], seed: int, one: Trial) -> Trial:
+    """A refit of a model after as many steps as it needs, freed of videos that hold it back, and begun elsewhere."""
+    return one.continued().freed(trial, seed=seed).begun_elsewhere(trial, scores[one.causes[-1].name])

@@ -37,6 +37,8 @@ HALF = 0.5
 TOO_DEAR = 2.0
 """How many times what a common step is expected to bring, or `STEEP`, one video may lose by it; if more, others are not
 looked at."""
+MOVED, MOST_HELD = 0.5, 2
+"""Standard deviations by which a common step has to move a number for that to be held instead, and how many are."""
 STEEP = 5.0
 """Gain (nats) that its own step promises a video which has just looked for its best own numbers, from which on it is
 taken to be at an edge: where two orders of events meet, or a contact just happens."""
@@ -267,11 +269,13 @@ def _with_one_held(numbers: SharedNumbers, ridges: _Ridges, state: State, slopes
     """The state after the common step that promises most with one shared number held, of those that bring something.
 
     A number may be at an edge of some video, which no way along its own numbers avoids: where a contact just sticks,
-    friction that is any less lets it slide. What the others promise without it is not to be lost for that.
+    friction that is any less lets it slide. It is one that the step moves and hardly needs. What the others promise
+    without it is not to be lost for that.
     """
-    held = [slopes.step_without(number) for number in range(len(numbers))] if len(numbers) > 1 else []
+    moved = np.abs(slopes.shared_step) > MOVED * np.sqrt((slopes.root**2).sum(axis=1))
+    held = [slopes.step_without(number) for number in np.flatnonzero(moved).tolist()] if len(numbers) > 1 else []
     worth = [one for one in held if one[1] > max(HALF * slopes.expected_gain, EXPECTED)]
-    for step, expected in sorted(worth, key=lambda one: one[1], reverse=True):
+    for step, expected in sorted(worth, key=lambda one: one[1], reverse=True)[:MOST_HELD]:
         found = _improved(numbers, ridges, state, step, expected)
         if found is not state:
             return found

@@ -35,6 +35,7 @@ def refit_with(cause: str, gained: float, *, patches: bool = False) -> Mock:
     refit.with_courses_of.side_effect = lambda _other: refit
     refit.continued.return_value = refit
     refit.freed.side_effect = lambda _base, **_how: refit
+    refit.begun_elsewhere.side_effect = lambda _base, _score: refit
     return refit
 
 

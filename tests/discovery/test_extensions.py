@@ -119,16 +119,17 @@ def test_a_law_that_falls_short_is_freed_of_videos_that_hold_it_back(monkeypatch
     assert extensions_with(needed=6.0).made_of(nothing, [score]) == [freed]
 
 
-def test_refits_that_may_win_are_followed_to_the_end_and_freed(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_refits_that_may_win_are_followed_to_the_end_freed_and_begun_elsewhere(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(extensions, "mends_any_course", lambda _cause: False)
     nothing, effects = refit_with("", 0.0), {name: Mock() for name in ("wind", "patch")}
-    wind, further, freed, patch = (
-        refit_with(name, gained) for name, gained in (("w", 1), ("w", 2), ("w", 9), ("p", 1))
+    wind, further, freed, larger, patch = (
+        refit_with(name, gained) for name, gained in (("w", 1), ("w", 2), ("w", 9), ("w", 9.5), ("p", 1))
     )
     for one, name, gained in (
         (wind, "wind", 50.0),
         (further, "wind", 60.0),
         (freed, "wind", 90.0),
+        (larger, "wind", 95.0),
         (patch, "patch", 9.0),
     ):
         effects[name].name = name
@@ -136,7 +137,8 @@ def test_refits_that_may_win_are_followed_to_the_end_and_freed(monkeypatch: pyte
     wind.continued.return_value, further.freed.side_effect = further, lambda _base, *, seed: freed
     nothing.with_cause = lambda score: wind if score.effect is effects["wind"] else patch
     scores = [Mock(spec=CauseScore, effect=effect, size=10.0) for effect in effects.values()]
-    assert extensions_with().made_of(nothing, scores) == [freed, patch]
+    freed.begun_elsewhere.side_effect = lambda base, score: larger if (base, score) == (nothing, scores[0]) else freed
+    assert extensions_with().made_of(nothing, scores) == [larger, patch]
     assert not patch.freed.called
 
 

@@ -1,9 +1,10 @@
 """Draws of what all videos share of a cause whose density is no Gaussian: it bends, or ends at edges.
 
 The border of a patch lies between where bodies are slowed and where they are not; a restitution that begins to fall at
-slower impacts falls less. Walkers move in the cause's own numbers, all others follow as the Gaussian of the joint fit
-says. Source: Goodman and Weare, Ensemble samplers with affine invariance (2010), and Nelson et al., RUN DMC (2014), for
-the moves; Foreman-Mackey et al., emcee: the MCMC hammer (2013).
+slower impacts falls less. Walkers move in the cause's own numbers, which all others follow. Sources: Goodman and Weare,
+Ensemble samplers with affine invariance, Comm. App. Math. Comp. Sci. 5 (2010), and ter Braak, A Markov chain Monte
+Carlo version of the genetic algorithm differential evolution, Stat. Comput. 16 (2006), for their moves; Foreman-Mackey
+and others, emcee: the MCMC hammer, PASP 125 (2013).
 """
 
 from collections.abc import Callable
@@ -11,15 +12,19 @@ from dataclasses import dataclass
 
 import emcee
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 from numpy.random import RandomState
+from scipy.linalg import qr, solve_triangular
 
 from vrdp_prob.inference.draws.triangles import lower_root
 from vrdp_prob.inference.runs.parallel import in_parallel
+from vrdp_prob.inference.search.least_squares import jacobian, robust_cost
+from vrdp_prob.inference.search.noise_fit import NOISE_FIELDS
 from vrdp_prob.inference.several_videos.arrow import grown
 from vrdp_prob.inference.several_videos.bends import spread
 from vrdp_prob.inference.several_videos.fitting import SharedFit
 from vrdp_prob.inference.several_videos.joint_fit import JointFit, settle
+from vrdp_prob.inference.several_videos.linking import LinkedVideo
 from vrdp_prob.models.effects.effect import Effect
 
 PROBES, ROUGH = 64, 2.0
@@ -86,6 +91,66 @@ def cause_draws(fit: SharedFit, effect: Effect, sd: Float[np.ndarray, "shared"])
 
 
 @dataclass(frozen=True)
+class _Follower:
+    """A video's own numbers as they follow the shared ones: in straight lines, and then by a step along a chord.
+
+    That step takes up what the residuals leave as their derivative at the top says, as Newton's method does with a
+    derivative that is not renewed. Noise scales stay.
+
+    Parameters
+    ----------
+    video, centre
+        The video, and its own numbers at the top.
+    slope
+        How they go with a departure of the shared ones.
+    logarithms
+        Which shared numbers are logarithms.
+    places
+        Places of the own numbers that follow.
+    orthogonal, triangle
+        Factors of the residuals' derivative by these.
+    """
+
+    video: LinkedVideo
+    centre: Float[np.ndarray, "local"]
+    slope: Float[np.ndarray, "local shared"]
+    logarithms: Bool[np.ndarray, "shared"]
+    places: Int[np.ndarray, "own"]
+    orthogonal: Float[np.ndarray, "residual own"]
+    triangle: Float[np.ndarray, "own own"]
+
+    @classmethod
+    def of(cls, joint: JointFit, index: int) -> "_Follower":
+        video, own = joint.videos[index], joint.gaussian.locals[index]
+        noise = video.likelihood.coordinates.mask(NOISE_FIELDS)
+        scale = video.data.coordinates.scale
+        _, derivative = jacobian(video.data.residuals, joint.point(index), scale, central=True)
+        places = video.local_places[~noise[video.local_places] & derivative[:, video.local_places].any(axis=0)]
+        orthogonal, triangle = qr(derivative[:, places], mode="economic", check_finite=False)
+        slope = np.where(noise[video.local_places, None], 0.0, own.slope)
+        return cls(video, own.centre, slope, own.logarithms, places, orthogonal, triangle)
+
+    def log_density(
+        self, shared: Float[np.ndarray, "draw shared"], departure: Float[np.ndarray, "draw shared"], *, settled: bool
+    ) -> Float[np.ndarray, "draw"]:
+        """Log density (nats, up to a constant) of the video; minus infinity where there is no world."""
+        follows = self.centre + grown(departure, self.logarithms) @ self.slope.T
+        if settled:
+            pairs = zip(shared, follows, strict=True)
+            follows = np.stack([settle(self.video, numbers, [own]) for numbers, own in pairs])
+        points = np.stack([self.video.points(*one) for one in zip(shared, follows, strict=True)])
+        residuals = self.video.data.residuals(points)
+        found = -robust_cost(residuals, None)
+        if settled:
+            return found
+        world = np.isfinite(found)
+        points[np.ix_(world, self.places)] -= solve_triangular(
+            self.triangle, self.orthogonal.T @ residuals[world].T, check_finite=False
+        ).T
+        return np.maximum(found, -robust_cost(self.video.data.residuals(points), None))
+
+
+@dataclass(frozen=True)
 class _Subspace:
     """Some shared numbers of a joint fit, which all others follow, in units of its Gaussian there.
 
@@ -98,9 +163,11 @@ class _Subspace:
     root
         Cholesky factor of their covariance.
     slope
-        How all shared numbers go with them.
+        How all shared numbers go with them; noise scales stay.
     widening
         Factor by which standard deviations are larger than the likelihood says, which tempers it.
+    followers
+        The videos.
     """
 
     joint: JointFit
@@ -108,32 +175,29 @@ class _Subspace:
     root: Float[np.ndarray, "number number"]
     slope: Float[np.ndarray, "shared number"]
     widening: float
+    followers: tuple[_Follower, ...]
 
     @classmethod
     def of(cls, joint: JointFit, places: Int[np.ndarray, "number"], widening: float) -> "_Subspace":
         rows = joint.gaussian.root[places]
         root = lower_root(rows)
         slope = np.linalg.solve(root.T, np.linalg.solve(root, rows @ joint.gaussian.root.T)).T
-        return cls(joint, places, widening * root, slope, widening)
+        slope[[name in NOISE_FIELDS for name, _ in joint.numbers.keys]] = 0.0
+        followers = in_parallel(lambda index: _Follower.of(joint, index), range(len(joint.videos)))
+        return cls(joint, places, widening * root, slope, widening, tuple(followers))
 
     def coordinates(self, whitened: Float[np.ndarray, "draw number"]) -> Float[np.ndarray, "draw number"]:
         found: np.ndarray = self.joint.gaussian.mean[self.places] + whitened @ self.root.T
         return found
 
-    def log_density(self, whitened: Float[np.ndarray, "draw number"], *, settled: bool = False) -> np.ndarray:
+    def log_density(
+        self, whitened: Float[np.ndarray, "draw number"], *, settled: bool = False
+    ) -> Float[np.ndarray, "draw"]:
         """Log density (nats) beyond that of the top; very low where there is no world."""
         departure = np.concatenate([np.zeros_like(whitened[:1]), whitened]) @ self.root.T @ self.slope.T
         shared = self.joint.gaussian.mean + departure
-
-        def told(index: int) -> Float[np.ndarray, "draw"]:
-            video, own = self.joint.videos[index], self.joint.gaussian.locals[index]
-            follows = own.centre + grown(departure, own.logarithms) @ own.slope.T
-            if settled:
-                follows = np.stack([settle(video, one, [start]) for one, start in zip(shared, follows, strict=True)])
-            return np.nan_to_num(video.log_density(shared, follows), nan=-np.inf)
-
-        values = sum(in_parallel(told, range(len(self.joint.videos)))) / self.widening**2
-        values = values + self.joint.numbers.log_prior(shared)
+        told = in_parallel(lambda one: one.log_density(shared, departure, settled=settled), self.followers)
+        values = sum(told) / self.widening**2 + self.joint.numbers.log_prior(shared)
         return np.maximum(values[1:] - values[0], -1e300)
 
     def falls_far(self) -> bool:

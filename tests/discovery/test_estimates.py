@@ -130,7 +130,7 @@ def test_how_far_a_parameter_reaches_widens_its_interval_only(
     plain = estimates(fit, AirDrag())["air_drag"]
     middle = math.log(plain.q975) - 0.1
     grid = np.linspace(middle - 3 * far, middle + 3 * far, 2001)
-    reached = Reach.of_density(grid, -(((grid - middle) / far) ** 2) / 2)
+    reached = Reach(grid, -(((grid - middle) / far) ** 2) / 2)
     monkeypatch.setattr(module, "reaches", lambda fit, *_: {fit.joint.numbers.names.index("air_drag"): reached})
     found = estimates(fit, AirDrag())["air_drag"]
     assert found.q025 <= plain.q025

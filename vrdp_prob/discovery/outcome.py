@@ -224,13 +224,7 @@ def _cause(
     *,
     named: bool,
 ) -> FoundCause:
-    values = estimates(
-        trial.fit,
-        effect,
-        unexplained=trial.unexplained,
-        overdispersion=overdispersion,
-        known=trial.marginals(effect, overdispersion),
-    )
+    values = estimates(trial.fit, effect, unexplained=trial.unexplained, overdispersion=overdispersion)
     return FoundCause(
         name=effect.cause_name(),
         probability=min(max(probability, 0.0), 1.0),

@@ -7,6 +7,7 @@ from jaxtyping import Float
 
 from vrdp_prob.discovery.candidates.scores import happens_once
 from vrdp_prob.discovery.selection.estimates import widened
+from vrdp_prob.discovery.selection.reach import reaches
 from vrdp_prob.discovery.selection.trials import Trial
 from vrdp_prob.inference.several_videos.learned import believing
 from vrdp_prob.inference.several_videos.population import shared_sd, with_learned_population
@@ -28,10 +29,10 @@ def extended_model(trial: Trial, overdispersion: Float[np.ndarray, "video"]) -> 
     """
     gaussian = trial.fit.joint.gaussian
     mean, wide = gaussian.mean.copy(), widened(shared_sd(trial.fit), overdispersion, trial.unexplained)
-    known = [trial.marginals(cause, overdispersion) for cause in trial.causes]
-    for place, far in (one for found in known for one in found.items()):
+    of_causes = {parameter.name for cause in trial.causes for parameter in cause.parameters}
+    for place, far in reaches(trial.fit, of_causes, wide).items():
         mean[place], sd = far.moments(np.asarray)
-        wide[place] = sd if far.instead else max(sd, wide[place])
+        wide[place] = max(sd, wide[place])
     return believing(_of_the_table(trial), trial.fit.joint.numbers.keys, mean, wide)
 
 

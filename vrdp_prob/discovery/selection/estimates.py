@@ -32,7 +32,6 @@ def estimates(
     *,
     unexplained: Unexplained | None = None,
     overdispersion: Float[np.ndarray, "video"] | None = None,
-    known: Mapping[int, Reach] | None = None,
 ) -> dict[str, Estimate]:
     """Parameters of an effect by name, with the material, or the body and video, that each belongs to.
 
@@ -47,14 +46,12 @@ def estimates(
     overdispersion
         Further factor of each video by which variances are larger than what the likelihood says, shared numbers by
         their mean; 1 where None.
-    known
-        What is known of shared numbers otherwise than as a Gaussian, by their place; how far they reach where None.
     """
     factors = np.ones(len(fit.videos)) if overdispersion is None else overdispersion
     wide = widened(shared_sd(fit), factors, unexplained)
     units = {parameter.name: parameter for parameter in effect.parameters}
     found: dict[str, Estimate] = {}
-    joint, farther = fit.joint, reaches(fit, units, wide) if known is None else known
+    joint, farther = fit.joint, reaches(fit, units, wide)
     for place, key in enumerate(joint.numbers.keys):
         if key[0] in units:
             words = group_words(key[1])
@@ -157,12 +154,10 @@ def _estimate(transform: Transform, mean: float, sd: float, unit: str) -> Estima
 
 
 def _reaching(transform: Transform, gaussian: Estimate, far: Reach) -> Estimate:
-    """An estimate of what is known otherwise than a Gaussian says."""
+    """An estimate of what reaches farther than a Gaussian says."""
     value = np.exp if transform is Transform.LOG else np.asarray
     low, high = (float(value(far.quantile(share))) for share in ((1 - CERTAIN) / 2, (1 + CERTAIN) / 2))
     mean, sd = far.moments(value)
-    if far.instead:
-        return Estimate(mean, sd, low, high, gaussian.unit)
     return Estimate(mean, max(sd, gaussian.sd), min(low, gaussian.q025), max(high, gaussian.q975), gaussian.unit)
 
 

@@ -6,16 +6,14 @@ nothing of that, since the top is at the edge of such a plain.
 
 from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass
-from functools import partial
+from functools import cached_property, partial
 
 import numpy as np
 from jaxtyping import Float
 
-from vrdp_prob.discovery.selection.cause_draws import cause_draws
 from vrdp_prob.inference.runs.parallel import in_parallel
 from vrdp_prob.inference.several_videos.fitting import SharedFit
 from vrdp_prob.inference.several_videos.joint_fit import settle
-from vrdp_prob.models.effects.effect import Effect
 
 SIDE = 2.0
 """Standard deviations from the top at which it is seen whether the density falls..."""
@@ -33,32 +31,25 @@ FINE = 4001
 
 @dataclass(frozen=True)
 class Reach:
-    """How probable each value of a parameter is.
+    """The density of a parameter on a grid.
 
     Parameters
     ----------
     coordinate
-        Values of the parameter's coordinate, the least first.
-    weights
-        Probability of each.
-    instead
-        Whether the Gaussian tells nothing beside it; else what is told is no narrower than that.
+        Evenly spaced values of the parameter's coordinate.
+    log_density
+        Log density (nats, up to a constant) there.
     """
 
     coordinate: Float[np.ndarray, "place"]
-    weights: Float[np.ndarray, "place"]
-    instead: bool = False
+    log_density: Float[np.ndarray, "place"]
 
-    @classmethod
-    def of_density(cls, coordinate: Float[np.ndarray, "place"], log_density: Float[np.ndarray, "place"]) -> "Reach":
-        """That of a log density (nats, up to a constant) at evenly spaced values."""
-        density = np.exp(log_density - log_density.max())
-        return cls(coordinate, density / density.sum())
-
-    @classmethod
-    def of_draws(cls, draws: Float[np.ndarray, "draw"], *, instead: bool) -> "Reach":
-        """That of draws."""
-        return cls(np.sort(draws), np.full(len(draws), 1 / len(draws)), instead)
+    @cached_property
+    def weights(self) -> Float[np.ndarray, "place"]:
+        """Probability of each value."""
+        density = np.exp(self.log_density - self.log_density.max())
+        weights: np.ndarray = density / density.sum()
+        return weights
 
     def quantile(self, probability: float) -> float:
         """Value of the coordinate below which so much of the probability lies."""
@@ -69,25 +60,6 @@ class Reach:
         values = function(self.coordinate)
         mean = float(self.weights @ values)
         return mean, float(np.sqrt(self.weights @ (values - mean) ** 2))
-
-
-def marginals(fit: SharedFit, effect: Effect, sd: Float[np.ndarray, "shared"]) -> dict[int, Reach]:
-    """What is known of the shared numbers of an effect, by their place; without those of which its Gaussian says it.
-
-    Parameters
-    ----------
-    fit
-        The fit.
-    effect
-        The effect.
-    sd
-        As in `reaches`.
-    """
-    drawn = cause_draws(fit, effect, sd)
-    if drawn is None:
-        return reaches(fit, {one.name for one in effect.parameters}, sd)
-    columns = zip(drawn.places.tolist(), drawn.coordinates.T, strict=True)
-    return {place: Reach.of_draws(values, instead=drawn.instead) for place, values in columns}
 
 
 def reaches(fit: SharedFit, names: Collection[str], sd: Float[np.ndarray, "shared"]) -> dict[int, Reach]:
@@ -148,7 +120,7 @@ def reach(density: Callable[[float], float], top: float, sd: float) -> Reach | N
     known |= {value: _finite(density(value)) for value in np.linspace(low, high, POINTS).tolist()}
     places = np.array(sorted(known))
     grid = np.linspace(low, high, FINE)
-    return Reach.of_density(grid, np.interp(grid, places, np.array([known[value] for value in places.tolist()])))
+    return Reach(grid, np.interp(grid, places, np.array([known[value] for value in places.tolist()])))
 
 
 def _outwards(top: float, first: float) -> Iterator[float]:

@@ -14,12 +14,11 @@ from vrdp_prob.discovery.finding import HeldOut
 from vrdp_prob.discovery.residuals.held_out import Cavity, cavities
 from vrdp_prob.discovery.residuals.jitter import alike_in_neighbours
 from vrdp_prob.discovery.residuals.unexplained import Unexplained, unexplained
-from vrdp_prob.discovery.selection.estimates import may_vanish, widened
+from vrdp_prob.discovery.selection.estimates import may_vanish
 from vrdp_prob.discovery.selection.forecast import held_out
-from vrdp_prob.discovery.selection.reach import Reach, marginals
 from vrdp_prob.inference.several_videos.ascent import Effort, ImpossibleStartError
 from vrdp_prob.inference.several_videos.fitting import SharedFit
-from vrdp_prob.inference.several_videos.population import own_parameters, shared_sd, with_learned_population
+from vrdp_prob.inference.several_videos.population import own_parameters, with_learned_population
 from vrdp_prob.inference.several_videos.second_look import (
     LOST,
     SHARE_ASTRAY,
@@ -100,26 +99,6 @@ class Trial:
     def unexplained(self) -> Unexplained:
         """What it leaves to chance."""
         return unexplained(self.fit)
-
-    def marginals(self, cause: Effect, overdispersion: Float[np.ndarray, "video"]) -> dict[int, Reach]:
-        """What is known of the shared numbers of one of its causes otherwise than as a Gaussian, by their place.
-
-        Parameters
-        ----------
-        cause
-            The cause.
-        overdispersion
-            Factor of each video by which variances are larger than what the likelihood says.
-        """
-        key = (cause.name, overdispersion.tobytes())
-        if key not in self._marginals:
-            wide = widened(shared_sd(self.fit), overdispersion, self.unexplained)
-            self._marginals[key] = marginals(self.fit, cause, wide)
-        return self._marginals[key]
-
-    @cached_property
-    def _marginals(self) -> dict[tuple[str, bytes], dict[int, Reach]]:
-        return {}
 
     @property
     def log_density(self) -> Float[np.ndarray, "video"]:

@@ -1,11 +1,12 @@
-"""Whether the place decides how strongly a puck is braked after its collision, without any model.
+"""Whether place and speed decide how strongly a puck is braked after its collision, without any model.
 
     python benchmarks/puck_braking.py [--json FILE]
 
 Tracks of ../shared/data/puck_collisions_2d: one collision of two pucks on an air table per run. The acceleration
-against the velocity is that of a parabola through 13 frames (0.12 s) after the collision. If the table braked, by a
-patch or a slope, runs would be braked alike where they cross the same place: for each square of 2 cm that four or more
-runs cross, the table compares the least and the most braked of them. Without the data nothing is measured.
+against the velocity is that of a parabola through 13 frames (0.12 s) after the collision. A patch of the table or a law
+of friction would brake runs alike that cross the same place as fast: for each square of 2 cm that three or more runs
+cross at speeds within a factor of 1.5, the table compares the least and the most braked of them. Without the data
+nothing is measured.
 """
 
 import argparse
@@ -20,6 +21,7 @@ from _page import table_row
 from jaxtyping import Float
 
 from vrdp_prob.datasets import load_all
+from vrdp_prob.files import write_atomically
 from vrdp_prob.scene import Tracks
 
 DATA = Path(__file__).parents[2] / "shared" / "data" / "puck_collisions_2d"
@@ -27,10 +29,10 @@ HALF = 6
 """Frames on either side of the one at which an acceleration is told."""
 SLOWEST = 0.05
 """Speed in m/s below which a direction of motion tells nothing."""
-SQUARE, FEWEST = 0.02, 4
-"""Side of a square in m, and runs that have to cross it."""
-Braked = tuple[str, Float[np.ndarray, "2"], float]
-"""A run, where a puck is, and its acceleration in m/s^2 against its velocity."""
+SQUARE, BAND, FEWEST = 0.02, 1.5, 3
+"""Side of a square in m, factor between the speeds of a band, and runs that have to cross a square in the same band."""
+Braked = tuple[str, Float[np.ndarray, "2"], float, float]
+"""A run, where a puck is, its speed in m/s, and its acceleration in m/s^2 against its velocity."""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -49,7 +51,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     head = ("puck", "frames", "braking, m/s²", "5 to 95 %", "squares", "least braked run", "most braked run")
     print("\n".join([table_row(*head), "|---" * len(head) + "|", *(line(*one) for one in results.items())]))
     if options.json:
-        options.json.write_text(json.dumps(results, indent=1) + "\n", encoding="utf-8")
+        with write_atomically(options.json) as temporary:
+            temporary.write_text(json.dumps(results, indent=1) + "\n", encoding="utf-8")
     return 0
 
 
@@ -64,14 +67,15 @@ def braked(video: Tracks, puck: int) -> Iterator[Braked]:
         _, velocity, acceleration = np.linalg.lstsq(parabola, places[chosen, puck], rcond=None)[0]
         speed = float(np.linalg.norm(velocity))
         if speed > SLOWEST:
-            yield video.video, places[frame, puck], -float(acceleration @ velocity) / speed
+            yield video.video, places[frame, puck], speed, -float(acceleration @ velocity) / speed
 
 
 def summary(frames: Sequence[Braked]) -> dict[str, float]:
-    """How strongly a puck is braked, and how much that differs between runs at the same place."""
+    """How strongly a puck is braked, and how much that differs between runs at the same place and speed."""
     squares: dict[tuple[int, ...], dict[str, list[float]]] = defaultdict(lambda: defaultdict(list))
-    for run, place, braking in frames:
-        squares[tuple((place // SQUARE).astype(int).tolist())][run].append(braking)
+    for run, place, speed, braking in frames:
+        band = int(np.log(speed) // np.log(BAND))
+        squares[*(place // SQUARE).astype(int).tolist(), band][run].append(braking)
     crossed = [[float(np.mean(one)) for one in runs.values()] for runs in squares.values() if len(runs) >= FEWEST]
     low, middle, high = np.quantile([braking for *_, braking in frames], [0.05, 0.5, 0.95]).tolist()
     return {

@@ -1,7 +1,10 @@
 """What is local is begun at several sizes."""
 
+import numpy as np
+
 from tests.discovery.fitted import fitted
 from tests.discovery.scenes import Setting
+from vrdp_prob.discovery.candidates import scores
 from vrdp_prob.discovery.candidates.scores import score_causes
 from vrdp_prob.discovery.selection.estimates import estimates
 from vrdp_prob.discovery.selection.trials import Trial
@@ -24,3 +27,10 @@ def test_a_patch_is_begun_at_another_size_that_explains_as_much() -> None:
         assert told[name].q025 <= getattr(laws, name) <= told[name].q975
     small_ones = estimates(small.fit, patch, unexplained=small.unexplained)
     assert small_ones["patch_radius"].q975 < laws.patch_radius
+
+
+def test_where_nothing_is_left_the_best_place_is_told_all_the_same() -> None:
+    points = [{"patch_radius": 0.3}, {"patch_radius": 0.6}]
+    assert scores._best_of_each_size(FrictionPatch(), points, np.array([-2e-17, -1e-17])) == [1]
+    assert scores._best_of_each_size(FrictionPatch(), points, np.array([9.0, 10.0])) == [1, 0]
+    assert scores._best_of_each_size(FrictionPatch(), points, np.array([7.0, 10.0])) == [1]

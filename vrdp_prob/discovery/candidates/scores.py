@@ -219,7 +219,7 @@ def _scan_shared(
         for p in range(len(points))
     ]
     statistics = np.array([score.chi_square for score in scores])
-    best = int(np.argmax(statistics))
+    best, *_ = places = _best_of_each_size(effect, points, statistics)
     degrees = scores[best].degrees
     if not degrees:
         return None
@@ -229,9 +229,7 @@ def _scan_shared(
     ]
     alone = _p_value(scores[best], names, effect)
     p_value = anywhere(alone, _places(blocks, degrees, generator))
-    start, *others = (
-        _start(effect, points[place], names, scores[place]) for place in _best_of_each_size(effect, points, statistics)
-    )
+    start, *others = (_start(effect, points[place], names, scores[place]) for place in places)
     largest = _largest([zip(names, score.estimate, score.sd, strict=True) for score in scores], effect)
     strengths = scores[best].estimate
     by_video = tuple(
@@ -336,20 +334,18 @@ def _best_of_each_size(
     best: dict[tuple[float | None, ...], int] = {}
     for place in np.argsort(-statistics, kind="stable").tolist():
         best.setdefault(tuple(points[place].get(name) for name in sizes), place)
-    return [place for place in best.values() if statistics[place] >= OTHER_SIZE * statistics.max()]
+    first, *others = best.values()
+    return [first, *(place for place in others if statistics[place] >= OTHER_SIZE * statistics[first])]
 
 
 def _start(effect: Effect, point: Mapping[str, float], names: Sequence[str], score: Score) -> dict[str, float]:
-    """Where a refit begins at a search point."""
-    estimate = dict(zip(names, score.estimate.tolist(), strict=True))
-    return dict(point) | (_starting(effect, estimate) if len(estimate) == len(names) else {})
-
-
-def _starting(effect: Effect, estimate: Mapping[str, float]) -> dict[str, float]:
     """Where a refit begins: at the estimates, positive where they have to be, and where the motion has a slope."""
+    estimate = dict(zip(names, score.estimate.tolist(), strict=True))
+    if len(estimate) < len(names):
+        return dict(point)
     least = {one.name: LEAST_START * one.default for one in effect.parameters if one.transform is Transform.LOG}
     least |= effect.least_start
-    return {name: max(value, least.get(name, value)) for name, value in estimate.items()}
+    return {**point, **{name: max(value, least.get(name, value)) for name, value in estimate.items()}}
 
 
 def _places(

@@ -230,7 +230,7 @@ class Trial:
         One size explains as much as another where few bodies meet what has it; how many values of it do is what tells
         between them.
         """
-        begun = (base.with_cause(replace(score, start=start, other_starts=())) for start in score.other_starts)
+        begun = (base.with_cause(replace(score, start=start)) for start in score.other_starts)
         return max([self, *(one.continued() for one in begun if one is not None)], key=lambda one: one.fit.log_evidence)
 
     def start_with(self, cause: Effect) -> CauseScore:

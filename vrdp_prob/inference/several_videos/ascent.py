@@ -272,7 +272,7 @@ def _with_one_held(numbers: SharedNumbers, ridges: _Ridges, state: State, slopes
     friction that is any less lets it slide. It is one that the step moves and hardly needs. What the others promise
     without it is not to be lost for that.
     """
-    moved = np.abs(slopes.shared_step) > MOVED * np.sqrt((slopes.root**2).sum(axis=1))
+    moved = np.abs(slopes.shared_step) > MOVED * np.linalg.norm(slopes.root, axis=1)
     held = [slopes.step_without(number) for number in np.flatnonzero(moved).tolist()] if len(numbers) > 1 else []
     worth = [one for one in held if one[1] > max(HALF * slopes.expected_gain, EXPECTED)]
     for step, expected in sorted(worth, key=lambda one: one[1], reverse=True)[:MOST_HELD]:

@@ -49,6 +49,7 @@ def without_tracks(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(refits.Refits, "_placed", lambda _self, _trial: [])
     monkeypatch.setattr(refits.Refits, "_dropped", lambda _self, _trial: [])
     monkeypatch.setattr(refits, "trusted", lambda _fits: np.ones(4, dtype=bool))
+    monkeypatch.setattr(refits.Refits, "searched_where_checks_fail", lambda _self, trial: trial)
 
 
 def selection_with(needed: float = 0.0) -> ForwardSelection:

@@ -94,6 +94,8 @@ class ForwardSelection:
         while len(chain[-1].cause_names) < MOST_CAUSES:
             step = steps[-1] = self.tried(chain[-1])
             found, winner = self.chosen(chain[-1], step)
+            if winner is None and found is chain[-1]:
+                found = self.refits.searched_where_checks_fail(found)
             is_exhausted = _is_trifle(found, chain[-1])
             if found is not chain[-1]:
                 chain[-1], steps[-1] = found, replace(step, left=self.leavings.of(found))

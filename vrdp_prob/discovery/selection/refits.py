@@ -38,6 +38,8 @@ NEARLY = 0.8
 """Share of what a jump of the clock brings from which a law comes first."""
 PLAIN_TURNS = 4
 """Turns from which walls and discs that explain them need no comparison with what else may have been there."""
+MOST_SEARCHED = 12
+"""Number of videos up to which all are searched anew where checks fail in the end."""
 SEARCHES = 3
 """How often the lost videos of a cause are searched anew, as long as that finds something."""
 
@@ -245,6 +247,20 @@ class Refits:
         if found is not one:
             self._keep(trial, [found if old is one else old for old in self.of(trial)])
         return found
+
+    def searched_where_checks_fail(self, trial: Trial) -> Trial:
+        """A model beside which nothing is found, with its videos searched anew if it explains them and checks fail.
+
+        On a wrong course of events a video may be explained as well, where the cause is as strong as that course needs
+        it to be; all others are held there, and what shows it are checks of something else. That may be any video.
+        """
+        fits = trial.fit.fits
+        if not trial.causes or len(fits) > MOST_SEARCHED or lost_videos(fits):
+            return trial
+        if not any(one.significant for one in self.leavings.checks(trial)):
+            return trial
+        other = trial.with_other_courses(range(len(fits)), seed=self.seed)
+        return trial if other.loses_videos_of(trial) else other
 
     def _from_the_beginning(self, trial: Trial, one: Trial) -> Trial:
         """One of the refits, fitted from the beginning if its cause explains the worst of its lost videos then.

@@ -1,6 +1,6 @@
 """The climb of several videos where the best own numbers of one are at an edge."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -133,3 +133,27 @@ def test_a_cloud_finds_the_other_side_of_an_edge() -> None:
 
 def test_the_same_cloud_is_drawn_each_time(monkeypatch: pytest.MonkeyPatch) -> None:
     assert climbed(monkeypatch).log_density == climbed(monkeypatch).log_density
+
+
+@pytest.mark.parametrize(("gain", "rounds"), [(0.5, 1), (1.5, ascent.WHOLE.rounds)], ids=["a trifle", "a good part"])
+def test_a_climb_ends_where_no_common_step_brings_anything_and_edges_bring_a_trifle_of_what_it_promises(
+    gain: float, rounds: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    numbers, video = grazing()
+    crossed = []
+
+    def across(_videos: object, state: ascent.State, _expansions: object) -> ascent.State:
+        crossed.append(state)
+        return replace(state, values=(state.values[0] + gain,))
+
+    monkeypatch.setattr(joint_fit, "expand", expand)
+    monkeypatch.setattr(ascent, "_across_edges", across)
+    monkeypatch.setattr(ascent, "_settled", lambda _videos, state, _expansions: state)
+    monkeypatch.setattr(ascent, "_improved", lambda _numbers, _ridges, state, *_others, **_how: state)
+    monkeypatch.setattr(ascent, "_with_one_held", lambda _numbers, _ridges, state, _slopes: state)
+    monkeypatch.setattr(
+        ascent, "smooth", lambda _slopes: SimpleNamespace(expected_gain=100.0, shared_step=np.array([2.0]))
+    )
+    found = ascent.climb(numbers, [video], np.zeros(1), [np.array([-0.52, -0.48])])
+    assert len(crossed) == rounds
+    assert not found.converged

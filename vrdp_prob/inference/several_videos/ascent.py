@@ -32,6 +32,9 @@ TOLERANCE = 0.2
 EXPECTED = 1.0
 """...and has converged, if no more than so much was expected; where a common step brought nothing, none is tried until
 the videos by themselves have gained as much."""
+STUCK = 0.01
+"""Share of what is expected of a common step below which a search ends where no share of that brings anything: some
+video stands in its way, whichever side of its edges it is on, and what the others find by themselves changes little."""
 HALF = 0.5
 """Share of what is expected of a common step below which a trial looks on both sides of edges before it ends."""
 TOO_DEAR = 2.0
@@ -199,16 +202,18 @@ def climb(
                 trial = _with_one_held(numbers, ridges, own, inner)
             if trial is own:
                 refused = own.total(numbers)
-        brought = trial.total(numbers) - state.total(numbers)
+        brought, enough = trial.total(numbers) - state.total(numbers), effort.enough
         if brought < max(TOLERANCE, min(effort.enough, HALF * expected)):
             own = _across_edges(videos, trial, slopes.videos)
             trial = _improved(numbers, ridges, own, inner.shared_step, expected, around=slopes.videos)
             refused = -np.inf
+            if trial is own:
+                enough = max(enough, STUCK * expected)
         gain = trial.total(numbers) - state.total(numbers)
         if gain > 0:
             state = trial
             slopes = expand_all(numbers, videos, state.shared, state.locals)
-        if gain < effort.enough:
+        if gain < enough:
             converged = smooth(slopes).expected_gain < EXPECTED
             break
     gaussian = slopes.gaussian(state.shared, state.locals, numbers.logarithms)

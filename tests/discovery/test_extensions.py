@@ -11,7 +11,7 @@ from vrdp_prob.discovery.selection import extensions
 from vrdp_prob.discovery.selection.extensions import Extensions
 from vrdp_prob.discovery.selection.leavings import Leavings
 from vrdp_prob.discovery.selection.trials import Trial
-from vrdp_prob.inference.several_videos.ascent import ImpossibleStartError
+from vrdp_prob.inference.several_videos.climb_state import ImpossibleStartError
 from vrdp_prob.models.effects.surface_tilt import SurfaceTilt
 
 

@@ -12,7 +12,7 @@ from vrdp_prob.discovery.selection.courses import Courses
 from vrdp_prob.discovery.selection.extensions import Extensions
 from vrdp_prob.discovery.selection.leavings import Leavings, Left
 from vrdp_prob.discovery.selection.trials import Trial
-from vrdp_prob.inference.several_videos.ascent import ImpossibleStartError
+from vrdp_prob.inference.several_videos.climb_state import ImpossibleStartError
 from vrdp_prob.models.effects.clock_error import ClockError
 from vrdp_prob.models.effects.contact_radius_error import ContactRadiusError
 from vrdp_prob.models.effects.effect import Effect

@@ -17,7 +17,7 @@ from vrdp_prob.inference import default_model
 from vrdp_prob.inference.map_fit import fit_map
 from vrdp_prob.inference.search.plan import TURNING
 from vrdp_prob.inference.several_videos import spin_islands
-from vrdp_prob.inference.several_videos.ascent import NoCommonWorldError
+from vrdp_prob.inference.several_videos.climb_state import NoCommonWorldError
 from vrdp_prob.inference.several_videos.fitting import SharedFit, fit_together
 from vrdp_prob.inference.several_videos.spin_islands import DECAY, with_other_spins
 from vrdp_prob.models.parameters import Prior

@@ -9,8 +9,9 @@ import pytest
 
 from tests.inference.several_videos.videos import sliding
 from vrdp_prob.inference.search.least_squares import jacobian
-from vrdp_prob.inference.several_videos import ascent, joint_fit
+from vrdp_prob.inference.several_videos import ascent, joint_fit, own_steps
 from vrdp_prob.inference.several_videos.arrow import Expansion
+from vrdp_prob.inference.several_videos.climb_state import State
 from vrdp_prob.inference.several_videos.linking import LinkedVideo, SharedNumbers
 from vrdp_prob.models.coordinates import Coordinate, Coordinates
 from vrdp_prob.models.likelihood import Likelihood
@@ -80,7 +81,8 @@ def climbed(monkeypatch: pytest.MonkeyPatch) -> ascent.JointFit:
 @pytest.mark.parametrize("both_sides", [True, False])
 def test_a_ridge_is_followed_along_an_edge(monkeypatch: pytest.MonkeyPatch, *, both_sides: bool) -> None:
     if not both_sides:
-        monkeypatch.setattr(ascent, "_best_of_cloud", lambda video, shared, centre, root, known: known)
+        for module in (ascent, own_steps):
+            monkeypatch.setattr(module, "best_of_cloud", lambda video, shared, centre, root, known: known)
     found = climbed(monkeypatch)
     assert found.gaussian.mean[0] == pytest.approx(BEST, abs=0.2)
     most = -((BEST - 2) ** 2) / (2 * 0.3**2) - (BEST + 1) ** 2 / 4
@@ -101,7 +103,7 @@ def test_where_one_shared_number_is_at_an_edge_the_others_go_on(monkeypatch: pyt
     assert found.gaussian.mean == pytest.approx([1.0, 1.0], abs=0.01)
     slopes = joint_fit.expand_all(numbers, [video], begin, [np.array([-0.5])])
     whole = ascent._improved(
-        numbers, ascent._Ridges([video]), ascent.State.at([video], begin, [np.array([-0.5])]), slopes.shared_step
+        numbers, ascent._Ridges([video]), State.at([video], begin, [np.array([-0.5])]), slopes.shared_step
     )
     assert np.abs(whole.shared - begin).max() < 0.1  # all together they would leave the edge
 
@@ -116,7 +118,7 @@ def test_others_do_not_follow_a_step_that_one_video_hinders(monkeypatch: pytest.
         return np.array([3.0, 0.0]) if hindered and index else own  # where bodies that met do not
 
     monkeypatch.setattr(ascent._Ridges, "end", end)
-    state = ascent.State.at(videos, np.zeros(1), [np.array([-3.0, -0.4])] * 2)
+    state = State.at(videos, np.zeros(1), [np.array([-3.0, -0.4])] * 2)
     found = ascent._improved(numbers, ascent._Ridges(videos), state, np.array([2.0]), 1.0)
     assert (found is state) == hindered
     assert [share for index, share in followed if index == 0] == [2.0]
@@ -126,7 +128,7 @@ def test_others_do_not_follow_a_step_that_one_video_hinders(monkeypatch: pytest.
 def test_a_cloud_finds_the_other_side_of_an_edge() -> None:
     _, video = grazing()
     shared, beyond = np.array([1.0]), np.array([-0.9, 0.05])  # they would have to meet, and just do not
-    found = ascent._best_of_cloud(video, shared, beyond, np.eye(2), beyond)
+    found = own_steps.best_of_cloud(video, shared, beyond, np.eye(2), beyond)
     assert video.value(shared, beyond) < -1000
     assert video.value(shared, found) > -3
 
@@ -142,13 +144,13 @@ def test_a_climb_ends_where_no_common_step_brings_anything_and_edges_bring_a_tri
     numbers, video = grazing()
     crossed = []
 
-    def across(_videos: object, state: ascent.State, _expansions: object) -> ascent.State:
+    def across(_videos: object, state: State, _expansions: object) -> State:
         crossed.append(state)
         return replace(state, values=(state.values[0] + gain,))
 
     monkeypatch.setattr(joint_fit, "expand", expand)
-    monkeypatch.setattr(ascent, "_across_edges", across)
-    monkeypatch.setattr(ascent, "_settled", lambda _videos, state, _expansions: state)
+    monkeypatch.setattr(ascent, "across_edges", across)
+    monkeypatch.setattr(ascent, "settled", lambda _videos, state, _expansions: state)
     monkeypatch.setattr(ascent, "_improved", lambda _numbers, _ridges, state, *_others, **_how: state)
     monkeypatch.setattr(ascent, "_with_one_held", lambda _numbers, _ridges, state, _slopes: state)
     monkeypatch.setattr(

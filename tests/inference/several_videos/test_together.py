@@ -28,7 +28,7 @@ from vrdp_prob.inference.several_videos import (
     sample_together,
     together,
 )
-from vrdp_prob.inference.several_videos.ascent import ImpossibleStartError
+from vrdp_prob.inference.several_videos.climb_state import ImpossibleStartError
 from vrdp_prob.inference.several_videos.gibbs import sample_gibbs
 from vrdp_prob.inference.several_videos.gradient_ascent import _Whitened, climb_by_gradient
 from vrdp_prob.inference.several_videos.joining import joined

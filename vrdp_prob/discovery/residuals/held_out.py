@@ -17,7 +17,6 @@ from scipy.linalg import cho_solve, cholesky, solve_triangular, svdvals
 from vrdp_prob.inference.runs.parallel import in_parallel
 from vrdp_prob.inference.search.prior_mass import log_prior_constant
 from vrdp_prob.inference.several_videos.arrow import LOG_TWO_PI
-from vrdp_prob.inference.several_videos.ascent import STEEP
 from vrdp_prob.inference.several_videos.fitting import SharedFit
 from vrdp_prob.inference.several_videos.joint_fit import expand, expand_prior
 
@@ -48,7 +47,7 @@ def cavities(fit: SharedFit) -> dict[str, Cavity]:
     )
     prior = expand_prior(joint.numbers, mean)
     # Where a video is at an edge between two courses of events its gradient says nothing of what lies beyond.
-    inside = [one.promised < STEEP for one in expansions]
+    inside = [not one.at_edge for one in expansions]
     gradients = [one.reduced_gradient * ok for one, ok in zip(expansions, inside, strict=True)]
     curvatures = [one.reduced for one in expansions]
     total = prior.curvature + sum(curvatures)

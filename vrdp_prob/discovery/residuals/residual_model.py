@@ -19,7 +19,7 @@ from vrdp_prob.discovery.residuals.linear import LinearFit, LinearVideo, Score
 from vrdp_prob.inference.runs.parallel import in_parallel
 from vrdp_prob.inference.search.least_squares import jacobian
 from vrdp_prob.inference.search.noise_fit import NOISE_FIELDS
-from vrdp_prob.inference.several_videos.ascent import STEEP
+from vrdp_prob.inference.several_videos.arrow import STEEP
 from vrdp_prob.inference.several_videos.fitting import SharedFit
 from vrdp_prob.inference.several_videos.joint_fit import expand_prior
 from vrdp_prob.inference.several_videos.linking import LinkedVideo

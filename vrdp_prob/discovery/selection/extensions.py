@@ -17,7 +17,7 @@ from vrdp_prob.discovery.selection.met_surfaces import fit_with_surfaces
 from vrdp_prob.discovery.selection.restamped import fit_with_dropped_frames
 from vrdp_prob.discovery.selection.trials import Trial
 from vrdp_prob.inference.runs.parallel import in_processes
-from vrdp_prob.inference.several_videos.ascent import ImpossibleStartError
+from vrdp_prob.inference.several_videos.climb_state import ImpossibleStartError
 from vrdp_prob.inference.several_videos.fitting import SharedFit, fit_together
 from vrdp_prob.inference.several_videos.second_look import explained
 from vrdp_prob.models.effects.dropped_frames import DroppedFrames

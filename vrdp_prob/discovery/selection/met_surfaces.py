@@ -6,7 +6,7 @@ from dataclasses import replace
 from vrdp_prob.discovery.candidates.surfaces import Placed, as_stated
 from vrdp_prob.discovery.selection.trials import FIRST, Trial
 from vrdp_prob.errors import InputError
-from vrdp_prob.inference.several_videos.ascent import ImpossibleStartError
+from vrdp_prob.inference.several_videos.climb_state import ImpossibleStartError
 from vrdp_prob.inference.several_videos.fitting import SharedFit, fit_together
 from vrdp_prob.inference.several_videos.learned import with_learned_walls
 from vrdp_prob.inference.several_videos.second_look import FAR_WORSE, explained

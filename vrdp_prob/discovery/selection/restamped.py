@@ -10,7 +10,7 @@ from vrdp_prob.discovery.candidates.dropped_frames import SIGNIFICANT, Dropped
 from vrdp_prob.discovery.checks.clock import LateFrames
 from vrdp_prob.discovery.residuals.residual_model import ResidualModel
 from vrdp_prob.discovery.selection.trials import FIRST, Trial
-from vrdp_prob.inference.several_videos.ascent import ImpossibleStartError
+from vrdp_prob.inference.several_videos.climb_state import ImpossibleStartError
 from vrdp_prob.inference.several_videos.fitting import SharedFit, fit_together
 from vrdp_prob.models.effects.dropped_frames import DROPPED_AFTER, FRAME_TIME, MOST_DROPPED, DroppedFrames
 from vrdp_prob.models.unknowns import Held

@@ -16,7 +16,8 @@ from vrdp_prob.discovery.residuals.jitter import alike_in_neighbours
 from vrdp_prob.discovery.residuals.unexplained import Unexplained, unexplained
 from vrdp_prob.discovery.selection.estimates import may_vanish
 from vrdp_prob.discovery.selection.forecast import held_out
-from vrdp_prob.inference.several_videos.ascent import Effort, ImpossibleStartError
+from vrdp_prob.inference.several_videos.ascent import Effort
+from vrdp_prob.inference.several_videos.climb_state import ImpossibleStartError
 from vrdp_prob.inference.several_videos.fitting import SharedFit
 from vrdp_prob.inference.several_videos.population import own_parameters, with_learned_population
 from vrdp_prob.inference.several_videos.second_look import (

@@ -19,6 +19,9 @@ from vrdp_prob.inference.draws.triangles import lower_root, upper_root
 
 LARGEST_LOGARITHM = 5.0
 LOG_TWO_PI = float(np.log(2 * np.pi))
+STEEP = 5.0
+"""Gain (nats) that its own step promises a video which has just looked for its best own numbers, from which on it is
+taken to be at an edge: where two orders of events meet, or a contact just happens."""
 
 
 @dataclass(frozen=True)
@@ -90,6 +93,11 @@ class Expansion:
     def promised(self) -> float:
         """Gain (nats) that the Newton step of the own numbers promises."""
         return float(self._pulled @ self._pulled) / 2
+
+    @property
+    def at_edge(self) -> bool:
+        """Whether a video that has just looked for its best own numbers is at an edge, where gradients say nothing."""
+        return self.promised > STEEP
 
     @cached_property
     def separate_steps(self) -> Float[np.ndarray, "direction local"]:

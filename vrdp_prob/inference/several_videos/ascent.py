@@ -6,32 +6,23 @@ along an edge, where a contact just happens, and is then looked for on both side
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
-import torch
 from jaxtyping import Bool, Float
-from scipy.optimize import minimize
 
-from vrdp_prob.errors import InputError
 from vrdp_prob.inference.runs.journal import kept
 from vrdp_prob.inference.runs.parallel import in_parallel
-from vrdp_prob.inference.search.noise_fit import NOISE_FIELDS, best_noise
-from vrdp_prob.inference.several_videos.arrow import Expansion, Expansions
-from vrdp_prob.inference.several_videos.joint_fit import JointFit, expand_all, expand_prior, follow_or_settle, settle
+from vrdp_prob.inference.several_videos.arrow import STEEP, Expansion, Expansions
+from vrdp_prob.inference.several_videos.climb_state import EXPECTED, TOLERANCE, State, with_best_noise
+from vrdp_prob.inference.several_videos.joint_fit import JointFit, expand_all, follow_or_settle, settle
 from vrdp_prob.inference.several_videos.linking import LinkedVideo, SharedNumbers
+from vrdp_prob.inference.several_videos.own_steps import across_edges, best_of_cloud, settled
 
 SHARES = (1.0, 0.3, 0.1, 0.02)
 """Shares of a common step that are tried, one after the other, until one brings something."""
-OWN_SHARES = np.array([1.0, 0.3, 0.1])
-"""Shares of its own Newton step among which each video chooses beforehand."""
 STEPS = 30
 """Steps in which a video follows a common step; where they are not enough, that was too long."""
-TOLERANCE = 0.2
-"""Gain (nats) of a step, expected or real, below which a search ends..."""
-EXPECTED = 1.0
-"""...and has converged, if no more than so much was expected; where a common step brought nothing, none is tried until
-the videos by themselves have gained as much."""
 STUCK = 0.01
 """Share of what is expected of a common step below which a search ends where no share of that brings anything: some
 video stands in its way, whichever side of its edges it is on, and what the others find by themselves changes little."""
@@ -42,15 +33,8 @@ TOO_DEAR = 2.0
 looked at."""
 MOVED, MOST_HELD = 0.5, 2
 """Standard deviations by which a common step has to move a number for that to be held instead, and how many are."""
-STEEP = 5.0
-"""Gain (nats) that its own step promises a video which has just looked for its best own numbers, from which on it is
-taken to be at an edge: where two orders of events meet, or a contact just happens."""
 FELL = 2.0
 """Nats that a video may lose on the way along its ridge before it is taken to have left it over an edge."""
-CLOUD, SPREADS = 64, (0.1, 0.3)
-"""Own numbers that are tried on either side of an edge, for each of these shares of their standard deviations..."""
-FINISHED = 3
-"""...and how many of them, the best ones, go on from there."""
 
 
 @dataclass(frozen=True)
@@ -71,46 +55,6 @@ class Effort:
 
 WHOLE = Effort()
 """To the top."""
-
-
-class ImpossibleStartError(Exception):
-    """A search was to begin where the world of some video cannot be simulated, or where it is not worth its while.
-
-    Its text names the videos that cannot be simulated.
-    """
-
-
-class NoCommonWorldError(ImpossibleStartError, InputError):
-    """Some video has no world at what all of them say of the numbers that they share."""
-
-
-@dataclass(frozen=True)
-class State:
-    """Where a climb is: shared numbers, those of each video, and the log density of each video."""
-
-    shared: Float[np.ndarray, "shared"]
-    locals: tuple[Float[np.ndarray, "_"], ...]
-    values: tuple[float, ...]
-
-    @classmethod
-    def at(
-        cls,
-        videos: Sequence[LinkedVideo],
-        shared: Float[np.ndarray, "shared"],
-        locals_: Sequence[Float[np.ndarray, "_"]],
-    ) -> "State":
-        """That of some numbers."""
-        values = (video.value(shared, local) for video, local in zip(videos, locals_, strict=True))
-        return cls(shared, tuple(locals_), tuple(values))
-
-    def impossible(self, videos: Sequence[LinkedVideo]) -> ImpossibleStartError:
-        """What is raised where nothing can begin here: it names the videos that cannot be simulated."""
-        values = zip(videos, self.values, strict=True)
-        return ImpossibleStartError(", ".join(video.name for video, value in values if not np.isfinite(value)))
-
-    def total(self, numbers: SharedNumbers) -> float:
-        """Joint log posterior (nats, up to a constant)."""
-        return float(numbers.log_prior(self.shared[None])[0]) + sum(self.values)
 
 
 @dataclass(frozen=True)
@@ -178,13 +122,12 @@ def climb(
     """
     if least is not None:
         locals_ = in_parallel(lambda index: settle(videos[index], shared, [locals_[index]]), range(len(videos)))
-    state, converged = _with_best_noise(numbers, videos, State.at(videos, shared, locals_)), False
+    state, converged = with_best_noise(numbers, videos, State.at(videos, shared, locals_)), False
     if not state.total(numbers) > (-np.inf if least is None else least):
         raise state.impossible(videos)
     slopes = expand_all(numbers, videos, state.shared, state.locals)
     if towards is not None and not np.array_equal(towards, shared):
-        settled = _settled(videos, state, slopes.videos)
-        state = _improved(numbers, _Ridges(videos), settled, towards - shared)
+        state = _improved(numbers, _Ridges(videos), settled(videos, state, slopes.videos), towards - shared)
         slopes = expand_all(numbers, videos, state.shared, state.locals)
     refused = -np.inf
     for _ in range(effort.rounds):
@@ -194,7 +137,7 @@ def climb(
         converged = expected < TOLERANCE
         if converged:
             break
-        trial, ridges = _settled(videos, state, slopes.videos), _Ridges(videos)
+        trial, ridges = settled(videos, state, slopes.videos), _Ridges(videos)
         if _gained(trial, state, ~inside) < EXPECTED and trial.total(numbers) > refused + EXPECTED:
             own = trial
             trial = _improved(numbers, ridges, own, inner.shared_step, expected)
@@ -204,7 +147,7 @@ def climb(
                 refused = own.total(numbers)
         brought, enough = trial.total(numbers) - state.total(numbers), effort.enough
         if brought < max(TOLERANCE, min(effort.enough, HALF * expected)):
-            own = _across_edges(videos, trial, slopes.videos)
+            own = across_edges(videos, trial, slopes.videos)
             trial = _improved(numbers, ridges, own, inner.shared_step, expected, around=slopes.videos)
             refused = -np.inf
             if trial is own:
@@ -225,7 +168,7 @@ def _inside(slopes: Expansions) -> Bool[np.ndarray, "video"]:
 
     Others are at an edge, and what they say there of the shared numbers is not to be believed.
     """
-    return np.array([one.promised < STEEP for one in slopes.videos], dtype=bool)
+    return np.array([not one.at_edge for one in slopes.videos], dtype=bool)
 
 
 def smooth(slopes: Expansions) -> Expansions:
@@ -261,7 +204,7 @@ def _improved(
         followed = _followed(ridges, state, target, around, first=hindering, most=most)
         if followed is None:
             continue
-        trial = _with_best_noise(numbers, ridges.videos, followed)
+        trial = with_best_noise(numbers, ridges.videos, followed)
         if trial.total(numbers) > before:
             return trial
         lost = np.array(state.values) - np.array(trial.values)
@@ -308,7 +251,7 @@ def _followed(
         if around is None or video.value(target, found) > state.values[index] - FELL:
             return found
         expected = own + around[index].slope @ (target - state.shared)
-        return _best_of_cloud(video, target, expected, around[index].local_root, found)
+        return best_of_cloud(video, target, expected, around[index].local_root, found)
 
     locals_ = {}
     for index in first:
@@ -318,120 +261,3 @@ def _followed(
     rest = [index for index in range(len(ridges.videos)) if index not in locals_]
     locals_ |= zip(rest, in_parallel(found, rest), strict=True)
     return State.at(ridges.videos, target, [locals_[index] for index in range(len(ridges.videos))])
-
-
-def _across_edges(videos: Sequence[LinkedVideo], state: State, expansions: Sequence[Expansion]) -> State:
-    """The state with each video whose own Newton step promised something at the best of a cloud around it."""
-
-    def best(index: int) -> Float[np.ndarray, "_"]:
-        video, own, expansion = videos[index], state.locals[index], expansions[index]
-        if expansion.promised < EXPECTED:
-            return own
-        found = _best_of_cloud(video, state.shared, own, expansion.local_root, own)
-        return found if video.value(state.shared, found) > state.values[index] else own
-
-    return State.at(videos, state.shared, in_parallel(best, range(len(videos))))
-
-
-def _best_of_cloud(
-    video: LinkedVideo,
-    shared: Float[np.ndarray, "shared"],
-    centre: Float[np.ndarray, "local"],
-    root: Float[np.ndarray, "local local"],
-    known: Float[np.ndarray, "local"],
-) -> Float[np.ndarray, "local"]:
-    """Own numbers that are the best of those known and of what becomes of a cloud around a centre."""
-    directions = np.random.default_rng(0).standard_normal((CLOUD, len(centre))) @ root.T
-    cloud = np.concatenate([centre + share * directions for share in SPREADS])
-    promising = np.argsort(-_values(video, shared, cloud))[:FINISHED]
-    return settle(video, shared, [known, *cloud[promising]])
-
-
-def _settled(videos: Sequence[LinkedVideo], state: State, expansions: Sequence[Expansion]) -> State:
-    """Each video at the best that its own Newton step leads to."""
-    locals_, values = [], []
-    for video, local, value, one in zip(videos, state.locals, state.values, expansions, strict=True):
-        steps = OWN_SHARES[:, None] * one.local_step
-        if one.promised > STEEP:
-            steps = np.concatenate([steps, _bent_steps(video, state.shared, local, value, one)])
-        found = _values(video, state.shared, local + steps)
-        best = int(found.argmax())
-        locals_.append(local + steps[best] if found[best] > value else local)
-        values.append(max(float(found[best]), value))
-    return replace(state, locals=tuple(locals_), values=tuple(values))
-
-
-def _bent_steps(
-    video: LinkedVideo,
-    shared: Float[np.ndarray, "shared"],
-    local: Float[np.ndarray, "local"],
-    value: float,
-    expansion: Expansion,
-) -> Float[np.ndarray, "trial local"]:
-    """Steps made of those parts of the Newton step that bring something by themselves.
-
-    A few directions in which the density bends spoil the whole step, and damping it would hold back the flattest
-    directions most: a common factor on all masses, say, that only their priors know.
-    """
-    parts = expansion.separate_steps
-    trials = OWN_SHARES[:, None, None] * parts
-    gains = _values(video, shared, local + trials.reshape(-1, len(local))).reshape(trials.shape[:2]) - value
-    best = gains.argmax(axis=0)
-    brings = gains.max(axis=0) > 0
-    chosen = trials[best, np.arange(len(parts))]
-    return np.concatenate([OWN_SHARES[:, None] * chosen[brings].sum(axis=0), chosen[[int(gains.max(axis=0).argmax())]]])
-
-
-def _values(
-    video: LinkedVideo, shared: Float[np.ndarray, "shared"], locals_: Float[np.ndarray, "trial local"]
-) -> Float[np.ndarray, "trial"]:
-    return video.log_density(np.tile(shared, (len(locals_), 1)), locals_)
-
-
-def _with_best_noise(numbers: SharedNumbers, videos: Sequence[LinkedVideo], state: State) -> State:
-    """The state with the most probable sizes of the noise for its worlds."""
-    locals_ = []
-    for video, local in zip(videos, state.locals, strict=True):
-        own = video.likelihood.coordinates.mask(NOISE_FIELDS)
-        own[video.shared_places] = False
-        point = video.points(state.shared, local)
-        locals_.append(video.split(best_noise(video.data, point, own))[1] if own.any() else local)
-    columns = np.flatnonzero([field in NOISE_FIELDS for field, _ in numbers.keys])
-    shared = _best_shared_noise(numbers, videos, state.shared, locals_, columns) if len(columns) else state.shared
-    found = State.at(videos, shared, locals_)
-    return found if found.total(numbers) > state.total(numbers) else state
-
-
-def _best_shared_noise(
-    numbers: SharedNumbers,
-    videos: Sequence[LinkedVideo],
-    shared: Float[np.ndarray, "shared"],
-    locals_: Sequence[Float[np.ndarray, "_"]],
-    columns: np.ndarray,
-) -> Float[np.ndarray, "shared"]:
-    """Shared numbers with the most probable noise for given worlds."""
-    with torch.no_grad():
-        discrepancies = [
-            video.data.discrepancies(torch.from_numpy(video.points(shared, local)[None]))
-            for video, local in zip(videos, locals_, strict=True)
-        ]
-    if not all(bool(torch.isfinite(one.positions).all()) for one in discrepancies):
-        return shared
-
-    def descend(values: Float[np.ndarray, "noise"]) -> tuple[float, Float[np.ndarray, "noise"]]:
-        moved = shared.copy()
-        moved[columns] = values
-        prior = expand_prior(numbers, moved)
-        loss, slope = -float(numbers.log_prior(moved[None])[0]), prior.gradient.copy()
-        for video, local, one in zip(videos, locals_, discrepancies, strict=True):
-            point = torch.from_numpy(video.points(moved, local)[None]).requires_grad_()
-            value = video.data.log_density_given(one, point)[0]
-            (gradient,) = torch.autograd.grad(value, point)
-            loss -= float(value.detach())
-            slope[video.shared_columns] -= gradient[0].numpy()[video.shared_places]
-        return loss, slope[columns]
-
-    result = minimize(descend, shared[columns], jac=True, method="L-BFGS-B", options={"maxiter": 30})
-    moved = shared.copy()
-    moved[columns] = result.x
-    return moved

@@ -18,7 +18,8 @@ from vrdp_prob.inference.search.misfit import judge
 from vrdp_prob.inference.search.model_error_fit import TURNS, next_model_error
 from vrdp_prob.inference.search.plan import IN_DOUBT, FitPlan
 from vrdp_prob.inference.several_videos.agreement import following_ones
-from vrdp_prob.inference.several_videos.ascent import WHOLE, Effort, ImpossibleStartError, NoCommonWorldError, climb
+from vrdp_prob.inference.several_videos.ascent import WHOLE, Effort, climb
+from vrdp_prob.inference.several_videos.climb_state import ImpossibleStartError, NoCommonWorldError
 from vrdp_prob.inference.several_videos.joining import CLIMBS, Climb, joined
 from vrdp_prob.inference.several_videos.joint_fit import JointFit, with_alternatives
 from vrdp_prob.inference.several_videos.linking import check_names, link

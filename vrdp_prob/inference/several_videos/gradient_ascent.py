@@ -16,7 +16,8 @@ from vrdp_prob.inference.draws.samples import evaluate_with_gradient
 from vrdp_prob.inference.runs.parallel import in_parallel
 from vrdp_prob.inference.search.descent import FAILED
 from vrdp_prob.inference.several_videos.arrow import ArrowGaussian
-from vrdp_prob.inference.several_videos.ascent import EXPECTED, TOLERANCE, State, smooth
+from vrdp_prob.inference.several_videos.ascent import smooth
+from vrdp_prob.inference.several_videos.climb_state import EXPECTED, TOLERANCE, State
 from vrdp_prob.inference.several_videos.joint_fit import JointFit, expand_all
 from vrdp_prob.inference.several_videos.linking import LinkedVideo, SharedNumbers
 

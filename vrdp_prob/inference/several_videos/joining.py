@@ -14,7 +14,8 @@ from vrdp_prob.inference.search.misfit import judge
 from vrdp_prob.inference.search.plan import TURNING, FitPlan, Optimiser
 from vrdp_prob.inference.search.yaw_search import tells_yaws_by_contacts
 from vrdp_prob.inference.several_videos.agreement import first_guess
-from vrdp_prob.inference.several_videos.ascent import ImpossibleStartError, climb
+from vrdp_prob.inference.several_videos.ascent import climb
+from vrdp_prob.inference.several_videos.climb_state import ImpossibleStartError
 from vrdp_prob.inference.several_videos.gradient_ascent import climb_by_gradient
 from vrdp_prob.inference.several_videos.joint_fit import JointFit
 from vrdp_prob.inference.several_videos.linking import LinkedVideo, SharedNumbers

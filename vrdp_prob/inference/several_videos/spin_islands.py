@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 from vrdp_prob.inference.search.yaw_search import tells_yaws_by_contacts
-from vrdp_prob.inference.several_videos.ascent import ImpossibleStartError
+from vrdp_prob.inference.several_videos.climb_state import ImpossibleStartError
 from vrdp_prob.inference.several_videos.fitting import NEWS, SharedFit, fit_together
 from vrdp_prob.models.parameters import ANGULAR_DRAG, Parameter, Prior, Scope
 from vrdp_prob.models.physics import PhysicsModel

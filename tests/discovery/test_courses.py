@@ -49,8 +49,8 @@ def test_a_course_for_which_another_video_loses_its_own_is_a_wrong_one(
     tilt.mended.assert_called_once_with([2], seed=0, thorough=True)
 
 
-def check(*, significant: bool) -> Check:
-    return Check("lost frames", 0.0, 0.0 if significant else 0.5, significant, "")
+def check(p_value: float) -> Check:
+    return Check("lost frames", 0.0, p_value, False, "")
 
 
 @pytest.mark.parametrize(
@@ -80,7 +80,7 @@ def test_all_videos_are_searched_anew_where_a_model_explains_them_and_a_check_fa
     found.with_other_courses.side_effect = lambda among, *, seed: {(tuple(range(videos)), 0): other}[tuple(among), seed]
     other.loses_videos_of.side_effect = lambda before: is_wrong and before is found
     monkeypatch.setattr(refits, "lost_videos", lambda _fits: lost)
-    monkeypatch.setattr(Leavings, "checks", lambda _self, _trial: (check(significant=False), check(significant=fails)))
+    monkeypatch.setattr(Leavings, "checks", lambda _self, _trial: (check(0.3), check(0.002 if fails else 0.003)))
     assert refits_with().searched_where_checks_fail(found) is (other if taken else found)
 
 

@@ -7,6 +7,7 @@ from functools import partial
 import numpy as np
 from jaxtyping import Float
 
+from vrdp_prob.discovery.checks.false_discovery import something_left
 from vrdp_prob.discovery.finding import Check, FoundCause, Gain, Verdict
 from vrdp_prob.discovery.selection.doubts import Doubt, Without, doubts, unasked_turns, with_doubts
 from vrdp_prob.discovery.selection.estimates import cause_sentence, estimates
@@ -23,8 +24,6 @@ MIMIC = 0.5
 EXPLAINED, MENDED = 0.5, 0.6
 """Share of what the model left unexplained beyond the noise, and of the checks that failed, that the named causes must
 explain for them to be the verdict where something is left."""
-LEFT_LEVEL = 0.005
-"""Probability, over all checks, with which a model that explains everything is taken to leave something."""
 LEAST_SHARE = 0.01
 """Probability from which a cause is told of that could take the place of a named one."""
 
@@ -155,7 +154,7 @@ def _credible(trial: Trial) -> bool:
 
 def _verdict(found: Search, before: Sequence[Check], after: Sequence[Check]) -> Verdict:
     """What is said of a model whose causes nobody doubts, by the checks before and after."""
-    left = min((check.p_value for check in after), default=1.0) * len(after) < LEFT_LEVEL
+    left = something_left(after)
     if not found.best.causes:
         return Verdict.UNKNOWN if left or _loses_any(found.base) else Verdict.NONE
     explained = _excess(found.best) <= (1 - EXPLAINED) * _excess(found.base)

@@ -12,6 +12,8 @@ RATE = 0.05
 """Largest share of false ones among the checks that count (and probability of any where nothing is wrong)."""
 SEEN = 0.01
 """Probability by chance below which something was seen, however many other checks count."""
+LEFT_LEVEL = 0.005
+"""Probability, over all checks, with which a model is taken to leave something."""
 
 
 def significant(p_values: Float[np.ndarray, "check"], rate: float = RATE) -> Bool[np.ndarray, "check"]:
@@ -40,3 +42,8 @@ def controlled(checks: Sequence[Check]) -> tuple[Check, ...]:
     marks = significant(p_values) & (p_values < SEEN)
     marked = [replace(check, significant=bool(mark)) for check, mark in zip(checks, marks, strict=True)]
     return tuple(sorted(marked, key=lambda check: check.p_value))
+
+
+def something_left(checks: Sequence[Check]) -> bool:
+    """Whether the worst of all checks of a model is too improbable by chance, among so many, for nothing to be left."""
+    return min((check.p_value for check in checks), default=1.0) * len(checks) < LEFT_LEVEL

@@ -11,6 +11,7 @@ from vrdp_prob.discovery.candidates.dropped_frames import Dropped, frames_unknow
 from vrdp_prob.discovery.candidates.scores import CauseScore, happens_once, mends_any_course
 from vrdp_prob.discovery.candidates.single_videos import causes_of_lost_videos
 from vrdp_prob.discovery.candidates.surfaces import Placed, surfaces_unknown_to
+from vrdp_prob.discovery.checks.false_discovery import something_left
 from vrdp_prob.discovery.selection.courses import Courses
 from vrdp_prob.discovery.selection.doubts import HELD_BY_BODIES, causes_with_own_check_failing
 from vrdp_prob.discovery.selection.extensions import Extensions, explaining
@@ -257,7 +258,7 @@ class Refits:
         fits = trial.fit.fits
         if not trial.causes or len(fits) > MOST_SEARCHED or lost_videos(fits):
             return trial
-        if not any(one.significant for one in self.leavings.checks(trial)):
+        if not something_left(self.leavings.checks(trial)):
             return trial
         other = trial.with_other_courses(range(len(fits)), seed=self.seed)
         return trial if other.loses_videos_of(trial) else other

@@ -47,10 +47,13 @@ def test_tracks_show_most_of_them_and_none_elsewhere(seed: int) -> None:
     assert {round(one.frame_time, 6) for one in found} == {round(1 / data.truth.videos[0].frame_rate, 6)}
 
 
-@pytest.mark.parametrize("way", [None, "external_impulse", "wall_met_often", "contact_radius_error"])
-def test_outliers_dropouts_kicks_and_contacts_are_none(way: str | None) -> None:
+@pytest.mark.parametrize(
+    ("way", "strength"),
+    [(None, 0.0), ("external_impulse", 0.3), ("wall_met_often", 0.3), ("contact_radius_error", 0.3)],
+)
+def test_outliers_dropouts_kicks_and_contacts_are_none(way: str | None, strength: float) -> None:
     for seed in (1, 2):
-        wanted = [] if way is None else [Wanted(way, strength=0.3)]
+        wanted = [] if way is None else [Wanted(way, strength=strength)]
         data = draw(wanted, seed=seed, setting=Setting(videos=4, bodies=3), measurement=ROUGH)
         assert dropped_frames(data.tracks) == []
 
@@ -64,14 +67,28 @@ def test_a_single_one_is_left_to_the_other_way_of_the_cause_and_uneven_stamps_ar
     assert dropped_frames([Dropped(tuple(places), 1 / 25).restamped(full)]) == []
 
 
-def test_more_than_a_video_may_lack_are_something_else() -> None:
-    times = np.arange(400) / 25
-    late = np.cumsum(np.arange(400) % 8 == 7) / 25
-    positions = np.stack([0.8 * (times + late), 0 * times], axis=1)[:, None]
+def stamped_evenly(late: np.ndarray) -> Tracks:
+    """Tracks of a body that glides, of which each frame is late by so many frames."""
+    times = np.arange(len(late)) / 25
+    positions = np.stack([1.6 * (times + late / 25), 0 * times], axis=1)[:, None]
     noise = np.random.default_rng(0).normal(0, 0.002, positions.shape)
-    tracks = Tracks.from_arrays("v", (Body("a", Shape.CYLINDER, radius=0.1),), times, positions + noise)
-    assert late[-1] * 25 > MOST_DROPPED
-    assert dropped_frames([tracks]) == []
+    return Tracks.from_arrays("v", (Body("a", Shape.CYLINDER, radius=0.1),), times, positions + noise)
+
+
+def test_more_than_a_video_may_lack_are_something_else() -> None:
+    late = np.cumsum(np.arange(400) % 8 == 7)
+    assert late[-1] > MOST_DROPPED
+    assert dropped_frames([stamped_evenly(late)]) == []
+
+
+@pytest.mark.parametrize("lasting", [True, False], ids=["all later ones are as late", "later ones are not"])
+def test_frames_that_come_early_and_late_hide_no_other(*, lasting: bool) -> None:
+    late = np.zeros(100)
+    for place in (30, 70):
+        late[place:] += lasting
+        late[place - 1 : place + 1] += [-0.38, 0.38] if not lasting else 0.0
+    found = dropped_frames([stamped_evenly(late)])
+    assert [len(one.after) for one in found] == ([2] if lasting else [])
 
 
 @pytest.fixture(scope="module")

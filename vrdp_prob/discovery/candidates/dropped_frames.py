@@ -23,6 +23,8 @@ SIGNIFICANT = 6.0
 """Standard deviations by which a step is too long, from which on it is several, wherever it was looked for."""
 WHOLE = 0.25
 """Share of a step by which it may be off a whole number of usual ones, beside the noise: bodies brake."""
+AWAY = 0.1
+"""The same for it with the two beside it: a frame that comes late by itself makes the next step as much shorter."""
 BEND = 0.5
 """Share of a step by which those before and after may differ: by more, the body has met something."""
 ALIKE = 4.0
@@ -101,14 +103,17 @@ def _missing(steps: Float[np.ndarray, "step body 2"], place: int, noise: float) 
     around = steps[place - 1 : place + 2]
     with np.errstate(invalid="ignore"):
         taken = (around * usual).sum(axis=2) / size**2
-        telling = (bend < BEND * size) & (size > ALIKE * noise) & (np.nan_to_num(taken[[0, 2]], nan=1.0) > 0.5).all(0)
+        beside = np.nan_to_num(taken[[0, 2]], nan=1.0)
+        telling = (bend < BEND * size) & (size > ALIKE * noise) & (beside > 0.5).all(0)
     told = np.flatnonzero(telling & np.isfinite(taken[1]))
     if not len(told):
         return 0
     squares = size[told] ** 2
     count, sd = float((taken[1, told] * squares).sum() / squares.sum()), np.sqrt(2.0 / squares.sum()) * noise
-    whole = round(count)
+    whole, excess = round(count), float((beside[:, told].sum(axis=0) * squares).sum() / squares.sum()) - 2
     if whole < 2 or count - 1 < SIGNIFICANT * sd or abs(count - whole) > WHOLE + 2 * sd:
+        return 0
+    if abs(count + excess - whole) > AWAY + 2 * sd:
         return 0
     off = np.linalg.norm(around[1, told] - whole * usual[told], axis=1)
     allowed = ALIKE * np.sqrt(2.0 * (1 + whole**2)) * noise + WHOLE * size[told]

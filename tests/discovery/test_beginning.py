@@ -34,7 +34,7 @@ def _search(best: Trial, rivals: Sequence[Sequence[Trial]], monkeypatch: pytest.
     """A search with such a best model, of which gains are not divided; a cause needs 6 nats."""
     monkeypatch.setattr(Leavings, "of", lambda _self, _trial: Left((), (), np.ones(3)))
     lesser = tuple(refit_with("", 0.0) for _ in rivals)
-    return Search(refit_with("", 0.0), best, (), lesser, tuple(map(tuple, rivals)), refits_with(needed=6.0))
+    return Search(refit_with("", 0.0), best, lesser, tuple(map(tuple, rivals)), refits_with(needed=6.0))
 
 
 def test_what_happens_once_is_nothing_to_go_on_from_and_rivals_are_those_that_come_near(

@@ -139,7 +139,7 @@ def test_a_rival_takes_the_place_of_a_doubted_cause_where_it_explains_as_much(
     monkeypatch.setattr(LesserModels, "left_out", lambda _self, _best, _divisor, _cause: nothing)
     judge_by_gain(monkeypatch)
     monkeypatch.setattr(Leavings, "of", lambda _self, _trial: Mock(spec=Left, overdispersion=np.ones(3)))
-    before = Search(nothing, bowl, (), (nothing,), ((tilt,),), refits_with(needed=2.0))
+    before = Search(nothing, bowl, (nothing,), ((tilt,),), refits_with(needed=2.0))
     found = before.with_rival(bowl.causes[0], lambda _trial: is_believed)
     assert (found.best if found else None) is (tilt if taken else None)
 
@@ -153,7 +153,7 @@ def test_what_brings_too_little_without_a_doubted_cause_goes_too(monkeypatch: py
     judge_by_gain(monkeypatch)
     monkeypatch.setattr(Leavings, "of", lambda _self, _trial: Mock(spec=Left, overdispersion=np.ones(3)))
     base = refit_with("", 0.0)
-    found = Search(base, both, (), (lens, nothing), ((), ()), refits_with(needed=5.0)).without([bowl])
+    found = Search(base, both, (lens, nothing), ((), ()), refits_with(needed=5.0)).without([bowl])
     assert found.best is base
     assert found.lesser == ()
 

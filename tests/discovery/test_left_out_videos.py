@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from tests.discovery.fitted import fitted
-from vrdp_prob.discovery.candidates.scores import score_causes
+from tests.discovery.stand_ins import start_with
+from vrdp_prob.discovery.candidates.scores import CauseScore, Site, score_causes
 from vrdp_prob.discovery.finding import HeldOut, VideoErrors
 from vrdp_prob.discovery.residuals.held_out import all_but_each, cavities, left_out
 from vrdp_prob.discovery.residuals.residual_model import ResidualModel
@@ -21,6 +22,7 @@ from vrdp_prob.discovery.selection.trials import Trial
 from vrdp_prob.inference.map_fit import MapFit
 from vrdp_prob.inference.several_videos import fitting
 from vrdp_prob.inference.several_videos.agreement import following_ones
+from vrdp_prob.inference.several_videos.climb_state import ImpossibleStartError
 from vrdp_prob.inference.several_videos.fitting import SharedFit, fit_together
 from vrdp_prob.inference.several_videos.joint_fit import expand
 from vrdp_prob.inference.several_videos.parts import link_fits
@@ -32,6 +34,7 @@ from vrdp_prob.models.effects.linear_drag import LinearDrag
 from vrdp_prob.models.effects.material_friction import MaterialFriction
 from vrdp_prob.models.effects.surface_tilt import SurfaceTilt
 from vrdp_prob.models.parameters import ANGULAR_DRAG
+from vrdp_prob.models.physics import PhysicsModel
 from vrdp_prob.models.unknowns import Held
 from vrdp_prob.scene import Tracks
 
@@ -364,7 +367,7 @@ def test_a_video_is_searched_beside_others_that_have_followed_what_they_agree_on
     assert strayed.mended([1], seed=0) is strayed
     for index in (0, 2):
         video = joint.videos[index]
-        assert expand(video, *video.split(handed[index].point), central=True).promised < 1.0
+        assert expand(video, *video.split(handed[index].point)).promised < 1.0
     assert (handed[1].point == strayed.joint.point(1)).all()
 
 
@@ -392,3 +395,39 @@ def test_a_video_searched_anew_may_share_a_number_that_no_other_one_has(
     found = lacking.mended([1], seed=0)
     assert found.joint.log_density >= lacking.joint.log_density
     assert found is lacking or ANGULAR_DRAG.name in found.joint.numbers.names
+
+
+def test_a_kick_that_can_be_in_one_place_only_acts_there() -> None:
+    """A single place is no choice among several, whose logarithm was taken for that nothing happens."""
+    _, fit = fitted("external_impulse", 3.0, seed=2)
+    site = Site(1, 0, {"impulse_time": 1.0, "impulse_x": 0.1, "impulse_y": 0.0}, 50.0, 1e-9)
+    score = CauseScore(ExternalImpulse(), {}, (site,), 50.0, 2, 1e-9, {}, 1)
+    trial = Trial((), fit).with_cause(score)
+    assert trial is not None
+    assert trial.acting(trial.causes[-1]) == [1]
+
+
+def test_a_model_without_a_cause_is_fitted_from_the_beginning_where_no_world_begins_as_it_is(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    _, fit = fitted("surface_tilt", 3.0, seed=2)
+    tilted = Trial((), fit).with_cause(start_with(SurfaceTilt()))
+    assert tilted is not None
+    begun: list[str] = []
+
+    def under(*_given: object, **_how: object) -> SharedFit:
+        raise ImpossibleStartError
+
+    def fit_together(_tracks: object, *, model: PhysicsModel, **_how: object) -> SharedFit:
+        begun.append(model.name)
+        return fit
+
+    monkeypatch.setattr(SharedFit, "under", under)
+    monkeypatch.setattr(trials, "fit_together", fit_together)
+    monkeypatch.setattr(trials, "with_own_population", lambda fit: fit)
+    found = tilted.without(*tilted.causes)
+    assert found.causes == ()
+    assert found.fit is fit
+    assert begun == [fit.model.name]
+    with pytest.raises(ImpossibleStartError):
+        replace(tilted, choices={"external_impulse": np.ones(3)}).without(*tilted.causes)

@@ -35,7 +35,7 @@ def search_that_found(cause: Effect, way: str, effect_size: float, setting: Sett
     refitted = base.with_cause(score)
     assert refitted is not None
     refits = Refits((), seed=0, needed=6.0, advance=lambda _count: None)
-    return Search(base, refitted.continued(), (), (base,), ((),), refits)
+    return Search(base, refitted.continued(), (base,), ((),), refits)
 
 
 @pytest.mark.slow

@@ -11,6 +11,7 @@ from tests.discovery.findings import TILT, WIND
 from vrdp_prob.discovery import outcome, stages
 from vrdp_prob.discovery.finding import Check, Verdict
 from vrdp_prob.discovery.selection import tried
+from vrdp_prob.discovery.selection.beginning import Beginning
 from vrdp_prob.discovery.selection.search import Search
 from vrdp_prob.discovery.selection.trials import Trial
 from vrdp_prob.inference import default_model
@@ -136,6 +137,23 @@ def test_beside_causes_the_few_videos_that_stray_are_searched_anew(
     assert found is {"anew": better, "before": fit}[taken]
     if taken == "anew":
         fit.with_other_courses.assert_called_once_with(seed=0, among=straying)
+
+
+def test_a_search_that_begins_again_on_better_courses_begins_with_what_some_videos_have_told(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    fit, better = (create_autospec(SharedFit, instance=True) for _ in range(2))
+    beginning = create_autospec(Beginning, instance=True)
+    asked = []
+    monkeypatch.setattr(stages.Stages, "_fit", lambda *_given: fit)
+    believed = create_autospec(outcome.Outcome, instance=True)
+    monkeypatch.setattr(stages.Stages, "_search", lambda _self, *given: asked.append(given))
+    monkeypatch.setattr(stages.Stages, "_believed", lambda *_given: believed)
+    monkeypatch.setattr(stages.Stages, "_with_better_courses", lambda *_given: better)
+    causes = (TILTED_TABLE,)
+    told = stages.Asked(causes, 3, 62, beginning)
+    stages.Stages(default_model(), (TILTED_TABLE, Wind()), 0, None).outcome([], told)
+    assert asked == [(fit, causes, beginning), (better, causes, beginning)]
 
 
 @pytest.mark.parametrize("finds_better", [True, False])

@@ -49,7 +49,7 @@ class VideoErrors:
     Parameters
     ----------
     rmse, rmse_one_second, rmse_end
-        Over all frames that are predicted, one second after the first of them, and in the last ones.
+        Over all frames that are predicted, one second after the last that is fitted, and in the last ones.
     """
 
     rmse: float | None
@@ -65,7 +65,8 @@ class HeldOut:
     ----------
     rmse, rmse_one_second, rmse_end
         Root mean square error (m, per axis) of predicted positions in the video in the middle, half of the others being
-        better: over all frames that are predicted, one second after the first of them, and in the last ones; None where
+        better: over all frames that are predicted, one second after the last that is fitted, and in the last ones; None
+        where
         no video is so long. A single video in which two bodies just miss each other says nothing here, and much in the
         log predictive density.
     coverage_50, coverage_90

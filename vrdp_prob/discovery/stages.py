@@ -17,7 +17,7 @@ from vrdp_prob.discovery.selection.trials import Trial
 from vrdp_prob.discovery.selection.tried import tried_causes
 from vrdp_prob.discovery.words import title
 from vrdp_prob.inference.several_videos.fitting import SharedFit, fit_together
-from vrdp_prob.inference.several_videos.second_look import SHARE_ASTRAY, explained, loses_single_videos
+from vrdp_prob.inference.several_videos.second_look import explained, loses_single_videos, most_astray
 from vrdp_prob.inference.several_videos.spin_islands import with_other_spins
 from vrdp_prob.models.effects.effect import Effect
 from vrdp_prob.models.physics import PhysicsModel
@@ -124,7 +124,7 @@ class Stages:
         fit = self._fit(videos, causes)
         outcome = self._believed(self._search(fit, causes, beginning))
         better = self._with_better_courses(fit, outcome)
-        return outcome if better is fit else self._believed(self._search(better, causes))
+        return outcome if better is fit else self._believed(self._search(better, causes, beginning))
 
     def _fit(self, videos: Sequence[Tracks], causes: Sequence[Effect]) -> SharedFit:
         """The fit of the model; single lost videos are searched anew, unless it lacks something."""
@@ -148,7 +148,7 @@ class Stages:
             with self._stage("Searching all videos anew"):
                 return with_other_spins(fit, seed=self.seed).with_other_courses(seed=self.seed)
         straying = best.unexplained.videos
-        if not 0 < len(straying) <= SHARE_ASTRAY * len(fit.fits):
+        if not 0 < len(straying) <= most_astray(len(fit.fits)):
             return fit
         with self._stage("Searching videos that stray anew"):
             return fit.with_other_courses(seed=self.seed, among=straying)

@@ -55,10 +55,19 @@ class Sticking(Grazing):
         return np.stack([5 * (strength - 1), friction + own, own, slides], axis=1)
 
 
-def expand(video: LinkedVideo, shared: np.ndarray, local: np.ndarray, *, central: bool) -> Expansion:
+@dataclass(frozen=True)
+class Agreed(Grazing):
+    """What both numbers are is plain."""
+
+    def _residuals(self, points: np.ndarray) -> np.ndarray:
+        strength, own = points.T
+        return np.stack([5 * (strength - 1), own, 0 * own], axis=1)
+
+
+def expand(video: LinkedVideo, shared: np.ndarray, local: np.ndarray) -> Expansion:
     """That of residuals, on the side of the edge where the point is."""
     point = video.points(shared, local)
-    residuals, derivative = jacobian(video.data.residuals, point, np.ones(3), central=central)
+    residuals, derivative = jacobian(video.data.residuals, point, np.ones(len(point)), central=True)
     derivative[-1], residuals = 0.0, residuals[:-1]
     gradient, count = derivative[:-1].T @ residuals, len(shared)
     return Expansion(gradient[:count], gradient[count:], derivative[:, :count], derivative[:, count:])
@@ -159,3 +168,18 @@ def test_a_climb_ends_where_no_common_step_brings_anything_and_edges_bring_a_tri
     found = ascent.climb(numbers, [video], np.zeros(1), [np.array([-0.52, -0.48])])
     assert len(crossed) == rounds
     assert not found.converged
+
+
+def test_a_climb_does_not_end_before_a_video_that_is_far_off_by_itself_has_come(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """What the others promise together is nothing, and it was taken to be at an edge."""
+    monkeypatch.setattr(joint_fit, "expand", expand)
+    entries = (Coordinate("strength", None, Transform.IDENTITY, Prior(1.0, 10.0)),)
+    own = Coordinate("own", 0, Transform.IDENTITY, Prior(0.0, 1.0))
+    likelihood = Likelihood(sliding(0), PhysicsModel.base(), Coordinates((*entries, own), {}))
+    video = Agreed(likelihood, np.arange(1), np.arange(1), np.zeros(1))
+    numbers = SharedNumbers((("strength", ()),), entries, None)
+    found = ascent.climb(numbers, [video] * 3, np.ones(1), [np.zeros(1), np.zeros(1), np.array([5.0])])
+    assert found.converged
+    assert found.log_density == pytest.approx(0.0, abs=1e-6)

@@ -130,7 +130,10 @@ def test_cubes_of_a_video_that_was_lost_are_turned_on_where_it_is_explained(
     assert [plan.like_noise for plan in made if plan.yaws] == [like_noise]
 
 
-def test_a_look_at_a_video_that_no_world_is_like_leaves_its_fit(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("yielding", [True, False])
+def test_a_look_at_a_video_that_no_world_is_like_leaves_its_fit(
+    *, yielding: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """A wall that is tried may stand where a body begins."""
     fits = [
         fit_map(one, default_model(), stream(0, one.video), plan=IN_DOUBT, model_error=False)
@@ -145,7 +148,7 @@ def test_a_look_at_a_video_that_no_world_is_like_leaves_its_fit(monkeypatch: pyt
 
     monkeypatch.setattr(second_look, "fit_map", impossible)
     with several_processes(1):
-        found = look_again(fits, [0], default_model(), None, seed=0)
+        found = look_again(fits, [0], default_model(), None, seed=0, yielding=yielding)
     assert looks
     assert found[0] is fits[0]
 

@@ -3,6 +3,7 @@
 A fit that does not know of them spreads the time that is lost over whole videos, and finds the way to none of them.
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -52,6 +53,11 @@ class Dropped:
         """The tracks at the times at which they were taken."""
         late = np.searchsorted(np.array(self.after), tracks.times) * self.frame_time
         return tracks.at_times(tracks.times + late)
+
+
+def choices(tracks: Tracks, dropped: int) -> float:
+    """Logarithm of the number of places, between two stamps each, among which those of dropped frames are chosen."""
+    return dropped * math.log(len(tracks.times) - 1)
 
 
 def frames_unknown_to(fit: SharedFit, catalogue: Sequence[Effect]) -> list[Dropped]:

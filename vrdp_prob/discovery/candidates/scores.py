@@ -100,7 +100,7 @@ class CauseScore:
     sites
         Where it acts, if it happens once in a video, the clearest first.
     chi_square, degrees
-        The largest statistic and its number of degrees of freedom.
+        The statistic that is least probable by chance, and its number of degrees of freedom.
     p_value
         Probability of a statistic as large anywhere if the cause is absent.
     largest

@@ -123,7 +123,7 @@ class FittedContacts:
         return np.maximum(self.events.impulse - self.stopping, 0.0)
 
     def pushed_apart(
-        self, impulse: Float[np.ndarray, "contact 2 column"], *, moving: bool = True, turning: bool = True
+        self, impulse: Float[np.ndarray, "contact 2 column"], *, moving: bool = True
     ) -> Float[np.ndarray, "time body 3 column"]:
         """Changes of what is measured by impulses (kg m/s) on the second body or wall, their opposites on the first.
 
@@ -131,8 +131,8 @@ class FittedContacts:
         ----------
         impulse
             The impulses.
-        moving, turning
-            Whether velocities, and whether spins change.
+        moving
+            Whether velocities change; spins do in any case.
         """
         both = self.sides[:, None, None] * impulse[:, None]
         mass, inertia = self.motion.mass[self.bodies], self.motion.inertia[self.bodies]
@@ -140,7 +140,7 @@ class FittedContacts:
         torque = lever[:, :, 0] * both[:, :, 1] - lever[:, :, 1] * both[:, :, 0]
         changes = np.zeros((*self.bodies.shape, 3, impulse.shape[-1]))
         changes[:, :, :2] = moving * both / mass[..., None, None]
-        changes[:, :, 2] = turning * torque / inertia[..., None]
+        changes[:, :, 2] = torque / inertia[..., None]
         return self._kicked(changes)
 
     def pushed_together(

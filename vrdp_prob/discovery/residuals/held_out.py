@@ -43,7 +43,7 @@ def cavities(fit: SharedFit) -> dict[str, Cavity]:
     joint = fit.joint
     mean = joint.gaussian.mean
     expansions = in_parallel(
-        lambda k: expand(joint.videos[k], mean, joint.gaussian.locals[k].centre, central=True), range(len(joint.videos))
+        lambda k: expand(joint.videos[k], mean, joint.gaussian.locals[k].centre), range(len(joint.videos))
     )
     prior = expand_prior(joint.numbers, mean)
     # Where a video is at an edge between two courses of events its gradient says nothing of what lies beyond.

@@ -1,13 +1,12 @@
 """Fits of a model with further causes: from their scores, from the beginning, or in the place of kicks."""
 
-import math
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
 
-from vrdp_prob.discovery.candidates.dropped_frames import Dropped
+from vrdp_prob.discovery.candidates.dropped_frames import Dropped, choices
 from vrdp_prob.discovery.candidates.proposals import hidden_things
 from vrdp_prob.discovery.candidates.scores import CauseScore, mends_any_course
 from vrdp_prob.discovery.candidates.surfaces import Placed
@@ -159,11 +158,11 @@ class Extensions:
         found = self._began_anew(trial, [effect], partial(fit_with_dropped_frames, trial, dropped, seed=self.seed))
         if found is None:
             return None
-        places = [
-            sum(name in effect.stepwise for name, _ in structure.held) * math.log(len(tracks.times) - 1)
+        prices = [
+            choices(tracks, sum(name in effect.stepwise for name, _ in structure.held))
             for structure, tracks in zip(found.fit.structures, trial.fit.tracks, strict=True)
         ]
-        return replace(found, choices={**found.choices, effect.name: np.array(places)})
+        return replace(found, choices={**found.choices, effect.name: np.array(prices)})
 
     def hidden_instead(
         self, kicked: Trial, kicks: Effect, trial: Trial, p_value: float = 0.0, *, known: Collection[str] = ()

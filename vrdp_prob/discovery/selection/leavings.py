@@ -12,7 +12,7 @@ from vrdp_prob.discovery.finding import Check
 from vrdp_prob.discovery.residuals.overdispersion import overdispersion
 from vrdp_prob.discovery.selection.shortlist import SHORTLIST_LEVEL
 from vrdp_prob.discovery.selection.trials import Trial
-from vrdp_prob.inference.several_videos.second_look import SHARE_ASTRAY, trusted
+from vrdp_prob.inference.several_videos.second_look import most_astray, trusted
 from vrdp_prob.models.effects.effect import Effect
 
 LOUD = 20.0
@@ -116,12 +116,14 @@ class Leavings:
 
     def suspects(self, trial: Trial) -> list[int]:
         """Videos that may have taken a wrong course of events: few, in which alone some cause is called for."""
-        few = [some for _, some in self._called_for_in(trial) if len(some) <= _half(trial)]
+        most = most_astray(len(trial.fit.videos))
+        few = [some for _, some in self._called_for_in(trial) if len(some) <= most]
         return list(dict.fromkeys(video for some in few for video in some))
 
     def most_call_for_a_law(self, trial: Trial, needed: float) -> bool:
         """Whether a law is called for in most videos, and loudly (see `laws`): no wrong course of single ones does."""
-        called = {effect for effect, some in self._called_for_in(trial) if len(some) > _half(trial)}
+        most = most_astray(len(trial.fit.videos))
+        called = {effect for effect, some in self._called_for_in(trial) if len(some) > most}
         return any(law in called for law in self.laws(trial, needed))
 
     def laws(self, trial: Trial, needed: float) -> list[Effect]:
@@ -146,8 +148,3 @@ class Leavings:
         """Scores that chance makes as large too rarely, where it had as many causes to do so."""
         left = self.of(trial).beside_chance
         return (one for one in left if one.p_value * len(left) <= SHORTLIST_LEVEL)
-
-
-def _half(trial: Trial) -> int:
-    """Number of videos of which no more than so many may be on wrong courses by themselves."""
-    return int(SHARE_ASTRAY * len(trial.fit.videos))

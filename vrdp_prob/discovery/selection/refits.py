@@ -20,10 +20,10 @@ from vrdp_prob.discovery.selection.leavings import Leavings
 from vrdp_prob.discovery.selection.shortlist import CLOSE, SHORTLIST_LEVEL, shortlist
 from vrdp_prob.discovery.selection.trials import Trial
 from vrdp_prob.inference.several_videos.second_look import (
-    SHARE_ASTRAY,
     explained,
     loses_single_videos,
     lost_videos,
+    most_astray,
     outweigh,
     trusted,
 )
@@ -188,7 +188,7 @@ class Refits:
         """
         first = self.provisional(trial, found)
         lost = [] if first is None else lost_videos(first.fit.fits)
-        if first is not None and 0 < len(lost) <= SHARE_ASTRAY * len(first.fit.fits) and explained(first.fit.fits):
+        if first is not None and 0 < len(lost) <= most_astray(len(first.fit.fits)) and explained(first.fit.fits):
             searched = self.courses.searched_anew(first, lost)
             found = [searched if one is first else one for one in found]
         return sorted(found, key=merit, reverse=True)
@@ -201,7 +201,7 @@ class Refits:
         """
         fits = trial.fit.fits
         astray = np.flatnonzero(~trusted(fits)).tolist()
-        if not 0 < len(astray) <= SHARE_ASTRAY * len(fits) or not outweigh(fits, astray):
+        if not 0 < len(astray) <= most_astray(len(fits)) or not outweigh(fits, astray):
             return []
         asked = [one for one in shortlist(self.leavings.of(trial).beside_chance, CLOSE) if not happens_once(one.effect)]
         found = self.extensions.made_of(trial, asked)
@@ -237,7 +237,7 @@ class Refits:
         for _ in range(SEARCHES):
             kicked = [site.video for score in self.leavings.of(found).scores for site in score.sites if _kicks(score)]
             videos = list(dict.fromkeys([*lost_videos(found.fit.fits), *kicked]))
-            before, few = found, len(videos) <= SHARE_ASTRAY * len(one.fit.fits)
+            before, few = found, len(videos) <= most_astray(len(one.fit.fits))
             found = self.courses.searched_anew(found, videos) if few else found
             if found is before:
                 break

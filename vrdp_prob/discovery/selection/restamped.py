@@ -1,12 +1,11 @@
 """Fits from the beginning at the times at which frames were taken, where tracks show that frames are missing."""
 
-import math
 from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from vrdp_prob.discovery.candidates.dropped_frames import SIGNIFICANT, Dropped
+from vrdp_prob.discovery.candidates.dropped_frames import SIGNIFICANT, Dropped, choices
 from vrdp_prob.discovery.checks.clock import LateFrames
 from vrdp_prob.discovery.residuals.residual_model import ResidualModel
 from vrdp_prob.discovery.selection.trials import FIRST, Trial
@@ -78,10 +77,8 @@ def _taken(
     taken = [more if k in better else less for k, (more, less) in enumerate(zip(further, known, strict=True))]
     if len(better) < len(changed):
         found = fit.with_courses_of(found, better)
-    choices = sum(
-        (len(taken[k].after) - len(known[k].after)) * math.log(len(tracks.times)) for k, tracks in enumerate(fit.tracks)
-    )
-    return (found, taken) if found.joint.log_density > fit.joint.log_density + choices else None
+    price = sum(choices(tracks, len(taken[k].after) - len(known[k].after)) for k, tracks in enumerate(fit.tracks))
+    return (found, taken) if found.joint.log_density > fit.joint.log_density + price else None
 
 
 def _explains_better(fit: SharedFit, other: SharedFit, video: int) -> bool:

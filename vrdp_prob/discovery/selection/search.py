@@ -8,7 +8,7 @@ from jaxtyping import Float
 
 from vrdp_prob.discovery.selection.beginning import Beginning
 from vrdp_prob.discovery.selection.comparison import Comparison
-from vrdp_prob.discovery.selection.forward import OUT_OF_REACH, ForwardSelection, Step
+from vrdp_prob.discovery.selection.forward import OUT_OF_REACH, ForwardSelection
 from vrdp_prob.discovery.selection.gains import gain, merit
 from vrdp_prob.discovery.selection.leavings import Left
 from vrdp_prob.discovery.selection.lesser_models import LesserModels
@@ -32,8 +32,6 @@ class Search:
         The model that was given, with the best courses of events that were found, whatever was tried beside it.
     best
         The model with every cause that was found.
-    steps
-        The steps, the last of which added nothing.
     lesser
         For each cause of `best`: the model without it.
     rivals
@@ -46,7 +44,6 @@ class Search:
 
     base: Trial
     best: Trial
-    steps: tuple[Step, ...]
     lesser: tuple[Trial, ...]
     rivals: tuple[tuple[Trial, ...], ...]
     refits: Refits
@@ -152,4 +149,4 @@ def search(
         best, lesser, rivals = Comparison(refits, beginning).compared(chain, steps)
         if not best.causes:  # what was tried, and what is told, is of the model that was given
             best = chain[0]
-    return Search(chain[0], best, tuple(steps), lesser, rivals, refits, limit)
+    return Search(chain[0], best, lesser, rivals, refits, limit)

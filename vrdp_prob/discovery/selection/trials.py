@@ -18,15 +18,15 @@ from vrdp_prob.discovery.selection.estimates import may_vanish
 from vrdp_prob.discovery.selection.forecast import held_out
 from vrdp_prob.inference.several_videos.ascent import Effort
 from vrdp_prob.inference.several_videos.climb_state import ImpossibleStartError
-from vrdp_prob.inference.several_videos.fitting import SharedFit
+from vrdp_prob.inference.several_videos.fitting import SharedFit, fit_together
 from vrdp_prob.inference.several_videos.population import own_parameters, with_learned_population
 from vrdp_prob.inference.several_videos.second_look import (
     LOST,
-    SHARE_ASTRAY,
-    SHARE_LOST,
     explained,
     lost_videos,
     may_take_another_course,
+    most_astray,
+    most_lost,
 )
 from vrdp_prob.models.effects.effect import Effect
 from vrdp_prob.models.parameters import Parameter, Scope
@@ -169,7 +169,7 @@ class Trial:
     def fallen_from(self, base: "Trial") -> list[int]:
         """Videos that are less probable than under a model with less, the worst first: they have lost their course."""
         fallen = self._fallen_from(base)
-        return fallen[: max(int(SHARE_ASTRAY * len(self.fit.fits)), 1)]
+        return fallen[: max(most_astray(len(self.fit.fits)), 1)]
 
     def loses_videos_of(self, other: "Trial") -> bool:
         """Whether a video is less probable than in another fit and explained no more."""
@@ -194,9 +194,7 @@ class Trial:
         if self.fit.joint.converged or not explained(fits):
             return self
         holding = [one for one in self._fallen_from(base, HELD_BACK) if may_take_another_course(fits[one])]
-        found = (
-            self if len(holding) > max(SHARE_LOST * len(fits), 1) else self.mended(holding, seed=seed, yielding=True)
-        )
+        found = self if len(holding) > most_lost(len(fits)) else self.mended(holding, seed=seed, yielding=True)
         if found is self:
             return self
         found = replace(found, fit=with_own_population(found.fit)).continued()
@@ -205,7 +203,7 @@ class Trial:
     def with_cause_in_place(self, score: CauseScore, replaced: Effect, least: float) -> "Trial | None":
         """The fit with a cause in the place of another one, from where that has brought the videos.
 
-        None where no world can begin there, or the log posterior does not come near to `least` at once.
+        None where no world can begin there, or the log posterior is not above `least` at once.
         """
         left = self.fit.model.without_effect(replaced).with_effect(score.effect, self.fit.tracks)
         choices = {name: one for name, one in self.choices.items() if name != replaced.name}
@@ -278,7 +276,10 @@ class Trial:
             own.append(values)
         acting = np.array([min(len(mine), 1) for mine in sites])
         times = [len(effect.search_points([one])) if effect.stepwise else 1 for one in self.fit.tracks]
-        choices = {**self.choices, effect.name: np.log(max(score.places, 1) * np.array(times)) * acting}
+        places = np.maximum(
+            max(score.places, 1) * np.array(times), 2
+        )  # where there is but one, it acts there or nowhere
+        choices = {**self.choices, effect.name: np.log(places) * acting}
         model = self.fit.extended(effect)
         fit = self.fit.under(model, own=own, held=held, effort=FIRST, model_error=False)
         return replace(self, causes=(*self.causes, effect), fit=fit, choices=choices)
@@ -360,14 +361,21 @@ class Trial:
     def without(self, *causes: Effect) -> "Trial":
         """The fit without some of its causes, to which the videos' own numbers follow before those that they share.
 
-        Without a law that all follow, nothing that they share can be read from where they are.
+        Without a law that all follow, nothing that they share can be read from where they are. Where no world can begin
+        there the model is fitted from the beginning.
         """
         model, gone = self.fit.model, {cause.name for cause in causes}
         for cause in causes:
             model = model.without_effect(cause)
         left = self.with_stated_population(model)
         choices = {name: one for name, one in self.choices.items() if name not in gone}
-        fit = self.fit.under(left, held=self._held_without(*causes), least=-math.inf, effort=FIRST, model_error=False)
+        held = self._held_without(*causes)
+        try:
+            fit = self.fit.under(left, held=held, least=-math.inf, effort=FIRST, model_error=False)
+        except ImpossibleStartError:
+            if choices:  # a fit from the beginning knows of no single events
+                raise
+            fit = fit_together(self.fit.tracks, model=left, shared=self.fit.shared, model_error=False)
         kept = tuple(one for one in self.causes if one.name not in gone)
         return replace(self, causes=kept, fit=with_own_population(fit), choices=choices)
 

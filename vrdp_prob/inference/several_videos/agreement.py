@@ -95,7 +95,7 @@ def consensus(
 
     def expanded(index: int) -> Expansion:
         own = videos[index].split(points[index])[1]
-        found = expand(videos[index], places[index], own, central=True)
+        found = expand(videos[index], places[index], own)
         # A video's fit is taken at its word, that it is a maximum: the data pull against the prior.
         prior = expand_prior(numbers, places[index])
         believed = replace(found, shared_gradient=-prior.gradient, local_gradient=np.zeros_like(own))

@@ -42,12 +42,6 @@ class Expansion:
     shared: Float[np.ndarray, "residual shared"]
     local: Float[np.ndarray, "residual local"]
 
-    def damped(self, damping: float) -> "Expansion":
-        """With every number's curvature larger by a share of it."""
-        triangle, own = self._triangle, self.local.shape[1]
-        rows = np.concatenate([triangle, np.diag(np.sqrt(damping) * np.linalg.norm(triangle, axis=0))])
-        return Expansion(self.shared_gradient, self.local_gradient, rows[:, own:], rows[:, :own])
-
     @cached_property
     def _triangle(self) -> Float[np.ndarray, "number number"]:
         """Upper-triangular root of the curvature, the own numbers first."""
@@ -255,13 +249,6 @@ class Expansions:
     prior: SharedExpansion
     videos: tuple[Expansion, ...]
 
-    def damped(self, damping: float) -> "Expansions":
-        """With every number's curvature larger by a share of it."""
-        rows = self.prior.rows
-        added = np.diag(np.sqrt(damping) * np.linalg.norm(rows, axis=0))
-        prior = SharedExpansion(self.prior.gradient, np.concatenate([rows, added]))
-        return Expansions(prior, tuple(one.damped(damping) for one in self.videos))
-
     @cached_property
     def _triangle(self) -> Float[np.ndarray, "shared shared"]:
         """Upper-triangular root of the curvature in the shared numbers when all own ones follow."""
@@ -291,10 +278,14 @@ class Expansions:
         return step, float(pulled @ pulled) / 2
 
     @property
+    def shared_gain(self) -> float:
+        """Gain in log density (nats) that the Newton step of the shared numbers promises."""
+        return -float(self.gradient @ self.shared_step) / 2
+
+    @property
     def expected_gain(self) -> float:
-        """Gain in log density (nats) that the Newton step promises."""
-        own = sum(float(one.local_gradient @ one.local_step) for one in self.videos)
-        return -(float(self.gradient @ self.shared_step) + own) / 2
+        """Gain in log density (nats) that the Newton step of all numbers promises."""
+        return self.shared_gain + sum(one.promised for one in self.videos)
 
     def consensus(
         self, prior_at: Float[np.ndarray, "shared"], places: Sequence[Float[np.ndarray, "shared"]]

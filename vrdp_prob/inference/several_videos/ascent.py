@@ -134,11 +134,12 @@ def climb(
         inside = _inside(slopes)
         inner = smooth(slopes)
         expected = inner.expected_gain
-        converged = expected < TOLERANCE
+        trial, ridges = settled(videos, state, slopes.videos), _Ridges(videos)
+        at_edges = _gained(trial, state, ~inside)
+        converged = expected < TOLERANCE and at_edges < TOLERANCE
         if converged:
             break
-        trial, ridges = settled(videos, state, slopes.videos), _Ridges(videos)
-        if _gained(trial, state, ~inside) < EXPECTED and trial.total(numbers) > refused + EXPECTED:
+        if expected > TOLERANCE and at_edges < EXPECTED and trial.total(numbers) > refused + EXPECTED:
             own = trial
             trial = _improved(numbers, ridges, own, inner.shared_step, expected)
             if trial is own:
@@ -193,8 +194,8 @@ def _improved(
 ) -> State:
     """The first share of a common step that brings something; where none does, the state itself.
 
-    Videos that lost by far more than is `expected` of the step, with the same share before or with the one before it,
-    are looked at first.
+    Videos that lost by far more than is `expected` of a step, with the same share in this round or else with the share
+    before it, are looked at first.
     """
     before, most = state.total(numbers), TOO_DEAR * max(expected, STEEP)
     hindering: list[int] = []
@@ -222,7 +223,7 @@ def _with_one_held(numbers: SharedNumbers, ridges: _Ridges, state: State, slopes
     """
     moved = np.abs(slopes.shared_step) > MOVED * np.linalg.norm(slopes.root, axis=1)
     held = [slopes.step_without(number) for number in np.flatnonzero(moved).tolist()] if len(numbers) > 1 else []
-    worth = [one for one in held if one[1] > max(HALF * slopes.expected_gain, EXPECTED)]
+    worth = [one for one in held if one[1] > max(HALF * slopes.shared_gain, EXPECTED)]
     for step, expected in sorted(worth, key=lambda one: one[1], reverse=True)[:MOST_HELD]:
         found = _improved(numbers, ridges, state, step, expected)
         if found is not state:

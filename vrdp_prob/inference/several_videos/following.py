@@ -44,14 +44,11 @@ class Followed:
     ----------
     local
         The numbers.
-    cost
-        Half their sum of squared residuals; infinite where the world fails.
     arrived
         Whether they were reached along the ridge.
     """
 
     local: Float[np.ndarray, "local"]
-    cost: float
     arrived: bool
 
 
@@ -91,13 +88,12 @@ def follow(
         if reached < np.inf and (stride or reached < cost):
             point = found
         if arrived and not cost - reached > ENOUGH:
-            return Followed(video.split(point)[1], min(cost, reached), arrived=True)
+            return Followed(video.split(point)[1], arrived=True)
         strides += [stride] if stride else []
         if not arrived and (_too_slow(strides, left) or (not stride and not cost - reached > ENOUGH)):
             break
     end[video.local_places] = point[video.local_places]
-    moved = robust_cost(video.data.residuals(end[None]), None)
-    return Followed(video.split(end)[1], float(moved[0]), arrived=False)
+    return Followed(video.split(end)[1], arrived=False)
 
 
 def _too_slow(strides: Sequence[float], left: int) -> bool:

@@ -22,11 +22,11 @@ from vrdp_prob.inference.several_videos.linking import LinkedVideo, SharedNumber
 from vrdp_prob.inference.several_videos.parts import carried_starts, fit_alone, link_fits
 from vrdp_prob.inference.several_videos.second_look import (
     FAR_WORSE,
-    SHARE_ASTRAY,
     WORSE,
     doubtful,
     explained,
     look_again,
+    most_astray,
     trusted,
 )
 from vrdp_prob.models.physics import PhysicsModel
@@ -70,7 +70,8 @@ def joined(
     if not may_be_turned or not _strays(*found[0]):
         return found[0]
     turned = _turned(alone, model, seed=seed, optimiser=plan.optimiser)
-    found.append(join(turned, islands=False))
+    if any(one is not other for one, other in zip(turned, alone, strict=True)):
+        found.append(join(turned, islands=False))
     if _strays(*found[-1]):
         found.append(join(turned, islands=True))
     return max(found, key=lambda one: one[1].log_density)
@@ -81,7 +82,7 @@ def _strays(fits: Sequence[MapFit], joint: JointFit) -> bool:
 
     Where more are, it is the model that lacks something.
     """
-    return 0 < int((_worsened(fits, joint) > WORSE).sum()) <= SHARE_ASTRAY * len(fits)
+    return 0 < int((_worsened(fits, joint) > WORSE).sum()) <= most_astray(len(fits))
 
 
 def _has_unseen_yaws(fit: MapFit) -> bool:

@@ -64,7 +64,7 @@ class JointFit:
     log_density
         Log posterior (nats, up to the constants of the priors and of the data) there.
     converged
-        Whether the last step gained next to nothing.
+        Whether the next step promises next to nothing in the videos that are at no edge.
     alternatives
         Further modes of each video's own numbers, where the shared ones are at their mean.
     """
@@ -120,12 +120,10 @@ def expand(
     video: LinkedVideo,
     shared: Float[np.ndarray, "shared"],
     local: Float[np.ndarray, "local"],
-    *,
-    central: bool = False,
 ) -> Expansion:
     """Expand a video's negative log density; the gradient is exact, the curvature that of its residuals."""
     likelihood, point = video.data, video.points(shared, local)
-    _, derivative = jacobian(likelihood.residuals, point, likelihood.coordinates.scale, central=central)
+    _, derivative = jacobian(likelihood.residuals, point, likelihood.coordinates.scale, central=True)
     places, noise = noise_curvature(likelihood, point)
     derivative[:, places] = 0.0
     _, gradient = evaluate_with_gradient(likelihood.log_density, point[None])
@@ -173,7 +171,7 @@ def expand_all(
     locals_: Sequence[Float[np.ndarray, "_"]],
 ) -> Expansions:
     """Expand the negative log density of all videos, and the prior of what they share."""
-    found = in_parallel(lambda index: expand(videos[index], shared, locals_[index], central=True), range(len(videos)))
+    found = in_parallel(lambda index: expand(videos[index], shared, locals_[index]), range(len(videos)))
     return Expansions(expand_prior(numbers, shared), tuple(found))
 
 
@@ -244,7 +242,7 @@ def local_modes(
             continue
         if any(np.abs(one.whitened(own, nothing)).max() < SAME_MODE for one, _ in found):
             continue
-        gaussian = expand(video, shared, own, central=True).around(own, numbers.logarithms)
+        gaussian = expand(video, shared, own).around(own, numbers.logarithms)
         found.append((gaussian, value + gaussian.log_volume))
     best = max((weight for _, weight in found), default=0.0)
     return tuple(LocalMode(one, weight - best) for one, weight in found if weight > best - HOPELESS or one is first)

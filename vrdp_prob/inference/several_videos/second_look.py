@@ -46,6 +46,16 @@ WIDER, LEAST_SD = 2.0, 0.02
 """What the others say is believed with so many times its standard deviation, and at least with this one."""
 
 
+def most_astray(videos: int) -> int:
+    """Most of so many videos that may be on wrong courses without the model being to blame."""
+    return int(SHARE_ASTRAY * videos)
+
+
+def most_lost(videos: int) -> int:
+    """Most of so many videos that may have lost their courses by themselves."""
+    return max(int(SHARE_LOST * videos), 1)
+
+
 def trusted(fits: Sequence[MapFit]) -> Bool[np.ndarray, "video"]:
     """Whose fits are not far worse than those of the others."""
     return _excess(fits) < FAR_WORSE
@@ -62,13 +72,13 @@ def doubtful(fits: Sequence[MapFit], among: Collection[int] | None = None) -> li
         Videos that may be; all where None.
     """
     excess = _excess(fits)
-    order = np.argsort(-excess, kind="stable")[: int(SHARE_ASTRAY * len(fits))]
     possible = range(len(fits)) if among is None else among
-    return [
+    found = [
         int(index)
-        for index in order
+        for index in np.argsort(-excess, kind="stable")
         if excess[index] > WORSE and index in possible and may_take_another_course(fits[index])
     ]
+    return found[: most_astray(len(fits))]
 
 
 def explained(fits: Sequence[MapFit], within: float = EXPLAINED) -> bool:
@@ -84,7 +94,7 @@ def lost_videos(fits: Sequence[MapFit]) -> list[int]:
 
 def loses_single_videos(fits: Sequence[MapFit]) -> bool:
     """Whether a model explains most videos and loses few, which rather lack their course of events than a cause."""
-    return explained(fits) and 0 < len(lost_videos(fits)) <= max(SHARE_LOST * len(fits), 1)
+    return explained(fits) and 0 < len(lost_videos(fits)) <= most_lost(len(fits))
 
 
 def outweigh(fits: Sequence[MapFit], some: Collection[int]) -> bool:
@@ -101,7 +111,7 @@ def lost_together(fits: Sequence[MapFit]) -> list[list[int]]:
     """
     lost, as_good = lost_videos(fits), trusted(fits)
     groups = [[index for index in lost if not as_good[index]], [index for index in lost if as_good[index]]]
-    return [group[: int(SHARE_ASTRAY * len(fits))] for group in groups if group]
+    return [group[: most_astray(len(fits))] for group in groups if group]
 
 
 def may_take_another_course(fit: MapFit) -> bool:
@@ -266,7 +276,7 @@ class _Look:
         looks = [look for look in first.values() if look not in one.made]
         return looks if at_once else looks[:1]
 
-    def _made(self, asked: tuple[_Doubted, int]) -> MapFit:
+    def _made(self, asked: tuple[_Doubted, int]) -> MapFit | None:
         doubted, look = asked
         believing, plan = self.ways[look]
         if plan.yaws and doubted.turned_on:
@@ -277,7 +287,7 @@ class _Look:
         try:
             return fit_map(tracks, model, generator, plan=plan, model_error=False, held=doubted.held)
         except NoWorldError:  # the others say what this video cannot be
-            return doubted.fit
+            return None
 
     def _take(self, one: "_Looked") -> None:
         """Take what was made of a video, in the order of the looks, as far as that is known."""
@@ -289,7 +299,10 @@ class _Look:
                 self._judge(one, way, one.made.pop(one.taken))
             one.taken = len(self.ways) if one.best.misfit.residual_sd < self.goal else one.taken + 1
 
-    def _judge(self, one: "_Looked", way: tuple[bool, FitPlan], found: MapFit) -> None:
+    def _judge(self, one: "_Looked", way: tuple[bool, FitPlan], found: MapFit | None) -> None:
+        if found is None:
+            one.settled.add(way)
+            return
         gained = one.best.misfit.residual_sd / found.misfit.residual_sd - 1
         better_from = -SAME if self.yielding else SAME
         if gained > better_from and found.log_density > one.best.log_density - FELL:
@@ -315,7 +328,7 @@ class _Looked:
     taken
         Number of looks that are done with.
     made
-        Fits of looks that come after these.
+        Fits of looks that come after these; None where there is no world.
     settled
         Ways in which no further look is made.
     """
@@ -324,7 +337,7 @@ class _Looked:
     best: MapFit
     better: MapFit | None = None
     taken: int = 0
-    made: dict[int, MapFit] = field(default_factory=dict)
+    made: dict[int, MapFit | None] = field(default_factory=dict)
     settled: set[tuple[bool, FitPlan]] = field(default_factory=set)
 
 

@@ -40,8 +40,9 @@ def named(result: Result) -> list[str]:
 
 
 def answer(result: Result) -> str:
-    """The first cause that was named; the verdict where none was."""
-    return next(iter(named(result)), result.get("verdict", "failed"))
+    """The first cause that was named; the verdict where none was, and `unknown` where that is the verdict."""
+    verdict = str(result.get("verdict", "failed"))
+    return verdict if verdict == "unknown" else next(iter(named(result)), verdict)
 
 
 def rightly_named(result: Result) -> list[Result]:

@@ -5,19 +5,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from vrdp_prob.inference.draws.summaries import ParameterSummary, Summary
+from vrdp_prob.plain_words import counted, listed, percent, percent_error
 from vrdp_prob.reasoning.answer import monte_carlo_error
-from vrdp_prob.report.wording import (
-    counted,
-    interval_words,
-    listed,
-    mass_status,
-    names,
-    percent,
-    percent_error,
-    restitution_status,
-    tags,
-    with_names,
-)
+from vrdp_prob.report.wording import interval_words, mass_status, names, restitution_status, tags, with_names
 from vrdp_prob.scene import Body, Shape
 
 

@@ -42,8 +42,8 @@ from vrdp_prob.models.effects.effect import Effect
 from vrdp_prob.models.model_file import known_effects
 from vrdp_prob.models.physics import PhysicsModel
 from vrdp_prob.models.simulator.rollout import compile_model
+from vrdp_prob.plain_words import counted, listed
 from vrdp_prob.progress import ProgressDisplay, SilentProgress
-from vrdp_prob.report.wording import counted, listed
 from vrdp_prob.scene import Shape, Tracks
 from vrdp_prob.workers import check_processes
 

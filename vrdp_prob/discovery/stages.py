@@ -21,8 +21,8 @@ from vrdp_prob.inference.several_videos.second_look import explained, loses_sing
 from vrdp_prob.inference.several_videos.spin_islands import with_other_spins
 from vrdp_prob.models.effects.effect import Effect
 from vrdp_prob.models.physics import PhysicsModel
+from vrdp_prob.plain_words import listed
 from vrdp_prob.progress import Advance, ProgressDisplay, SilentProgress
-from vrdp_prob.report.wording import listed
 from vrdp_prob.scene import Tracks
 from vrdp_prob.spread import evenly_spread
 

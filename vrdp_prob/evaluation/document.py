@@ -10,7 +10,7 @@ from vrdp_prob.evaluation.one_scene import VARIANTS
 from vrdp_prob.evaluation.page import absence, render
 from vrdp_prob.evaluation.scores import COVERAGES, Interval
 from vrdp_prob.files import write_atomically
-from vrdp_prob.plural import several
+from vrdp_prob.plain_words import several
 
 
 def to_document(evaluation: Evaluation) -> dict[str, Any]:

@@ -6,7 +6,7 @@ from vrdp_prob.evaluation.evaluate import GROUPS, Evaluation
 from vrdp_prob.evaluation.judgement import Judgement
 from vrdp_prob.evaluation.one_scene import BEST_FIT, POSTERIOR, PRIOR_DEFAULTS
 from vrdp_prob.evaluation.scores import COVERAGES, Bin, Interval, Scores
-from vrdp_prob.plural import several
+from vrdp_prob.plain_words import several
 from vrdp_prob.report.templating import asset, environment
 
 TITLES = {

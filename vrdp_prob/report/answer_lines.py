@@ -3,8 +3,9 @@
 import math
 from collections.abc import Sequence
 
+from vrdp_prob.plain_words import listed, percent, percent_error
 from vrdp_prob.reasoning import Answer
-from vrdp_prob.report.wording import listed, percent, percent_error, rests_on, with_names
+from vrdp_prob.report.wording import rests_on, with_names
 from vrdp_prob.scene import Body
 
 

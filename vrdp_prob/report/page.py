@@ -7,6 +7,7 @@ from typing import Any
 from markupsafe import Markup
 
 from vrdp_prob.inference.draws.summaries import PairSummary, ParameterSummary, Summary
+from vrdp_prob.plain_words import counted, listed, percent, percent_error, sentence
 from vrdp_prob.reasoning.answer import Answer
 from vrdp_prob.report.axes import log_axis, unit_axis
 from vrdp_prob.report.content import FACTUAL, FUTURE, AnswerContent, Footage, ReportContent
@@ -24,16 +25,11 @@ from vrdp_prob.report.summary import (
 from vrdp_prob.report.templating import asset, environment
 from vrdp_prob.report.wording import (
     color_of,
-    counted,
     interval_words,
-    listed,
     mass_status,
-    percent,
-    percent_error,
     restitution_status,
     rests_on,
     seconds,
-    sentence,
     tags,
     uncertain_attributes,
     with_names,

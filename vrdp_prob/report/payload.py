@@ -13,9 +13,10 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float, Int
 
+from vrdp_prob.plain_words import percent, percent_error
 from vrdp_prob.report.content import ReportContent, WorldContent
 from vrdp_prob.report.footage import film_data
-from vrdp_prob.report.wording import color_of, percent, percent_error, tags, world_group, world_label
+from vrdp_prob.report.wording import color_of, tags, world_group, world_label
 from vrdp_prob.scene import Camera
 from vrdp_prob.scene.naming import names
 

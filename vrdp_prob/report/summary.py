@@ -1,8 +1,9 @@
 """The report in one paragraph: what is there, what happened, whether to trust it, how much is in doubt."""
 
+from vrdp_prob.plain_words import counted, listed, number_word, percent, sentence
 from vrdp_prob.reasoning.answer import Answer
 from vrdp_prob.report.content import FACTUAL, AnswerContent, ReportContent
-from vrdp_prob.report.wording import counted, listed, number_word, percent, seconds, sentence
+from vrdp_prob.report.wording import seconds
 from vrdp_prob.scene import QuestionType
 from vrdp_prob.scene.naming import names
 

@@ -16,7 +16,7 @@ from vrdp_prob.concepts.perceived.training import train
 from vrdp_prob.concepts.perceived.vocabulary import Vocabulary
 from vrdp_prob.errors import InputError
 from vrdp_prob.inference.runs.checkpoint import Checkpoint
-from vrdp_prob.plural import several
+from vrdp_prob.plain_words import several
 from vrdp_prob.progress import ProgressDisplay, SilentProgress
 from vrdp_prob.randomness import seeded
 

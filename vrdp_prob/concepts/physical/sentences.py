@@ -2,7 +2,7 @@
 
 from vrdp_prob.concepts.physical.belief import Belief
 from vrdp_prob.concepts.physical.learned_word import LearnedWord
-from vrdp_prob.plural import several
+from vrdp_prob.plain_words import several
 from vrdp_prob.reasoning.changes import Rule
 
 SETTLED = 0.95

@@ -22,7 +22,7 @@ from vrdp_prob.discovery.residuals.free_flight import NORMAL_95, ONE_SIDED_95, F
 from vrdp_prob.discovery.residuals.linear import Score
 from vrdp_prob.discovery.residuals.residual_model import ResidualModel
 from vrdp_prob.discovery.words import number, opposite
-from vrdp_prob.plural import several
+from vrdp_prob.plain_words import several
 
 RUBBING = "tangential against normal impulse"
 DISTANCE = "centre distance at contact"

@@ -6,7 +6,7 @@ from typing import Any
 
 from vrdp_prob.discovery.finding import ComparedAnswer
 from vrdp_prob.discovery.page.wording import chance
-from vrdp_prob.report.wording import counted, number_word, sentence
+from vrdp_prob.plain_words import counted, number_word, sentence
 
 TELLING = 0.1
 """Change of a probability from which an answer is told of, though it stays."""

@@ -14,7 +14,7 @@ from vrdp_prob.discovery.page.seen import Figure, Seen
 from vrdp_prob.discovery.page.window_figures import acceleration_curves, acceleration_map
 from vrdp_prob.discovery.residuals.contact_patterns import AT_CONTACTS
 from vrdp_prob.inference.several_videos.fitting import SharedFit
-from vrdp_prob.report.wording import sentence
+from vrdp_prob.plain_words import sentence
 
 NAMES = ("the model that was given", "the extended model")
 OVER_THE_PLANE, AGAINST_SPEED, AGAINST_TIME = (

@@ -47,8 +47,8 @@ from vrdp_prob.discovery.page.wording import (
 from vrdp_prob.discovery.selection.forecast import TENTHS
 from vrdp_prob.discovery.words import title
 from vrdp_prob.models.effects.effect import Effect
+from vrdp_prob.plain_words import counted, listed, sentence
 from vrdp_prob.report.templating import asset, environment
-from vrdp_prob.report.wording import counted, listed, sentence
 from vrdp_prob.version import __version__
 
 ALIKE = (

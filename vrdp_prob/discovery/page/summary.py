@@ -23,7 +23,7 @@ from vrdp_prob.discovery.page.wording import (
     with_unit,
 )
 from vrdp_prob.discovery.words import title
-from vrdp_prob.report.wording import counted, listed, number_word, sentence
+from vrdp_prob.plain_words import counted, listed, number_word, sentence
 
 SURE = 0.9
 """Probability from which videos show a cause, and do not merely suggest it."""

@@ -18,7 +18,7 @@ from vrdp_prob.models.effects.effect import Effect
 from vrdp_prob.models.model_file import known_effects
 from vrdp_prob.models.parameters import Scope
 from vrdp_prob.models.physics import PhysicsModel
-from vrdp_prob.report.wording import counted, percent
+from vrdp_prob.plain_words import counted, percent
 
 UNDEFINED = "\N{EN DASH}"
 """Stands where a number is not defined."""

@@ -30,7 +30,7 @@ from vrdp_prob.models.effects.mass_dependent_friction import MassDependentFricti
 from vrdp_prob.models.effects.material_friction import MaterialFriction
 from vrdp_prob.models.effects.speed_dependent_restitution import SpeedDependentRestitution
 from vrdp_prob.models.effects.wall import Wall
-from vrdp_prob.report.wording import listed
+from vrdp_prob.plain_words import listed
 
 SURPRISING = 0.01
 """Probability below which parameters of a cause, or what is left of what it acts on, say that it is something else."""

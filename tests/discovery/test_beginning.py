@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from tests.discovery.fitted import fitted
-from tests.discovery.stand_ins import refit_with, refits_with, start_with
+from tests.discovery.stand_ins import refit_with, refits_with, start_with, without_tracks
 from vrdp_prob.discovery import stages
 from vrdp_prob.discovery.candidates.scores import CauseScore
 from vrdp_prob.discovery.selection import beginning as beginning_module
@@ -86,6 +86,7 @@ def test_the_search_goes_on_from_the_model_with_them(*, brings: bool, monkeypatc
     begun = create_autospec(Beginning, instance=True)
     begun.fitted.return_value = tilt if brings else None
     asked: list[Trial] = []
+    without_tracks(monkeypatch)
     monkeypatch.setattr(Leavings, "of", lambda _self, _trial: Left((), (), np.ones(3)))
     monkeypatch.setattr(ForwardSelection, "tried", lambda self, one: asked.append(one) or self.untried(one))
     chain, steps, _ = ForwardSelection(refits_with(needed=6.0), begun).models(plain)

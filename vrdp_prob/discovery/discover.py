@@ -10,9 +10,9 @@ from vrdp_prob.datasets.folder import some
 from vrdp_prob.discovery.checking import FEWEST_VIDEOS, check_searched, check_video_count
 from vrdp_prob.discovery.describe import describe
 from vrdp_prob.discovery.finding import Finding, FoundCause, UpperBound, Verdict
+from vrdp_prob.discovery.normal import WITHIN_95
 from vrdp_prob.discovery.outcome import noise_of
 from vrdp_prob.discovery.page.figures import residual_figures
-from vrdp_prob.discovery.residuals.free_flight import NORMAL_95
 from vrdp_prob.discovery.selection.believed import extended_model, models_of_the_others
 from vrdp_prob.discovery.selection.doubts import details_left, rivals_outside
 from vrdp_prob.discovery.selection.estimates import mass_scale_notes, upper_bounds
@@ -337,7 +337,7 @@ def _unlisted_note(unlisted: Unlisted) -> str:
         than = listed(f"'{title(name)}'" for name in unlisted.mimics)
         rest = f"; {than} may only follow it, and {'are' if len(unlisted.mimics) > 1 else 'is'} not named"
     laws = listed(f"{law.sentence[0].lower()}{law.sentence[1:].rstrip('.')}" for law in unlisted.laws)
-    better = "better" if unlisted.gain > NORMAL_95 * unlisted.error else "at least as well, as far as they can tell,"
+    better = "better" if unlisted.gain > WITHIN_95 * unlisted.error else "at least as well, as far as they can tell,"
     size = f"{unlisted.gain:.0f} ± {unlisted.error:.0f} nats"
     size += "" if unlisted.asked is None else f" in all, by {unlisted.asked} of them"
     return f"A model in which {laws} predicts left-out videos {better} ({size}){rest}."

@@ -15,7 +15,7 @@ from jaxtyping import Float
 from scipy.stats import chi2
 
 from vrdp_prob.discovery.candidates.probes import Probe, probes
-from vrdp_prob.discovery.residuals.free_flight import ONE_SIDED_95
+from vrdp_prob.discovery.normal import BELOW_95
 from vrdp_prob.discovery.residuals.jitter import jitter
 from vrdp_prob.discovery.residuals.linear import RANK, Score
 from vrdp_prob.discovery.residuals.look_elsewhere import anywhere, independent_places
@@ -83,7 +83,7 @@ class Largest:
     def widened(self, factor: float) -> float | None:
         """The bound where standard deviations are larger by a factor than the residuals say."""
         if self.strengths:
-            return max(abs(estimate) + factor * ONE_SIDED_95 * sd for estimate, sd in self.strengths)
+            return max(abs(estimate) + factor * BELOW_95 * sd for estimate, sd in self.strengths)
         return None if self.bound is None else factor * self.bound
 
 
@@ -268,7 +268,7 @@ def _largest(places: Sequence[Iterable[tuple[str, float, float]]], effect: Effec
         enough = max(expected[name], min((sd for *_, sd in seen), default=0.0))
         told = [row for row in seen if row[2] <= enough]
         each = tuple((estimate, sd) for _, estimate, sd in told)
-        bound = max((abs(estimate) + ONE_SIDED_95 * sd for estimate, sd in each), default=None)
+        bound = max((abs(estimate) + BELOW_95 * sd for estimate, sd in each), default=None)
         largest[name] = Largest(bound, len({row[0] for row in rows}), len({row[0] for row in told}), each)
     return largest
 

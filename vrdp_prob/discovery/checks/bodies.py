@@ -14,8 +14,8 @@ from vrdp_prob.discovery.checks.false_discovery import SEEN
 from vrdp_prob.discovery.checks.own_values import BodyFrictions, Rebounds
 from vrdp_prob.discovery.checks.scatter_regression import Dependence, dependence
 from vrdp_prob.discovery.finding import Check
+from vrdp_prob.discovery.normal import WITHIN_95
 from vrdp_prob.discovery.residuals.fitted_contacts import FittedContacts
-from vrdp_prob.discovery.residuals.free_flight import NORMAL_95
 from vrdp_prob.discovery.residuals.residual_model import ResidualModel
 from vrdp_prob.discovery.words import number, opposite
 from vrdp_prob.inference.several_videos.fitting import SharedFit
@@ -54,7 +54,7 @@ def _restitution_check(rebounds: Rebounds) -> Iterator[Check]:
         f"Restitution {opposite(slope, 'falls', 'grows')} with the approach speed: {number(low)} at {number(slow)} "
         f"m/s, {number(high)} at {number(fast)} m/s."
         if found.p_value < SEEN
-        else f"Nothing seen; a power of {number(NORMAL_95 * sd)} of speeds beyond {number(usual)} m/s would have shown."
+        else f"Nothing seen; a power of {number(WITHIN_95 * sd)} of speeds beyond {number(usual)} m/s would have shown."
     )
     yield Check(REBOUND, slope, found.p_value, False, sentence)
 
@@ -93,14 +93,14 @@ def _friction_checks(fit: SharedFit, contacts: Sequence[FittedContacts]) -> Iter
         yield from _friction_check("shape", found, f"that of cubes is {_more(found)} than that of cylinders")
     weighed = np.flatnonzero(np.isfinite(own.log_mass))
     found = asked([own.log_mass], weighed, np.concatenate([own.weighed_together, known], axis=1))
-    visible = "" if found is None else f"a power of {number(NORMAL_95 * float(found.sd[0]))} of the mass"
+    visible = "" if found is None else f"a power of {number(WITHIN_95 * float(found.sd[0]))} of the mass"
     yield from _friction_check("mass", found, _mass_words(found, own.largest_mass_ratio), visible)
 
 
 def _friction_check(name: str, found: Dependence | None, words: str, visible: str = "") -> Iterator[Check]:
     if found is None:
         return
-    visible = visible or f"{number(100 * NORMAL_95 * float(found.sd.max()))} %"
+    visible = visible or f"{number(100 * WITHIN_95 * float(found.sd.max()))} %"
     sentence = (
         f"The fitted friction of the bodies depends on their {name}: {words}."
         if found.p_value < SEEN

@@ -17,8 +17,9 @@ from vrdp_prob.discovery.checks.bodies import REBOUND
 from vrdp_prob.discovery.checks.false_discovery import SEEN
 from vrdp_prob.discovery.checks.kicks import kick_check
 from vrdp_prob.discovery.finding import Check
+from vrdp_prob.discovery.normal import BELOW_95, WITHIN_95
 from vrdp_prob.discovery.residuals.contact_patterns import AT_CONTACTS, AT_WALLS, GROW, WHERE, ContactScore
-from vrdp_prob.discovery.residuals.free_flight import NORMAL_95, ONE_SIDED_95, FreeFlight
+from vrdp_prob.discovery.residuals.free_flight import FreeFlight
 from vrdp_prob.discovery.residuals.linear import Score
 from vrdp_prob.discovery.residuals.residual_model import ResidualModel
 from vrdp_prob.discovery.words import number, opposite
@@ -81,7 +82,7 @@ def _slip_check(score: Score, where: str) -> Iterator[Check]:
     size, sd = float(alone.estimate[0]), float(alone.sd[0])
     word = opposite(size, "along", "against")
     found = f"{where.capitalize()} a tangential impulse acts {word} the slip, {number(abs(size))} of the normal one."
-    yield _check(RUBBING_OF[where], size, score.log_p_value, found, f"{number(NORMAL_95 * sd)} of the normal one")
+    yield _check(RUBBING_OF[where], size, score.log_p_value, found, f"{number(WITHIN_95 * sd)} of the normal one")
 
 
 def _rub_check(score: Score, where: str) -> Iterator[Check]:
@@ -90,7 +91,7 @@ def _rub_check(score: Score, where: str) -> Iterator[Check]:
         return
     known = score.sd > 0
     variance = score.sd[known] ** 2
-    visible = NORMAL_95 * float((1 / variance).sum() ** -0.5)
+    visible = WITHIN_95 * float((1 / variance).sum() ** -0.5)
     excess = float((score.estimate[known] ** 2 / variance - 1).sum() / (1 / variance).sum())
     size = float(np.sqrt(max(excess, 0.0)))
     found = f"{where.capitalize()} tangential impulses act, {number(size)} of the normal ones (root mean square)."
@@ -105,7 +106,7 @@ def _turn_check(score: Score, where: str) -> Iterator[Check]:
         f"{where.capitalize()} the spin of bodies changes as if the tangential impulse were {number(abs(size))} of the "
         f"normal one, {opposite(size, 'along', 'against')} the slip."
     )
-    visible = f"{number(NORMAL_95 * float(score.sd[0]))} of the normal impulse"
+    visible = f"{number(WITHIN_95 * float(score.sd[0]))} of the normal impulse"
     yield _check(TURNING[where], size, score.log_p_value, found, visible)
 
 
@@ -119,7 +120,7 @@ def _bounce_check(score: Score) -> Iterator[Check]:
         f"{AT_WALLS.capitalize()} restitution {opposite(size, 'falls', 'grows')} with the approach speed, to the power "
         f"{number(size)}."
     )
-    visible = f"a power of {number(NORMAL_95 * sd)} of the approach speed"
+    visible = f"a power of {number(WITHIN_95 * sd)} of the approach speed"
     yield _check(REBOUND_AT_WALLS, size, power.log_p_value, found, visible)
 
 
@@ -138,7 +139,7 @@ def _distance_check(score: Score, contacts: ContactScore) -> Iterator[Check]:
         f"Bodies touch {number(abs(size))} m {opposite(size, 'nearer', 'farther apart')} than the sum of their radii, "
         f"{number(100 * abs(share))} % of it."
     )
-    check = _check(DISTANCE, size, score.log_p_value, found, f"{number(NORMAL_95 * sd)} m")
+    check = _check(DISTANCE, size, score.log_p_value, found, f"{number(WITHIN_95 * sd)} m")
     yield replace(check, rival=_lasting_instead(score, contacts.durations("last", AT_CONTACTS)))
 
 
@@ -148,7 +149,7 @@ def _duration_check(score: Score, where: str) -> Iterator[Check]:
         return
     size, sd = float(score.estimate[0]), float(score.sd[0])
     found = f"{where.capitalize()} bodies touch for {number(size)} s, and give way meanwhile."
-    yield _check(DURATION[where], size, float(norm.logsf(size / sd)), found, f"{number(ONE_SIDED_95 * sd)} s")
+    yield _check(DURATION[where], size, float(norm.logsf(size / sd)), found, f"{number(BELOW_95 * sd)} s")
 
 
 def _lasting_instead(distance: Score, duration: Score) -> str:

@@ -18,8 +18,9 @@ from vrdp_prob.discovery.checks.neighbours import (
 )
 from vrdp_prob.discovery.checks.replications import two_sided_p_value
 from vrdp_prob.discovery.finding import Check
+from vrdp_prob.discovery.normal import WITHIN_95
 from vrdp_prob.discovery.residuals.fitted_motion import FittedMotion
-from vrdp_prob.discovery.residuals.free_flight import NORMAL_95, FreeFlight
+from vrdp_prob.discovery.residuals.free_flight import FreeFlight
 from vrdp_prob.discovery.residuals.residual_model import ResidualModel
 from vrdp_prob.discovery.words import number, opposite
 
@@ -64,7 +65,7 @@ def _lens_check(flight: FreeFlight) -> Iterator[Check]:
         f"Positions are displaced {opposite(strength, 'towards', 'away from')} the middle of the picture with the cube "
         f"of the distance: by {number(edge)} m at {number(far)} m from it."
         if lens.p_value < SEEN
-        else f"Nothing seen; {number(NORMAL_95 * float(lens.of([0], [1, 2]).sd[0]) * far**3)} m at {number(far)} m "
+        else f"Nothing seen; {number(WITHIN_95 * float(lens.of([0], [1, 2]).sd[0]) * far**3)} m at {number(far)} m "
         "from the middle would have shown."
     )
     yield Check(DISTORTION, edge, lens.p_value, False, sentence, log_p_value=lens.log_p_value)

@@ -9,10 +9,10 @@ from jaxtyping import Bool, Float
 from scipy.stats import chi2
 
 from vrdp_prob.discovery.checks.flight import DISTANCE, PUSH, QUESTIONS, SHAKING, phases
+from vrdp_prob.discovery.normal import WITHIN_95
 from vrdp_prob.discovery.page.scatter import Banded, Points, with_bands, with_bars
 from vrdp_prob.discovery.page.seen import Figure, Seen
 from vrdp_prob.discovery.residuals.fitted_motion import FittedMotion
-from vrdp_prob.discovery.residuals.free_flight import NORMAL_95
 from vrdp_prob.discovery.residuals.free_flight_patterns import there, way_travelled
 from vrdp_prob.discovery.residuals.residual_model import joined
 from vrdp_prob.scene import Body
@@ -221,7 +221,7 @@ def _spectrum(seen: Sequence[Seen]) -> str:
         for name, frequency in one.flight.scales.frequencies.items():
             part = one.flight.part(phases(name), PUSH)
             if part.score.degrees:
-                by_chance = part.visible / NORMAL_95 * np.sqrt(chi2.isf(0.05, part.score.degrees))
+                by_chance = part.visible / WITHIN_95 * np.sqrt(chi2.isf(0.05, part.score.degrees))
                 rows.append((frequency, part.size, 0.0, by_chance))
         at, size, low, high = np.array(rows).reshape(-1, 4).T
         return Banded(at, size, low, high)

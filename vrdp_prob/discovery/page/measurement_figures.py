@@ -8,9 +8,9 @@ import numpy as np
 from vrdp_prob.discovery.checks.clock import LOST_FRAMES, SINGLE_FRAMES, LateFrames
 from vrdp_prob.discovery.checks.measurement import MEMORY, OUTLIERS, SIZE
 from vrdp_prob.discovery.checks.neighbours import FEWEST, FramesApart, apart_from_neighbours
+from vrdp_prob.discovery.normal import WITHIN_95
 from vrdp_prob.discovery.page.scatter import Banded, Points, with_bands
 from vrdp_prob.discovery.page.seen import REPLICAS, Figure, Seen, shortened
-from vrdp_prob.discovery.residuals.free_flight import NORMAL_95
 from vrdp_prob.report.axes import size_axis
 
 MOST_APART = 20
@@ -64,7 +64,7 @@ def _neighbours(seen: Sequence[Seen], *, memory: bool) -> str:
             if (apart := FramesApart.of(one.model, one.replicas, frames)) is None:
                 break
             ends = (
-                (-NORMAL_95 * apart.sd, NORMAL_95 * apart.sd)
+                (-WITHIN_95 * apart.sd, WITHIN_95 * apart.sd)
                 if memory
                 else np.quantile(apart.drawn_differences, ENDS).tolist()
             )

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float
 
+from vrdp_prob.discovery.normal import WITHIN_95
 from vrdp_prob.discovery.page.plots import Plot, side_by_side
 from vrdp_prob.discovery.page.seen import Seen
-from vrdp_prob.discovery.residuals.free_flight import NORMAL_95
 from vrdp_prob.report.axes import Axis, linear_axis
 
 UNUSUAL = 3.0
@@ -141,7 +141,7 @@ class Banded:
     ) -> "Banded":
         """Numbers that are 0 where nothing is wrong; without those that are known much worse than most."""
         keep = Points(at, value, sd).usual
-        return cls(at[keep], value[keep], -NORMAL_95 * sd[keep], NORMAL_95 * sd[keep], against)
+        return cls(at[keep], value[keep], -WITHIN_95 * sd[keep], WITHIN_95 * sd[keep], against)
 
 
 def with_bands(

@@ -11,6 +11,7 @@ from functools import cached_property
 import numpy as np
 from jaxtyping import Float
 
+from vrdp_prob.discovery.normal import WITHIN_95
 from vrdp_prob.discovery.residuals.fitted_motion import Kicks
 from vrdp_prob.discovery.residuals.free_flight_patterns import Pattern, Scales, patterns
 from vrdp_prob.discovery.residuals.linear import Score
@@ -18,8 +19,6 @@ from vrdp_prob.discovery.residuals.residual_model import ResidualModel
 from vrdp_prob.models.effects.body_friction import FRICTION_RATIO
 from vrdp_prob.models.simulator.events import CONTACTS, RolloutEventKind
 
-NORMAL_95, ONE_SIDED_95 = 1.96, 1.644854
-"""Standard deviations from the middle of a normal distribution to the ends of its middle 95 %, and of its lower."""
 FRICTION = FRICTION_RATIO.name
 """Name of the parameter that is a body's own friction, in units of what the bodies share."""
 
@@ -105,7 +104,7 @@ class Part:
     def visible(self) -> float:
         """Root mean square acceleration (m/s^2) of one pattern that would have shown (95 %)."""
         squares = (self.fields**2).sum(axis=1).mean(axis=0) if len(self.fields) else np.zeros(len(self.patterns))
-        return NORMAL_95 * float(np.sqrt(np.max(squares * self.score.sd**2, initial=0.0)))
+        return WITHIN_95 * float(np.sqrt(np.max(squares * self.score.sd**2, initial=0.0)))
 
     def estimate(self, name: str) -> float:
         """Estimated amplitude of a pattern; 0 where the videos cannot show it."""

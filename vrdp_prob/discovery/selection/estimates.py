@@ -10,6 +10,7 @@ from scipy.stats import chi2
 
 from vrdp_prob.discovery.candidates.scores import CauseScore, Largest, telling_rows
 from vrdp_prob.discovery.finding import Estimate, UpperBound
+from vrdp_prob.discovery.normal import WITHIN_95
 from vrdp_prob.discovery.residuals.unexplained import Unexplained
 from vrdp_prob.discovery.selection.reach import Reach, reaches
 from vrdp_prob.inference.several_videos.fitting import SharedFit
@@ -22,8 +23,6 @@ CERTAIN = 0.95
 """Probability of the intervals."""
 OF_BELIEVED_MASSES = "for masses of the scale that was believed"
 """What is said of a bound that goes with the scale of the masses, where none is stated."""
-MIDDLE = 1.959964
-"""Standard deviations from the middle of a normal distribution to the ends of its middle 95 %."""
 
 
 def estimates(
@@ -146,7 +145,7 @@ def mass_scale_notes(effects: Iterable[Effect], videos: Iterable[Tracks]) -> Ite
 
 
 def _estimate(transform: Transform, mean: float, sd: float, unit: str) -> Estimate:
-    low, high = mean - MIDDLE * sd, mean + MIDDLE * sd
+    low, high = mean - WITHIN_95 * sd, mean + WITHIN_95 * sd
     if transform is Transform.IDENTITY:
         return Estimate(mean, sd, low, high, unit)
     middle = math.exp(mean + sd**2 / 2)

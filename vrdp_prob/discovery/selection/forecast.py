@@ -14,6 +14,7 @@ from jaxtyping import Float
 from scipy.stats import norm
 
 from vrdp_prob.discovery.finding import ErrorRatio, HeldOut, VideoErrors
+from vrdp_prob.discovery.normal import WITHIN_50, WITHIN_90
 from vrdp_prob.discovery.residuals.held_out import Cavity
 from vrdp_prob.inference.runs.parallel import in_parallel
 from vrdp_prob.inference.search.least_squares import jacobian, minimise
@@ -29,8 +30,6 @@ AHEAD = 1.0
 """Time in s after the last of them at which the error is looked at."""
 AROUND = 2
 """Frames on each side over which it is averaged, and twice as many at the end."""
-HALF, NINE_TENTHS = 0.6745, 1.6449
-"""Half widths of the middle 50 % and 90 % of a normal distribution."""
 TENTHS = 10
 FEWEST_SEEN = 2
 """Times that a body must have been seen by then, for what comes next to be predicted."""
@@ -85,8 +84,8 @@ def held_out(videos: Sequence[LinkedVideo], points: Sequence[np.ndarray], caviti
         rmse=math.nan if (rmse := _in_the_middle([one.rmse for one in by_video])) is None else rmse,
         rmse_one_second=_in_the_middle([one.rmse_one_second for one in by_video]),
         rmse_end=_in_the_middle([one.rmse_end for one in by_video]),
-        coverage_50=float((standardised < HALF).mean()),
-        coverage_90=float((standardised < NINE_TENTHS).mean()),
+        coverage_50=float((standardised < WITHIN_50).mean()),
+        coverage_90=float((standardised < WITHIN_90).mean()),
         pit=_tenths(errors),
         by_video=by_video,
     )

@@ -131,7 +131,7 @@ def test_a_cause_has_its_few_lost_videos_searched_anew(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     nothing, tilt, drag = refit_with("", 0.0), refit_with("tilt", 5.0), refit_with("drag", 7.0)
-    tilt.fit = Mock(fits=[""] * 4)
+    tilt.fit = Mock(fits=[""] * 4, videos=range(4))
     anew = refit_with("tilt searched anew", 9.0)
     tilt.mended.return_value, anew.mended.return_value = anew if taken != "tilt" else tilt, anew
     tilt.fallen_from.return_value = anew.fallen_from.return_value = []

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.special import log_ndtr
+from scipy.stats import chi2
 
 from vrdp_prob.discovery.residuals.linear import LinearFit, LinearVideo, Score
 
@@ -39,6 +40,20 @@ def test_a_video_at_an_edge_pulls_no_other_one() -> None:
 
     assert squares(pulled) > 2 * squares(alone)
     assert squares(spared) == pytest.approx(squares(alone), rel=0.1)
+
+
+@pytest.mark.parametrize("off", [0.0, 1e-3])
+def test_what_a_video_at_an_edge_promises_is_no_score_of_what_acts_as_shared_unknowns_do(off: float) -> None:
+    """What is left of such a direction is next to nothing, and the slope was that of a shared unknown."""
+    generator = np.random.default_rng(5)
+    videos, directions = [], []
+    for video in (_video(1), _video(2), _pulling(at_edge=True)):
+        shared = video.shared.copy()
+        shared[video.data :] = 0.0
+        videos.append(replace(video, shared=shared))
+        directions.append(shared[: video.data, :1] + off * generator.standard_normal((video.data, 1)))
+    score = _fit(*videos).score(directions)
+    assert score.chi_square < chi2.isf(1e-4, 1)
 
 
 def test_what_a_video_at_an_edge_promises_is_seen_and_does_not_count() -> None:

@@ -109,6 +109,18 @@ class LinearVideo:
         """The residuals when the own unknowns are at their best, the shared ones being those of the fit."""
         return self.without_own(self.residuals[:, None])[:, 0]
 
+    def pulling(self, residuals: Float[np.ndarray, "residual column"]) -> Float[np.ndarray, "residual column"]:
+        """What is left of residuals when the own unknowns follow; at an edge nothing that shared ones could take up.
+
+        What derivatives promise there of shared unknowns would else stand for whatever acts as these do.
+        """
+        left = self.without_own(residuals)
+        if not self.at_edge:
+            return left
+        basis, values, _ = np.linalg.svd(self.reduced_shared / _lengths(self.reduced_shared), full_matrices=False)
+        basis = basis[:, values > RIDGE * values.max(initial=0.0)]
+        return left - basis @ (basis.T @ left)
+
     def slope(self, left: Float[np.ndarray, "residual column"]) -> Float[np.ndarray, "shared column"]:
         """Derivative of half the sum of squares of such residuals by the shared unknowns; none at an edge."""
         slope: np.ndarray = self.reduced_shared.T @ left
@@ -355,7 +367,7 @@ class LinearFit:
         prior_gradient: Float[np.ndarray, "shared column"],
     ) -> tuple[Float[np.ndarray, "_ column"], ...]:
         """What all unknowns together leave of some residuals, each column by itself."""
-        reduced = [video.without_own(one) for video, one in zip(self.videos, residuals, strict=True)]
+        reduced = [video.pulling(one) for video, one in zip(self.videos, residuals, strict=True)]
         _, step = self._pulled(reduced, prior_gradient)
         return tuple(one - video.reduced_shared @ step for video, one in zip(self.videos, reduced, strict=True))
 

@@ -115,11 +115,12 @@ def _missing(steps: Float[np.ndarray, "step body 2"], place: int, noise: float) 
     if not len(told):
         return 0
     squares = size[told] ** 2
-    count, sd = float((taken[1, told] * squares).sum() / squares.sum()), np.sqrt(2.0 / squares.sum()) * noise
-    whole, excess = round(count), float((beside[:, told].sum(axis=0) * squares).sum() / squares.sum()) - 2
+    count, sd = float(np.average(taken[1, told], weights=squares)), np.sqrt(2.0 / squares.sum()) * noise
+    with_those_beside = count + float(np.average(beside[:, told].sum(axis=0), weights=squares))
+    whole = round(count)
     if whole < 2 or count - 1 < SIGNIFICANT * sd or abs(count - whole) > WHOLE + 2 * sd:
         return 0
-    if abs(count + excess - whole) > AWAY + 2 * sd:
+    if abs(with_those_beside - (whole + 2)) > AWAY + 2 * sd:
         return 0
     off = np.linalg.norm(around[1, told] - whole * usual[told], axis=1)
     allowed = ALIKE * np.sqrt(2.0 * (1 + whole**2)) * noise + WHOLE * size[told]

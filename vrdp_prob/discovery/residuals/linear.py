@@ -73,8 +73,7 @@ class LinearVideo:
     def _basis(self) -> Float[np.ndarray, "residual rank"]:
         """Orthonormal basis of what the own unknowns can do."""
         basis, values, _ = self._decomposed
-        kept: np.ndarray = basis[:, values > RIDGE * values.max(initial=0.0)]
-        return kept
+        return _kept(basis, values)
 
     @property
     def log_volume(self) -> float:
@@ -117,8 +116,7 @@ class LinearVideo:
         left = self.without_own(residuals)
         if not self.at_edge:
             return left
-        basis, values, _ = np.linalg.svd(self.reduced_shared / _lengths(self.reduced_shared), full_matrices=False)
-        basis = basis[:, values > RIDGE * values.max(initial=0.0)]
+        basis = _kept(*np.linalg.svd(self.reduced_shared / _lengths(self.reduced_shared), full_matrices=False)[:2])
         return left - basis @ (basis.T @ left)
 
     def slope(self, left: Float[np.ndarray, "residual column"]) -> Float[np.ndarray, "shared column"]:
@@ -213,6 +211,12 @@ def log_evidence(own: Float[np.ndarray, "residual own"], residuals: Float[np.nda
 def _lengths(columns: Float[np.ndarray, "row column"]) -> Float[np.ndarray, "column"]:
     """Lengths of columns, none of them 0."""
     return np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
+
+
+def _kept(basis: Float[np.ndarray, "row value"], values: Float[np.ndarray, "value"]) -> Float[np.ndarray, "row rank"]:
+    """Those left singular vectors whose values do not count as nothing."""
+    kept: np.ndarray = basis[:, values > RIDGE * values.max(initial=0.0)]
+    return kept
 
 
 def _told(values: Float[np.ndarray, "value"]) -> Float[np.ndarray, "value"]:

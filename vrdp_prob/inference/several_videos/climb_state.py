@@ -16,7 +16,8 @@ from vrdp_prob.inference.several_videos.linking import LinkedVideo, SharedNumber
 TOLERANCE = 0.2
 """Gain (nats) of a step, expected or real, below which a climb ends..."""
 EXPECTED = 1.0
-"""...and has converged, if no more than so much was expected."""
+"""...and has converged, if no more than so much was expected; where a common step brought nothing, none is tried until
+the videos by themselves have gained as much."""
 
 
 class ImpossibleStartError(Exception):

@@ -7,7 +7,7 @@ from unittest.mock import Mock, create_autospec
 import numpy as np
 import pytest
 
-from vrdp_prob.discovery.candidates.scores import CauseScore
+from vrdp_prob.discovery.candidates.first_guess import FirstGuess
 from vrdp_prob.discovery.selection import refits
 from vrdp_prob.discovery.selection.forward import ForwardSelection, Step
 from vrdp_prob.discovery.selection.leavings import Leavings, Left
@@ -15,9 +15,9 @@ from vrdp_prob.discovery.selection.trials import Trial
 from vrdp_prob.models.effects.effect import Effect
 
 
-def start_with(effect: Effect, values: Mapping[str, float] | None = None) -> CauseScore:
+def start_with(effect: Effect, values: Mapping[str, float] | None = None) -> FirstGuess:
     """A start of refits with a cause."""
-    return CauseScore(effect, dict(values or {}), (), 0.0, 0, 0.0, {})
+    return FirstGuess(effect, dict(values or {}))
 
 
 def refit_with(cause: str, gained: float, *, patches: bool = False) -> Mock:

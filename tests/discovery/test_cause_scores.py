@@ -95,7 +95,7 @@ def test_what_videos_have_of_a_score_adds_up_and_a_slope_is_called_for_in_most()
 def test_few_videos_are_those_without_which_a_cause_is_not_called_for(
     by_video: tuple[float, ...], p_value: float, few: list[int]
 ) -> None:
-    one = CauseScore(SurfaceTilt(), {}, (), sum(by_video), 2, p_value, {}, by_video=by_video)
+    one = CauseScore(SurfaceTilt(), {}, chi_square=sum(by_video), degrees=2, p_value=p_value, by_video=by_video)
     assert one.few_videos(1e-3) == few
 
 

@@ -43,7 +43,7 @@ def kicked() -> Trial:
 def test_a_disc_is_guessed_where_it_touches_the_hidden_one(kicked: Trial) -> None:
     data, _ = fitted(WAY, 20.0, seed=SEED)
     disc = data.truth.videos[0].hidden_discs[0]
-    starts = [one.start for one in hidden_things(kicked.fit, [HiddenObstacle()], 0.0)]
+    starts = [one.start for one in hidden_things(kicked.fit, [HiddenObstacle()])]
     assert starts
     # All guesses touch the body at one point; the true disc does so too, whatever its radius.
     reach = [
@@ -56,13 +56,13 @@ def test_a_disc_is_guessed_where_it_touches_the_hidden_one(kicked: Trial) -> Non
 
 
 def test_a_wall_is_guessed_square_to_the_kick(kicked: Trial) -> None:
-    guesses = hidden_things(kicked.fit, [Wall()], 0.0)
+    guesses = hidden_things(kicked.fit, [Wall()])
     assert guesses
     assert all(0 < one.start["hidden_wall_restitution"] < 1 for one in guesses)
 
 
 def test_a_second_wall_is_guessed_with_numbers_of_its_own(kicked: Trial) -> None:
-    first, second = (hidden_things(kicked.fit, [effect], 0.0) for effect in (Wall(), SecondWall()))
+    first, second = (hidden_things(kicked.fit, [effect]) for effect in (Wall(), SecondWall()))
     assert [list(one.start.values()) for one in second] == [list(one.start.values()) for one in first]
     assert all(name.startswith("second_hidden_wall_") for one in second for name in one.start)
 
@@ -111,7 +111,7 @@ def test_nothing_hidden_is_guessed_of_kicks_that_come_with_a_contact(
     kicked: Trial, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(proposals, "kicked_at_contact", lambda *_given: True)
-    assert hidden_things(kicked.fit, [HiddenObstacle(), Wall()], 0.0) == []
+    assert hidden_things(kicked.fit, [HiddenObstacle(), Wall()]) == []
 
 
 def _kicked_at_one_second(contact: float, partners: tuple[int, int]) -> EventTable:
@@ -124,11 +124,11 @@ def _kicked_at_one_second(contact: float, partners: tuple[int, int]) -> EventTab
 
 
 def test_nothing_is_guessed_of_other_causes(kicked: Trial) -> None:
-    assert hidden_things(kicked.fit, [ExternalImpulse()], 0.0) == []
+    assert hidden_things(kicked.fit, [ExternalImpulse()]) == []
 
 
 def test_a_disc_in_the_place_of_the_kick_explains_the_videos_as_well(kicked: Trial) -> None:
-    starts = hidden_things(kicked.fit, [HiddenObstacle()], 0.0)
+    starts = hidden_things(kicked.fit, [HiddenObstacle()])
     _, fit = fitted(WAY, 20.0, seed=SEED)
     least = fit.joint.log_density
     found = [
@@ -145,7 +145,7 @@ def test_a_disc_in_the_place_of_the_kick_explains_the_videos_as_well(kicked: Tri
 def test_a_disc_takes_the_place_of_kicks_beside_a_later_cause(kicked: Trial) -> None:
     both = kicked.with_cause(start_with(LinearDrag(), {"linear_drag": 0.01}))
     assert both is not None
-    starts = hidden_things(both.fit, [HiddenObstacle()], 0.0)
+    starts = hidden_things(both.fit, [HiddenObstacle()])
     least = both.fit.joint.log_density - 1000.0
     found = [one for start in starts if (one := both.with_cause_in_place(start, both.causes[0], least)) is not None]
     assert {one.names for one in found} == {("linear_drag", "hidden_obstacle")}

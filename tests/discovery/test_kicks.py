@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tests.discovery.fitted import fitted
-from vrdp_prob.discovery.candidates.scores import CauseScore, Site
+from vrdp_prob.discovery.candidates.first_guess import FirstGuess, Site
 from vrdp_prob.discovery.selection.trials import Trial
 from vrdp_prob.inference.several_videos.fitting import SharedFit
 from vrdp_prob.models.effects.external_impulse import ExternalImpulse
@@ -23,7 +23,7 @@ def first_contact(fit: SharedFit) -> tuple[int, int, float]:
 def kicked(fit: SharedFit, video: int, body: int, kick: dict[str, float]) -> Trial:
     """The fit with a kick of a body."""
     site = Site(video, body, kick, 30.0, 1e-6)
-    trial = Trial((), fit).with_cause(CauseScore(ExternalImpulse(), {}, (site,), 30.0, 2, 1e-6, {}, 9))
+    trial = Trial((), fit).with_cause(FirstGuess(ExternalImpulse(), {}, (site,), places=9))
     assert trial is not None
     assert trial.acting(ExternalImpulse()) == [video]
     return trial

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from vrdp_prob.discovery import stages
-from vrdp_prob.discovery.candidates.scores import CauseScore, Site
+from vrdp_prob.discovery.candidates.first_guess import Site
+from vrdp_prob.discovery.candidates.scores import CauseScore
 from vrdp_prob.discovery.finding import Check, Verdict
 from vrdp_prob.discovery.outcome import Outcome
 from vrdp_prob.discovery.selection import leavings as leavings_module
@@ -28,12 +29,12 @@ NOTHING = (0.0, 1.0, 0.5, 2.0)
 
 def law(effect: Effect, by_video: tuple[float, ...]) -> CauseScore:
     size = sum(by_video)
-    return CauseScore(effect, {}, (), size, 1, float(np.exp(-size / 2)), {}, by_video=by_video)
+    return CauseScore(effect, {}, chi_square=size, degrees=1, p_value=float(np.exp(-size / 2)), by_video=by_video)
 
 
 def kick(*videos: int) -> CauseScore:
     sites = tuple(Site(video, 0, {}, 50.0, 1e-9) for video in videos)
-    return CauseScore(ExternalImpulse(), {}, sites, 50.0, 2, 1e-9, {})
+    return CauseScore(ExternalImpulse(), {}, sites, chi_square=50.0, degrees=2, p_value=1e-9)
 
 
 def leaving(scores: list[CauseScore], monkeypatch: pytest.MonkeyPatch) -> tuple[Leavings, Trial]:

@@ -10,7 +10,8 @@ import pytest
 
 from tests.discovery.fitted import fitted
 from tests.discovery.stand_ins import start_with
-from vrdp_prob.discovery.candidates.scores import CauseScore, Site, score_causes
+from vrdp_prob.discovery.candidates.first_guess import FirstGuess, Site
+from vrdp_prob.discovery.candidates.scores import score_causes
 from vrdp_prob.discovery.finding import HeldOut, VideoErrors
 from vrdp_prob.discovery.residuals.held_out import all_but_each, cavities, left_out
 from vrdp_prob.discovery.residuals.residual_model import ResidualModel
@@ -401,7 +402,7 @@ def test_a_kick_that_can_be_in_one_place_only_acts_there() -> None:
     """A single place is no choice among several, whose logarithm was taken for that nothing happens."""
     _, fit = fitted("external_impulse", 3.0, seed=2)
     site = Site(1, 0, {"impulse_time": 1.0, "impulse_x": 0.1, "impulse_y": 0.0}, 50.0, 1e-9)
-    score = CauseScore(ExternalImpulse(), {}, (site,), 50.0, 2, 1e-9, {}, 1)
+    score = FirstGuess(ExternalImpulse(), {}, (site,))
     trial = Trial((), fit).with_cause(score)
     assert trial is not None
     assert trial.acting(trial.causes[-1]) == [1]

@@ -12,8 +12,8 @@ import numpy as np
 import torch
 from jaxtyping import Float
 
+from vrdp_prob.discovery.candidates.first_guess import FirstGuess
 from vrdp_prob.discovery.candidates.kicked_at_contact import kicked_at_contact
-from vrdp_prob.discovery.candidates.scores import CauseScore
 from vrdp_prob.inference.several_videos.fitting import SharedFit
 from vrdp_prob.models.effects.effect import Effect
 from vrdp_prob.models.effects.hidden_obstacle import HiddenObstacle
@@ -31,7 +31,7 @@ EARLY = 0.001
 """Distance in m by which a surface is put before the place of a kick, so that the body is sure to meet it."""
 
 
-def hidden_things(kicked: SharedFit, catalogue: Sequence[Effect], p_value: float) -> list[CauseScore]:
+def hidden_things(kicked: SharedFit, catalogue: Sequence[Effect]) -> list[FirstGuess]:
     """Starts of refits in which something unseen did what a fit puts down to kicks.
 
     Parameters
@@ -40,11 +40,9 @@ def hidden_things(kicked: SharedFit, catalogue: Sequence[Effect], p_value: float
         Fit of a model with kicks.
     catalogue
         Causes that are looked for.
-    p_value
-        Of the kicks.
     """
     return [
-        CauseScore(effect, start, (), 0.0, 0, p_value, {})
+        FirstGuess(effect, start)
         for effect in catalogue
         if isinstance(effect, Wall | HiddenObstacle)
         for kick in _kicks(kicked)

@@ -7,13 +7,14 @@ Davies, Hypothesis testing when a nuisance parameter is present only under the a
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 
 import numpy as np
 from jaxtyping import Float
 from scipy.stats import chi2
 
+from vrdp_prob.discovery.candidates.first_guess import FirstGuess, Site
 from vrdp_prob.discovery.candidates.probes import Probe, probes
 from vrdp_prob.discovery.normal import BELOW_95
 from vrdp_prob.discovery.residuals.jitter import jitter
@@ -35,29 +36,6 @@ OTHER_SIZE = 0.8
 its own; a scan is coarse, and what lies on the way of few bodies may be as large as one likes."""
 LEAST_START = 0.01
 """Smallest value of a positive strength at which a refit begins, as a share of its default."""
-
-
-@dataclass(frozen=True)
-class Site:
-    """Where and when an effect acts that happens once in a video.
-
-    Parameters
-    ----------
-    video
-        Index of the video.
-    owner
-        Index of the body; None where it concerns the whole video.
-    values
-        First guess of its parameters in their units.
-    chi_square, p_value
-        The statistic, and the probability of one as large at any time if there is nothing.
-    """
-
-    video: int
-    owner: int | None
-    values: Mapping[str, float]
-    chi_square: float
-    p_value: float
 
 
 @dataclass(frozen=True)
@@ -87,18 +65,12 @@ class Largest:
         return None if self.bound is None else factor * self.bound
 
 
-@dataclass(frozen=True)
-class CauseScore:
+@dataclass(frozen=True, kw_only=True)
+class CauseScore(FirstGuess):
     """What the residuals say of a cause that the model does not have.
 
     Parameters
     ----------
-    effect
-        The cause.
-    start
-        First guess of its shared parameters, in their units.
-    sites
-        Where it acts, if it happens once in a video, the clearest first.
     chi_square, degrees
         The statistic that is least probable by chance, and its number of degrees of freedom.
     p_value
@@ -106,24 +78,15 @@ class CauseScore:
     largest
         By the name of a strength: how large it may be, at any searched point if videos share it, else at the best one
         of each body or video that it may belong to.
-    places
-        Number of bodies or videos among which the sites were chosen.
     by_video
         What each video has of the statistic, if videos share the strength; empty where that is not told apart.
-    other_starts
-        Further first guesses, at other sizes of the cause that promise nearly as much.
     """
 
-    effect: Effect
-    start: Mapping[str, float]
-    sites: tuple[Site, ...]
     chi_square: float
     degrees: int
     p_value: float
-    largest: Mapping[str, Largest]
-    places: int = 1
+    largest: Mapping[str, Largest] = field(default_factory=dict)
     by_video: tuple[float, ...] = ()
-    other_starts: tuple[Mapping[str, float], ...] = ()
 
     def few_videos(self, level: float) -> list[int]:
         """The fewest videos without which chance makes as large a statistic as is left more often than at a level.
@@ -237,7 +200,14 @@ def _scan_shared(
     )
     chi_square = float(statistics[best])
     return CauseScore(
-        effect, start, (), chi_square, degrees, p_value, largest, by_video=by_video, other_starts=tuple(others)
+        effect,
+        start,
+        other_starts=tuple(others),
+        chi_square=chi_square,
+        degrees=degrees,
+        p_value=p_value,
+        largest=largest,
+        by_video=by_video,
     )
 
 
@@ -248,7 +218,9 @@ def _scan_frames(model: ResidualModel, effect: Effect) -> CauseScore | None:
         return None
     (name,) = effect.vanishes_at
     largest = {name: Largest(found.bound, 1, 1)}
-    return CauseScore(effect, {name: found.value}, (), found.chi_square, 1, found.p_value, largest)
+    return CauseScore(
+        effect, {name: found.value}, chi_square=found.chi_square, degrees=1, p_value=found.p_value, largest=largest
+    )
 
 
 def _largest(places: Sequence[Iterable[tuple[str, float, float]]], effect: Effect) -> dict[str, Largest]:
@@ -396,4 +368,13 @@ def _scan_once(
     p_value = min(1.0, first.p_value * len(sites))
     clear = tuple(sites[k] for k in order if sites[k].p_value * len(sites) < SITE_LEVEL)
     degrees = all_degrees[order[0]]
-    return CauseScore(effect, {}, clear, first.chi_square, degrees, p_value, _largest(strengths, effect), len(sites))
+    return CauseScore(
+        effect,
+        {},
+        clear,
+        len(sites),
+        chi_square=first.chi_square,
+        degrees=degrees,
+        p_value=p_value,
+        largest=_largest(strengths, effect),
+    )

@@ -16,6 +16,7 @@ from vrdp_prob.inference.runs.parallel import in_processes
 from vrdp_prob.inference.search.plan import IN_DOUBT
 from vrdp_prob.inference.several_videos.fitting import SharedFit
 from vrdp_prob.inference.several_videos.parts import fit_alone
+from vrdp_prob.inference.several_videos.second_look import loses_single_videos
 from vrdp_prob.models.effects.effect import Effect
 from vrdp_prob.models.parameters import Scope
 
@@ -59,7 +60,7 @@ def causes_of_lost_videos(
     Those that explain most videos come first, and where any does, none is told of that explains no video: what gains
     much and explains nothing mends a wrong course of events. Where no single one explains any of the videos, two of
     those that act in contacts may do so together: neither need bring anything by itself then. Such a pair is told of
-    alone.
+    alone, and looked for where more than single videos are lost: what acts in all contacts is not missed in one alone.
 
     Parameters
     ----------
@@ -108,7 +109,7 @@ def causes_of_lost_videos(
             break
     if last and not explained:
         return []
-    if not explained:
+    if not explained and not loses_single_videos(fit.fits):
         pair = _together(searches, lost[:WITH_ALL], in_contacts)
         if pair is not None and pair[1] > best_of_all + needed:
             return [pair]

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from vrdp_prob.discovery.candidates.scores import CauseScore
+from vrdp_prob.discovery.candidates.first_guess import FirstGuess
 from vrdp_prob.discovery.selection.gains import gain
 from vrdp_prob.discovery.selection.refits import Refits
 from vrdp_prob.discovery.selection.trials import Trial
@@ -28,7 +28,7 @@ class Beginning:
 
     causes: tuple[Effect, ...]
     believed: PhysicsModel
-    rivals: Mapping[str, tuple[CauseScore, ...]]
+    rivals: Mapping[str, tuple[FirstGuess, ...]]
 
     def fitted(self, base: Trial, refits: Refits) -> Trial | None:
         """A model with the causes, fitted to all videos from the beginning; None where it brings too little.

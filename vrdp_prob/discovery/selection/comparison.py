@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
 
-from vrdp_prob.discovery.candidates.scores import CauseScore
+from vrdp_prob.discovery.candidates.first_guess import FirstGuess
 from vrdp_prob.discovery.selection.beginning import Beginning
 from vrdp_prob.discovery.selection.forward import Step
 from vrdp_prob.discovery.selection.gains import gain, merit
@@ -92,7 +92,7 @@ class Comparison:
         return tuple(found)
 
     def _instead(
-        self, best: Trial, cause: Effect, without: Trial, left: Left, near: Sequence[CauseScore]
+        self, best: Trial, cause: Effect, without: Trial, left: Left, near: Sequence[FirstGuess]
     ) -> list[Trial]:
         """Models with one of some others in the place of a cause.
 
@@ -104,7 +104,7 @@ class Comparison:
         placed = [one for one in near if isinstance(one.effect, Wall | HiddenObstacle)][:MOST_RIVALS]
         return [*extensions.made_of(without, scored), *_continued(extensions.instead(best, cause, without, placed))]
 
-    def _near(self, cause: Effect) -> tuple[CauseScore, ...]:
+    def _near(self, cause: Effect) -> tuple[FirstGuess, ...]:
         """Effects that could take the place of a cause in the videos that the search begins with."""
         return () if self.beginning is None else self.beginning.rivals.get(cause.name, ())
 
@@ -114,10 +114,10 @@ def _continued(trials: Sequence[Trial]) -> list[Trial]:
     return sorted(in_processes(Trial.continued, trials), key=merit, reverse=True)
 
 
-def _close(step: Step, best: Trial) -> list[CauseScore]:
+def _close(step: Step, best: Trial) -> list[FirstGuess]:
     """Starts with what was tried at a step and came close to the best there, but for causes of a model, best first."""
     least = HOPEFUL * max(gain(one, step.base)[0] for one in step.tried)
-    found: dict[str, CauseScore] = {}
+    found: dict[str, FirstGuess] = {}
     for one in sorted(step.tried, key=merit, reverse=True):
         cause = one.causes[-1]
         if cause.name not in best.names and gain(one, step.base)[0] > least and not one.patches(cause):

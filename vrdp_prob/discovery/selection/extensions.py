@@ -7,6 +7,7 @@ from functools import partial
 import numpy as np
 
 from vrdp_prob.discovery.candidates.dropped_frames import Dropped, choices
+from vrdp_prob.discovery.candidates.first_guess import FirstGuess
 from vrdp_prob.discovery.candidates.proposals import hidden_things
 from vrdp_prob.discovery.candidates.scores import CauseScore, mends_any_course
 from vrdp_prob.discovery.candidates.surfaces import Placed
@@ -105,8 +106,8 @@ class Extensions:
         followed = in_processes(partial(_followed_to_the_end, trial, of_causes, self.seed), close)
         return sorted([*followed, *rest], key=merit, reverse=True)
 
-    def _all(self, refit: Callable[[CauseScore], Trial | None], scores: Sequence[CauseScore]) -> list[Trial]:
-        return [one for one in in_processes(refit, scores, advance=self.advance) if one is not None]
+    def _all(self, refit: Callable[[FirstGuess], Trial | None], starts: Sequence[FirstGuess]) -> list[Trial]:
+        return [one for one in in_processes(refit, starts, advance=self.advance) if one is not None]
 
     def from_the_beginning(
         self, trial: Trial, causes: Sequence[Effect], believed: PhysicsModel | None = None
@@ -164,9 +165,7 @@ class Extensions:
         ]
         return replace(found, choices={**found.choices, effect.name: np.array(prices)})
 
-    def hidden_instead(
-        self, kicked: Trial, kicks: Effect, trial: Trial, p_value: float = 0.0, *, known: Collection[str] = ()
-    ) -> list[Trial]:
+    def hidden_instead(self, kicked: Trial, kicks: Effect, trial: Trial, *, known: Collection[str] = ()) -> list[Trial]:
         """Fits with something unseen in the place of the kicks of a model.
 
         Parameters
@@ -175,15 +174,13 @@ class Extensions:
             The model, and its kicks.
         trial
             The model without them.
-        p_value
-            Of the kicks.
         known
             Names of causes whose fits are there already.
         """
         left = [effect for effect in self.leavings.further(kicked) if effect.name not in known]
-        return self.instead(kicked, kicks, trial, hidden_things(kicked.fit, left, p_value))
+        return self.instead(kicked, kicks, trial, hidden_things(kicked.fit, left))
 
-    def instead(self, best: Trial, cause: Effect, lesser: Trial, starts: Sequence[CauseScore]) -> list[Trial]:
+    def instead(self, best: Trial, cause: Effect, lesser: Trial, starts: Sequence[FirstGuess]) -> list[Trial]:
         """Fits with others in the place of a cause, from where that has brought the videos.
 
         Parameters

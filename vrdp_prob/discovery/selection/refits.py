@@ -355,7 +355,7 @@ class Refits:
         """Fits with something unseen in the place of kicks."""
         kicked = next((one for one in found if one.causes[-1].name == kicks.effect.name), None)
         kicked = kicked or next(iter(self.extensions.made_of(trial, [kicks])), None)
-        return [] if kicked is None else self.extensions.hidden_instead(kicked, kicked.causes[-1], trial, kicks.p_value)
+        return [] if kicked is None else self.extensions.hidden_instead(kicked, kicked.causes[-1], trial)
 
 
 def _brings(one: Trial, trial: Trial) -> float:

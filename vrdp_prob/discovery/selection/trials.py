@@ -8,8 +8,9 @@ from functools import cached_property
 import numpy as np
 from jaxtyping import Float
 
+from vrdp_prob.discovery.candidates.first_guess import FirstGuess
 from vrdp_prob.discovery.candidates.kicked_at_contact import kicked_at_contact
-from vrdp_prob.discovery.candidates.scores import CauseScore, happens_once, mends_any_course
+from vrdp_prob.discovery.candidates.scores import happens_once, mends_any_course
 from vrdp_prob.discovery.finding import HeldOut
 from vrdp_prob.discovery.residuals.held_out import Cavity, cavities
 from vrdp_prob.discovery.residuals.jitter import alike_in_neighbours
@@ -159,10 +160,10 @@ class Trial:
         """Whether the strength of a cause may as well be nothing, see `estimates.may_vanish`."""
         return may_vanish(self.fit, cause, unexplained=self.unexplained, overdispersion=overdispersion)
 
-    def with_cause(self, score: CauseScore) -> "Trial | None":
-        """The fit with one more cause, from what its score says of it; None where no world can begin there."""
+    def with_cause(self, guess: FirstGuess) -> "Trial | None":
+        """The fit with one more cause, from a first guess of it; None where no world can begin there."""
         try:
-            return self._with_single_events(score) if happens_once(score.effect) else self._with_lasting(score)
+            return self._with_single_events(guess) if happens_once(guess.effect) else self._with_lasting(guess)
         except ImpossibleStartError:
             return None
 
@@ -200,18 +201,18 @@ class Trial:
         found = replace(found, fit=with_own_population(found.fit)).continued()
         return found if found.brought(base) > self.brought(base) else self
 
-    def with_cause_in_place(self, score: CauseScore, replaced: Effect, least: float) -> "Trial | None":
+    def with_cause_in_place(self, guess: FirstGuess, replaced: Effect, least: float) -> "Trial | None":
         """The fit with a cause in the place of another one, from where that has brought the videos.
 
         None where no world can begin there, or the log posterior is not above `least` at once.
         """
-        left = self.fit.model.without_effect(replaced).with_effect(score.effect, self.fit.tracks)
+        left = self.fit.model.without_effect(replaced).with_effect(guess.effect, self.fit.tracks)
         choices = {name: one for name, one in self.choices.items() if name != replaced.name}
         try:
             fit = with_own_population(
                 self.fit.under(
                     left,
-                    start=score.start,
+                    start=guess.start,
                     held=self._held_without(replaced),
                     least=least,
                     effort=FIRST,
@@ -221,44 +222,44 @@ class Trial:
         except ImpossibleStartError:
             return None
         kept = (one for one in self.causes if one is not replaced)
-        return replace(self, causes=(*kept, score.effect), fit=fit, choices=choices)
+        return replace(self, causes=(*kept, guess.effect), fit=fit, choices=choices)
 
-    def begun_elsewhere(self, base: "Trial", score: CauseScore) -> "Trial":
+    def begun_elsewhere(self, base: "Trial", guess: FirstGuess) -> "Trial":
         """The most probable of the fit and those that begin at other sizes of its last cause, from a model without it.
 
         One size explains as much as another where few bodies meet what has it; how many values of it do is what tells
         between them.
         """
-        begun = (base.with_cause(replace(score, start=start)) for start in score.other_starts)
+        begun = (base.with_cause(replace(guess, start=start)) for start in guess.other_starts)
         return max([self, *(one.continued() for one in begun if one is not None)], key=lambda one: one.fit.log_evidence)
 
-    def start_with(self, cause: Effect) -> CauseScore:
+    def start_with(self, cause: Effect) -> FirstGuess:
         """A start of refits with one of its causes, which all videos share, as it is here."""
         values = {one.name: self.fit.value(one.name) for one in cause.parameters}
         start = {name: value for name, value in values.items() if value is not None}
-        return CauseScore(cause, start, (), 0.0, 0, 0.0, {})
+        return FirstGuess(cause, start)
 
-    def _with_lasting(self, score: CauseScore) -> "Trial":
+    def _with_lasting(self, guess: FirstGuess) -> "Trial":
         """The fit with an effect that acts on all videos."""
-        effect = score.effect
+        effect = guess.effect
         own_fields = [one.name for one in effect.parameters if one.scope is Scope.BODY]
         bodies = [range(len(part.likelihood.tracks.bodies)) for part in self.fit.fits]
         starts: list[dict[Owned, float]] = [
-            {(name, body): score.start[name] for name in own_fields if name in score.start for body in these}
+            {(name, body): guess.start[name] for name in own_fields if name in guess.start for body in these}
             for these in bodies
         ]
         model = self.fit.extended(effect)
-        fit = self.fit.under(model, start=score.start, own=starts, effort=FIRST, model_error=False)
+        fit = self.fit.under(model, start=guess.start, own=starts, effort=FIRST, model_error=False)
         return self.and_causes([effect], fit)
 
     def and_causes(self, effects: Sequence[Effect], fit: SharedFit) -> "Trial":
         """The trial of a fit with further causes, which believes what that fit says of bodies."""
         return replace(self, causes=(*self.causes, *effects), fit=with_own_population(fit))
 
-    def _with_single_events(self, score: CauseScore) -> "Trial":
+    def _with_single_events(self, guess: FirstGuess) -> "Trial":
         """The fit with an effect that happens at most once in each video, where its scan has found it."""
-        effect = score.effect
-        sites = [[site for site in score.sites if site.video == k] for k in range(len(self.fit.fits))]
+        effect = guess.effect
+        sites = [[site for site in guess.sites if site.video == k] for k in range(len(self.fit.fits))]
         fields = [parameter.name for parameter in effect.parameters]
         held, own = [], []
         for part, structure, mine in zip(self.fit.fits, self.fit.structures, sites, strict=True):
@@ -277,7 +278,7 @@ class Trial:
         acting = np.array([min(len(mine), 1) for mine in sites])
         times = [len(effect.search_points([one])) if effect.stepwise else 1 for one in self.fit.tracks]
         places = np.maximum(
-            max(score.places, 1) * np.array(times), 2
+            max(guess.places, 1) * np.array(times), 2
         )  # where there is but one, it acts there or nowhere
         choices = {**self.choices, effect.name: np.log(places) * acting}
         model = self.fit.extended(effect)

@@ -272,3 +272,20 @@ def test_a_cause_with_which_no_joint_world_can_begin_is_left_out(monkeypatch: py
     trial = refit_with("", 0.0)
     trial.choices, trial.names, trial.fit = {}, (), Mock(fits=[], model=Mock(effects=()))
     assert refits_with()._lost(trial, []) == []
+
+
+@pytest.mark.parametrize(("causes", "single"), [("", True), ("", False), ("tilt", False)])
+def test_a_cause_that_is_missed_in_single_videos_or_beside_others_has_to_explain_them(
+    causes: str, *, single: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Else a law that mends the course of one video a little is fitted to all of them from the beginning."""
+    searched = Mock(return_value=[])
+    monkeypatch.setattr(refits, "lost_videos", lambda _fits: [0])
+    monkeypatch.setattr(refits, "loses_single_videos", lambda _fits: single)
+    monkeypatch.setattr(refits, "causes_of_lost_videos", searched)
+    monkeypatch.setattr(Leavings, "of", lambda _self, _trial: Mock(scores=()))
+    trial = refit_with(causes, 0.0)
+    trial.causes, trial.choices, trial.names = tuple(filter(None, trial.causes)), {}, ()
+    trial.fit = Mock(fits=[], model=Mock(effects=()))
+    refits_with()._lost(trial, [])
+    assert searched.call_args.kwargs["must_explain"] is (single or bool(causes))

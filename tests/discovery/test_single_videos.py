@@ -32,21 +32,8 @@ GAINS = {
 """What searches with some causes gain (nats) in each video."""
 
 
-def _fit() -> SharedFit:
-    """A fit of which nothing is looked at."""
-    fit = create_autospec(SharedFit, instance=True)
-    fit.fits = []
-    return fit
-
-
-def _losing_single_videos(monkeypatch: pytest.MonkeyPatch, *, single: bool) -> None:
-    """Whether fits lose single videos alone."""
-    monkeypatch.setattr(single_videos, "loses_single_videos", lambda _fits: single)
-
-
 def _with_gains(explains: list[tuple[str, ...]], monkeypatch: pytest.MonkeyPatch) -> dict[int, list[str]]:
     """Searches that gain this, and explain a video with some causes; what they were last asked for of each video."""
-    _losing_single_videos(monkeypatch, single=False)
     asked: dict[int, list[str]] = {}
 
     def searched(
@@ -75,20 +62,12 @@ def test_two_causes_at_contacts_are_told_where_none_explains_a_video_alone(
 ) -> None:
     _with_gains(explains, monkeypatch)
     effects = [ContactFriction(), SlipToRoll(), PairForce(), SurfaceTilt()]
-    found = causes_of_lost_videos(_fit(), lost, effects, {"surface_tilt"}, 6.0, seed=0)
+    found = causes_of_lost_videos(
+        create_autospec(SharedFit, instance=True), lost, effects, {"surface_tilt"}, 6.0, seed=0
+    )
     assert [tuple(cause.name for cause in causes) for causes, _ in found] == told
     if len(told[0]) > 1:
         assert found[0][1] == 200.0 * min(len(lost), single_videos.WITH_ALL)
-
-
-def test_two_causes_at_contacts_are_not_looked_for_in_single_lost_videos(monkeypatch: pytest.MonkeyPatch) -> None:
-    """What acts in all contacts is not missed in one video alone."""
-    tried = _with_gains([("contact_friction", "slip_to_roll")], monkeypatch)
-    _losing_single_videos(monkeypatch, single=True)
-    fit = _fit()
-    found = causes_of_lost_videos(fit, [2], [ContactFriction(), SlipToRoll(), PairForce()], set(), 6.0, seed=0)
-    assert [cause.name for (cause,), _ in found] == ["pair_force"]
-    assert sorted(tried[2]) == ["contact_friction", "pair_force", "slip_to_roll"]
 
 
 @pytest.mark.parametrize(
@@ -109,10 +88,9 @@ def test_two_causes_may_explain_the_second_worst_video_alone(
         ]
         return [(causes, single_videos._Found(*one)) for causes, *one in zip(candidates, gained, explains, strict=True)]
 
-    _losing_single_videos(monkeypatch, single=False)
     monkeypatch.setattr(single_videos._Searches, "with_causes", searched)
     effects = [ContactFriction(), SlipToRoll(), PairForce()]
-    found = causes_of_lost_videos(_fit(), [2, 0, 1], effects, set(), 6.0, seed=0)
+    found = causes_of_lost_videos(create_autospec(SharedFit, instance=True), [2, 0, 1], effects, set(), 6.0, seed=0)
     (causes, gained), *_ = found
     assert [cause.name for cause in causes] == told
     assert gained == (400.0 if len(told) == 2 else 90.0)
@@ -128,7 +106,7 @@ def test_what_gains_most_and_explains_no_video_is_not_told_beside_what_explains_
 ) -> None:
     _with_gains(explains, monkeypatch)
     effects = [SlipToRoll(), PairForce()]
-    found = causes_of_lost_videos(_fit(), [2, 0, 1], effects, set(), 6.0, seed=0)
+    found = causes_of_lost_videos(create_autospec(SharedFit, instance=True), [2, 0, 1], effects, set(), 6.0, seed=0)
     assert [cause.name for (cause,), _ in found] == told
 
 
@@ -140,7 +118,7 @@ def test_what_explains_more_videos_is_told_before_what_gains_more(monkeypatch: p
         return [(causes, single_videos._Found(*gained[causes[0].name])) for causes in candidates]
 
     monkeypatch.setattr(single_videos._Searches, "with_causes", searched)
-    fit = _fit()
+    fit = create_autospec(SharedFit, instance=True)
     found = causes_of_lost_videos(fit, [2, 0, 1], [PairForce(), SlipToRoll()], set(), 6.0, seed=0)
     assert [(cause.name, gained) for (cause,), gained in found] == [("slip_to_roll", 60.0), ("pair_force", 90.0)]
 
@@ -152,7 +130,9 @@ def test_the_last_causes_are_told_only_where_one_explains_a_video(
     """And none that has brought too little in one video is tried in the next, nor two at once."""
     tried = _with_gains(explains, monkeypatch)
     effects = [ContactFriction(), SlipToRoll(), PairForce(), SurfaceTilt()]
-    found = causes_of_lost_videos(_fit(), [2, 0], effects, {"surface_tilt"}, 6.0, seed=0, last=True)
+    found = causes_of_lost_videos(
+        create_autospec(SharedFit, instance=True), [2, 0], effects, {"surface_tilt"}, 6.0, seed=0, must_explain=True
+    )
     assert [cause.name for (cause,), _ in found] == told
     assert sorted(tried[2]) == ["contact_friction", "pair_force", "slip_to_roll", "surface_tilt"]
     assert "contact_friction" not in tried[0]

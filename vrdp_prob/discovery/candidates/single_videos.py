@@ -16,7 +16,6 @@ from vrdp_prob.inference.runs.parallel import in_processes
 from vrdp_prob.inference.search.plan import IN_DOUBT
 from vrdp_prob.inference.several_videos.fitting import SharedFit
 from vrdp_prob.inference.several_videos.parts import fit_alone
-from vrdp_prob.inference.several_videos.second_look import loses_single_videos
 from vrdp_prob.models.effects.effect import Effect
 from vrdp_prob.models.parameters import Scope
 
@@ -53,14 +52,14 @@ def causes_of_lost_videos(
     needed: float,
     *,
     seed: int,
-    last: bool = False,
+    must_explain: bool = False,
 ) -> list[tuple[Causes, float]]:
     """Causes with which lost videos are explained much better, the best first, and what is gained (nats).
 
     Those that explain most videos come first, and where any does, none is told of that explains no video: what gains
     much and explains nothing mends a wrong course of events. Where no single one explains any of the videos, two of
     those that act in contacts may do so together: neither need bring anything by itself then. Such a pair is told of
-    alone, and looked for where more than single videos are lost: what acts in all contacts is not missed in one alone.
+    alone.
 
     Parameters
     ----------
@@ -78,8 +77,8 @@ def causes_of_lost_videos(
         Gain (nats) from which a cause is told of.
     seed
         Seed of the searches.
-    last
-        Whether no cause is looked for beyond these: then none is told of where none explains a video, and one that
+    must_explain
+        Whether none is told of where none explains a video, as where no cause is looked for beyond these; then one that
         brings too little in some videos is not tried in a further one.
     """
     telling = [effect for effect in catalogue if _tells(effect)]
@@ -103,13 +102,13 @@ def causes_of_lost_videos(
         if explaining or rank + 1 >= WITH_ALL:
             least = FAR_BEHIND * gains[effects[0].name] if explained else 0.0
             effects = [effect for effect in effects[:SECOND_LOOKS] if gains[effect.name] >= least]
-        if last:
+        if must_explain:
             effects = [effect for effect in effects if gains[effect.name] > needed]
         if len(effects) <= 1:
             break
-    if last and not explained:
+    if must_explain and not explained:
         return []
-    if not explained and not loses_single_videos(fit.fits):
+    if not explained:
         pair = _together(searches, lost[:WITH_ALL], in_contacts)
         if pair is not None and pair[1] > best_of_all + needed:
             return [pair]

@@ -294,7 +294,9 @@ class Refits:
         key = (trial, one)
         if key not in self._explain_worst:
             cause, worst = one.beyond(trial), lost_videos(one.fit.fits)[:1]
-            told = causes_of_lost_videos(trial.fit, worst, cause, one.names, self.needed, seed=self.seed, last=True)
+            told = causes_of_lost_videos(
+                trial.fit, worst, cause, one.names, self.needed, seed=self.seed, must_explain=True
+            )
             self._explain_worst[key] = bool(told)
         return self._explain_worst[key]
 
@@ -311,7 +313,8 @@ class Refits:
     def _lost(self, trial: Trial, found: Sequence[Trial]) -> list[Trial]:
         """Fits from the beginning, with causes that explain videos whose course of events nothing else explains.
 
-        Kicks in several videos explain none of them: they mend any course.
+        Kicks in several videos explain none of them: they mend any course. What acts in all videos, and is missed in
+        single ones alone, has to explain them.
         """
         if trial.choices:
             return []
@@ -321,8 +324,8 @@ class Refits:
         best = next((one.fit.fits for one in found if not _mends_several(one)), trial.fit.fits)
         still_lost = lost_videos(best)
         lost = [one for one in lost_videos(trial.fit.fits) if one in still_lost]
-        last = bool(trial.causes)
-        told = causes_of_lost_videos(trial.fit, lost, left, likely, self.needed, seed=self.seed, last=last)
+        must = bool(trial.causes) or loses_single_videos(trial.fit.fits)
+        told = causes_of_lost_videos(trial.fit, lost, left, likely, self.needed, seed=self.seed, must_explain=must)
         again = [causes for causes, promised in told if len(causes) > 1 or reached.get(causes[0].name, 0.0) < promised]
         return [one for causes in again if (one := self.extensions.from_the_beginning(trial, causes)) is not None]
 

@@ -57,22 +57,32 @@ class Extensions:
 
         Where the score of a cause promises more than any refit has brought, and its own brought far less, that goes on
         if it broke off on a long way; and videos are searched anew that have lost their course of events on it, or hold
-        it back.
-        So it is with the cause whose score promises most of all, whatever others have brought, if that is as much as a
-        cause needs at all. What mends any course is no measure of other causes.
+        it back. So it is with the cause whose score promises most of all, whatever others have brought, if that is as
+        much as a cause needs at all. What mends any course is no measure of other causes.
         Those that bring a good part of the most are followed to the end; where none explains the videos these are also
         those that broke off and whose scores promise a good part of the most.
         """
-        found = self._all(trial.with_cause, scores)
         promised = {one.effect.name: one.size / 2 for one in scores if not mends_any_course(one.effect)}
         promised = {name: size for name, size in promised.items() if size > self.needed}
+        found = self._all(trial.with_cause, scores)
+        found, promised = self._taken_further(trial, found, promised, beside)
+        close = _close_to_the_best(trial, found, promised, beside)
+        rest = [one for one in found if one not in close]
+        of_causes = {one.effect.name: one for one in scores}
+        followed = in_processes(partial(_followed_to_the_end, trial, of_causes, self.seed), close)
+        return sorted([*followed, *rest], key=merit, reverse=True)
+
+    def _taken_further(
+        self, trial: Trial, found: Sequence[Trial], promised: Mapping[str, float], beside: Sequence[Trial]
+    ) -> tuple[list[Trial], dict[str, float]]:
+        """Refits of a model, a few of which have gone on that brought far less than was promised, and what still is.
+
+        What goes on and gains nothing is promised no more.
+        """
+        found, promised = list(found), dict(promised)
         leader = "" if explaining(beside) else max(promised, key=lambda name: promised[name], default="")
-
-        def brought_most() -> float:
-            return max((one.brought(trial) for one in explaining([*beside, *found])), default=0.0)
-
         for _ in range(MENDINGS):
-            most = brought_most()
+            most = _brought_most(trial, [*beside, *found])
             short = [
                 one
                 for one in found
@@ -83,28 +93,20 @@ class Extensions:
             if not short:
                 break
             hopeful = max(short, key=lambda one: promised[one.causes[-1].name])
-            further = hopeful.continued()
-            if fallen := further.fallen_from(trial):
-                further = further.mended(fallen, seed=self.seed)
-            if further.brought(trial) < promised[hopeful.causes[-1].name]:
-                further = further.freed(trial, seed=self.seed)
+            further = self._mended(trial, hopeful, promised[hopeful.causes[-1].name])
             gained = further.brought(trial) - hopeful.brought(trial)
             if gained < self.needed:
                 promised.pop(hopeful.causes[-1].name)
             if gained > 0:
                 found = [further if one is hopeful else one for one in found]
-        most, leading = brought_most(), max(promised.values(), default=0.0)
-        nothing_explains = not any(explained(one.fit.fits) for one in explaining(found))
-        close = [
-            one
-            for one in found
-            if one.brought(trial) > SHORT * most > 0
-            or (nothing_explains and _broke_off(one) and promised.get(one.causes[-1].name, 0.0) > SHORT * leading)
-        ]
-        rest = [one for one in found if one not in close]
-        of_causes = {one.effect.name: one for one in scores}
-        followed = in_processes(partial(_followed_to_the_end, trial, of_causes, self.seed), close)
-        return sorted([*followed, *rest], key=merit, reverse=True)
+        return found, promised
+
+    def _mended(self, trial: Trial, one: Trial, promised: float) -> Trial:
+        """A refit of a model that has gone on, with videos searched anew that have lost their way or hold it back."""
+        further = one.continued()
+        if fallen := further.fallen_from(trial):
+            further = further.mended(fallen, seed=self.seed)
+        return further if further.brought(trial) >= promised else further.freed(trial, seed=self.seed)
 
     def _all(self, refit: Callable[[FirstGuess], Trial | None], starts: Sequence[FirstGuess]) -> list[Trial]:
         return [one for one in in_processes(refit, starts, advance=self.advance) if one is not None]
@@ -208,6 +210,25 @@ class Extensions:
 def explaining(trials: Sequence[Trial]) -> list[Trial]:
     """Those whose last cause does not just mend any course."""
     return [one for one in trials if not mends_any_course(one.causes[-1])]
+
+
+def _brought_most(trial: Trial, found: Sequence[Trial]) -> float:
+    """What the refit of a model brings that brings most and does not just mend any course."""
+    return max((one.brought(trial) for one in explaining(found)), default=0.0)
+
+
+def _close_to_the_best(
+    trial: Trial, found: Sequence[Trial], promised: Mapping[str, float], beside: Sequence[Trial]
+) -> list[Trial]:
+    """Refits that are worth following: they bring a good part of the most, or broke off and promise that."""
+    most, leading = _brought_most(trial, [*beside, *found]), max(promised.values(), default=0.0)
+    nothing_explains = not any(explained(one.fit.fits) for one in explaining(found))
+    return [
+        one
+        for one in found
+        if one.brought(trial) > SHORT * most > 0
+        or (nothing_explains and _broke_off(one) and promised.get(one.causes[-1].name, 0.0) > SHORT * leading)
+    ]
 
 
 def _broke_off(one: Trial) -> bool:

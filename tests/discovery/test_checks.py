@@ -115,7 +115,7 @@ def test_a_tilt_is_a_push_in_one_direction_of_its_size() -> None:
         ("placed_field", 4.0, ("acceleration across the velocity against place",)),
         ("pair_force", 4.0, ("acceleration against the distance to other bodies",)),
         ("vortex", 2.0, VORTEX),
-        pytest.param("vortex", 4.0, VORTEX, marks=pytest.mark.xfail(reason="a video is lost: its contacts lead")),
+        ("vortex", 4.0, VORTEX),
         ("contact_friction", 4.0, ("tangential against normal impulse",)),
         ("clock_error", 4.0, ("time stamps: lost frames",)),
     ],

@@ -265,6 +265,20 @@ def test_a_check_of_free_flight_fires_on_its_field_and_says_how_large_it_is(name
     assert re.search(says, after.sentence), after.sentence
 
 
+def test_what_brakes_a_body_by_a_constant_is_its_own_friction_however_little_the_table_brakes() -> None:
+    model = ResidualModel.of(fitted(seed=1, setting=replace(SMALL, resistance=0.05))[1])
+    generator = np.random.default_rng(0)
+    changes = []
+    for video in model.videos:
+        motion = video.motion
+        brakes = generator.normal(0.0, 0.1, len(motion.mass))
+        changes.append(motion.pushed((brakes[:, None] * motion.direction)[..., None])[:, :, :2, 0])
+    before, after = (by_name(free_flight_checks(FreeFlight.of(one))) for one in (model, moved(model, changes)))
+    assert min(check.p_value for check in before.values()) > CHANCE
+    for name, check in before.items():
+        assert after[name].statistic == pytest.approx(check.statistic, rel=1e-3), name
+
+
 def struck_aside(model: ResidualModel, back: float) -> list[Float[np.ndarray, "time body 2"]]:
     """Contacts at which one body is struck along the side that it touches with, and the other back by a share of it."""
     changes = []

@@ -38,7 +38,7 @@ class FreeFlight:
     rows
         What each does to the residuals of each video.
     score
-        How strongly each shows.
+        How strongly each shows, beside what a friction of its own may do to every body.
     fields
         The patterns' accelerations (per amplitude) of all bodies at all frames at which they move and are seen.
     """
@@ -53,16 +53,17 @@ class FreeFlight:
     @classmethod
     def of(cls, model: ResidualModel) -> "FreeFlight":
         """All patterns in the residuals of a fit."""
-        freed = after_contacts_freed(model)
         motions = [video.motion for video in model.videos]
         own = any(entry.field == FRICTION for v in model.videos for entry in v.likelihood.coordinates.entries)
+        freed = after_contacts_freed(model)
         scales = Scales.of(motions, own_friction=own)
         chosen = tuple(patterns(scales))
         fields = [np.stack([one.field(motion) for one in chosen], axis=-1) for motion in motions]
         rows = [v.rows(v.motion.pushed(field)) for v, field in zip(model.videos, fields, strict=True)]
         seen = [motion.moving & motion.tracks.seen for motion in motions]
         places = np.concatenate([field[where] for field, where in zip(fields, seen, strict=True)])
-        return cls(freed, scales, chosen, rows, freed.score(rows), places)
+        asked = frictions_freed(freed) if own else freed
+        return cls(freed, scales, chosen, rows, asked.score(rows), places)
 
     @cached_property
     def beside(self) -> ResidualModel:
@@ -122,6 +123,19 @@ def after_contacts_freed(model: ResidualModel) -> ResidualModel:
         times = np.concatenate([touching.time, touching.time[both]])
         bodies = np.concatenate([touching.first, touching.second[both]])
         columns.append(video.rows(video.motion.kicked(Kicks.single(times, bodies))))
+    return model.freed(columns)
+
+
+def frictions_freed(model: ResidualModel) -> ResidualModel:
+    """The model of a fit in which every body may be slowed or sped up along its velocity by a constant of its own.
+
+    The logarithm of a friction follows noise that asks for more of it, and none that asks for less than nothing: where
+    tables hardly brake, what is left of both would be an acceleration along the velocity.
+    """
+    columns = []
+    for video in model.videos:
+        bodies = np.eye(video.motion.speed.shape[1])
+        columns.append(video.rows(video.motion.pushed(video.motion.direction[..., None] * bodies[:, None])))
     return model.freed(columns)
 
 

@@ -197,14 +197,20 @@ class Refits:
         """Refits with what most videos ask for, the best first, where few others have lost their course by far.
 
         Where one such video leaves more than all others, it calls for whatever bends its course; given what these ask
-        for, its own may be found. None where that is not so.
+        for, its own may be found. None where that is not so. What stands out less beside chance is tried where that
+        leaves something: what that video calls for would else come before it.
         """
         fits = trial.fit.fits
         astray = np.flatnonzero(~trusted(fits)).tolist()
         if not 0 < len(astray) <= most_astray(len(fits)) or not outweigh(fits, astray):
             return []
-        asked = [one for one in shortlist(self.leavings.of(trial).beside_chance, CLOSE) if not happens_once(one.effect)]
-        found = self.extensions.made_of(trial, asked)
+        scores = self.leavings.of(trial).beside_chance
+        close = _laws_among(shortlist(scores, CLOSE))
+        found = self.extensions.made_of(trial, close)
+        if not self.settled(trial, found):
+            rest = [one for one in _laws_among(shortlist(scores)) if one not in close]
+            found += self.extensions.made_of(trial, rest, beside=found)
+            found.sort(key=merit, reverse=True)
         searched = [self.courses.searched_anew(one, astray) for one in found[:1]]
         return sorted([*searched, *found[1:]], key=merit, reverse=True)
 
@@ -375,6 +381,11 @@ def _mends_several(trial: Trial) -> bool:
 def _finds_lost_videos(one: Trial, trial: Trial) -> bool:
     """Whether a model has lost videos, and one with more has none."""
     return bool(lost_videos(trial.fit.fits)) and not lost_videos(one.fit.fits)
+
+
+def _laws_among(scores: Sequence[CauseScore]) -> list[CauseScore]:
+    """Scores of causes that last."""
+    return [one for one in scores if not happens_once(one.effect)]
 
 
 def _kicks_among(scores: Sequence[CauseScore]) -> CauseScore | None:

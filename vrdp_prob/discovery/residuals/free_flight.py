@@ -55,13 +55,13 @@ class FreeFlight:
         """All patterns in the residuals of a fit."""
         motions = [video.motion for video in model.videos]
         own = any(entry.field == FRICTION for v in model.videos for entry in v.likelihood.coordinates.entries)
-        freed = after_contacts_freed(model)
         scales = Scales.of(motions, own_friction=own)
         chosen = tuple(patterns(scales))
         fields = [np.stack([one.field(motion) for one in chosen], axis=-1) for motion in motions]
         rows = [v.rows(v.motion.pushed(field)) for v, field in zip(model.videos, fields, strict=True)]
         seen = [motion.moving & motion.tracks.seen for motion in motions]
         places = np.concatenate([field[where] for field, where in zip(fields, seen, strict=True)])
+        freed = after_contacts_freed(model)
         asked = frictions_freed(freed) if own else freed
         return cls(freed, scales, chosen, rows, asked.score(rows), places)
 

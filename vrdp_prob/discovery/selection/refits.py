@@ -17,7 +17,7 @@ from vrdp_prob.discovery.selection.doubts import HELD_BY_BODIES, causes_with_own
 from vrdp_prob.discovery.selection.extensions import Extensions, explaining
 from vrdp_prob.discovery.selection.gains import gain, merit, weights
 from vrdp_prob.discovery.selection.leavings import Leavings
-from vrdp_prob.discovery.selection.shortlist import CLOSE, SHORTLIST_LEVEL, shortlist
+from vrdp_prob.discovery.selection.shortlist import CLOSE, SHORTLIST_LEVEL, lasting, shortlist
 from vrdp_prob.discovery.selection.trials import Trial
 from vrdp_prob.inference.several_videos.second_look import (
     explained,
@@ -129,14 +129,20 @@ class Refits:
         found.sort(key=merit, reverse=True)
         if len(close) < len(likely) and not self.settled(trial, found):
             found = self._with_best_searched(trial, found)
-        if not self.settled(trial, found):
-            found += self.extensions.made_of(trial, [one for one in likely if one not in close], beside=found)
-            found.sort(key=merit, reverse=True)
-        found = self._with_traced(trial, found)
+        found = self._with_traced(trial, self._with_fainter(trial, found, close, likely))
         kicks = _kicks_among(scores)
         if kicks is not None and (not found or found[0].causes[-1].name == kicks.effect.name):
             found += self._hidden(trial, found, kicks)
         return found
+
+    def _with_fainter(
+        self, trial: Trial, found: Sequence[Trial], close: Sequence[CauseScore], likely: Sequence[CauseScore]
+    ) -> list[Trial]:
+        """Refits, the best first; where they leave something, with the likely causes that are not close ones, too."""
+        if self.settled(trial, found):
+            return list(found)
+        fainter = self.extensions.made_of(trial, [one for one in likely if one not in close], beside=found)
+        return sorted([*found, *fainter], key=merit, reverse=True)
 
     def _beside(self, met: Trial, trial: Trial, *, plain: bool) -> list[Trial]:
         """Refits beside walls and discs that the tracks show: none where these are plain.
@@ -205,12 +211,8 @@ class Refits:
         if not 0 < len(astray) <= most_astray(len(fits)) or not outweigh(fits, astray):
             return []
         scores = self.leavings.of(trial).beside_chance
-        close = _laws_among(shortlist(scores, CLOSE))
-        found = self.extensions.made_of(trial, close)
-        if not self.settled(trial, found):
-            rest = [one for one in _laws_among(shortlist(scores)) if one not in close]
-            found += self.extensions.made_of(trial, rest, beside=found)
-            found.sort(key=merit, reverse=True)
+        likely, close = lasting(shortlist(scores)), lasting(shortlist(scores, CLOSE))
+        found = self._with_fainter(trial, self.extensions.made_of(trial, close), close, likely)
         searched = [self.courses.searched_anew(one, astray) for one in found[:1]]
         return sorted([*searched, *found[1:]], key=merit, reverse=True)
 
@@ -381,11 +383,6 @@ def _mends_several(trial: Trial) -> bool:
 def _finds_lost_videos(one: Trial, trial: Trial) -> bool:
     """Whether a model has lost videos, and one with more has none."""
     return bool(lost_videos(trial.fit.fits)) and not lost_videos(one.fit.fits)
-
-
-def _laws_among(scores: Sequence[CauseScore]) -> list[CauseScore]:
-    """Scores of causes that last."""
-    return [one for one in scores if not happens_once(one.effect)]
 
 
 def _kicks_among(scores: Sequence[CauseScore]) -> CauseScore | None:

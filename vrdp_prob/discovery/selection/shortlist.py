@@ -26,8 +26,13 @@ def shortlist(scores: Sequence[CauseScore], share: float = HOPEFUL) -> list[Caus
     largest = max((one.size for one in scores), default=0.0)
     likely = [one for one in scores if one.p_value < SHORTLIST_LEVEL and one.size > TRIFLE * largest]
     likely.sort(key=lambda one: -one.size)
-    lasting = [one for one in likely if not happens_once(one.effect)]
-    compared = [(one, lasting if one in lasting else likely) for one in likely]
+    laws = lasting(likely)
+    compared = [(one, laws if one in laws else likely) for one in likely]
     chosen = [one for one, others in compared if one.size > share * others[0].size]
     least = ALIKE * chosen[MOST_REFITTED - 1].size if len(chosen) > MOST_REFITTED else 0.0
     return [one for one in chosen if one.size >= least]
+
+
+def lasting(scores: Sequence[CauseScore]) -> list[CauseScore]:
+    """Those of causes that last."""
+    return [one for one in scores if not happens_once(one.effect)]

@@ -10,7 +10,7 @@ import pytest
 from tests.evaluation.videos import write_videos
 from vrdp_prob import cli
 from vrdp_prob.inference import default_model
-from vrdp_prob.inference.several_videos.learned import believing
+from vrdp_prob.inference.several_videos.beliefs import believing
 from vrdp_prob.inference.several_videos.linking import Key
 from vrdp_prob.models.model_file import known_effects
 from vrdp_prob.models.physics import PhysicsModel

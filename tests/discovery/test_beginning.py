@@ -114,6 +114,7 @@ def test_causes_that_come_near_in_some_videos_are_compared_in_all(
     assert Comparison(refits_with(), TILTED)._rivals(tilt, (plain,), steps) == ((wind,),)
 
 
+@pytest.mark.slow
 def test_what_is_believed_is_where_a_fit_begins_and_no_part_of_it() -> None:
     _, fit = fitted("surface_tilt", seed=1)
     base, extensions = Trial((), fit), refits_with().extensions

@@ -73,6 +73,7 @@ def test_a_hidden_slope_has_the_largest_score_and_the_right_size() -> None:
     assert slope == pytest.approx(data.truth.causes[0].strength, rel=0.5)
 
 
+@pytest.mark.slow
 def test_what_videos_have_of_a_score_adds_up_and_a_slope_is_called_for_in_most() -> None:
     slope = scored("surface_tilt", seed=1)["surface_tilt"]
     assert sum(slope.by_video) == pytest.approx(slope.chi_square)

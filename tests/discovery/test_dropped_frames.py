@@ -101,6 +101,7 @@ def found() -> tuple[Trial, Trial]:
     return base, trial
 
 
+@pytest.mark.slow
 def test_the_fit_finds_those_that_tracks_do_not_show_and_explains_the_rest(found: tuple[Trial, Trial]) -> None:
     base, trial = found
     difference, error = gain(trial, base)

@@ -44,7 +44,7 @@ def states(video: Video, times: np.ndarray = TIMES) -> np.ndarray:
     return move(video, times).states
 
 
-@pytest.mark.parametrize("drag", [0.01, 0.4])
+@pytest.mark.parametrize("drag", [pytest.param(0.01, marks=pytest.mark.slow), 0.4])
 def test_friction_and_drag_stop_a_body_as_in_closed_form(drag: float) -> None:
     video = sliding((0, 0, 0.6, 0.8), friction=0.06, laws=Laws(drag=drag))
     expected = [base_motion(np.array([0, 0, 0.6, 0.8]), 0.06, drag, time) for time in TIMES]

@@ -77,6 +77,7 @@ def test_a_tilt_is_named_and_left_out_videos_are_predicted_better(tilted: tuple[
     assert sum(one > 0 for one in gain.by_video.values()) >= 2
 
 
+@pytest.mark.slow
 def test_the_extended_model_believes_what_the_videos_say(tilted: tuple[Truth, Finding], tmp_path: Path) -> None:
     truth, finding = tilted
     laws = truth.videos[0].laws
@@ -93,6 +94,7 @@ def test_the_extended_model_believes_what_the_videos_say(tilted: tuple[Truth, Fi
     assert {one.name: one for one in read.parameters} == {one.name: one for one in finding.extended.parameters}
 
 
+@pytest.mark.slow
 def test_among_all_causes_of_the_catalogue_dropped_frames_are_named(tmp_path: Path) -> None:
     truth, finding = finding_of(tmp_path, ["frames_dropped_often"], seed=2, setting=PAIRS)
     assert finding.verdict is Verdict.NAMED
@@ -104,6 +106,7 @@ def test_among_all_causes_of_the_catalogue_dropped_frames_are_named(tmp_path: Pa
     assert interval.q025 < 1 / truth.videos[0].frame_rate < interval.q975
 
 
+@pytest.mark.slow
 def test_restitution_by_speed_is_named_from_six_contacts(tmp_path: Path) -> None:
     """What it does is nearly what the middle of restitutions does, which is learned from the same contacts."""
     truth, finding = finding_of(
@@ -178,6 +181,7 @@ def test_with_no_cause_to_look_for_what_is_wrong_is_unknown(tmp_path: Path) -> N
     assert finding.extended.effects == finding.model.effects
 
 
+@pytest.mark.slow
 def test_two_causes_are_both_found(tmp_path: Path) -> None:
     truth, finding = finding_of(
         tmp_path, ["surface_tilt", "linear_drag"], seed=1, effect_size=5.0, setting=PAIRS, catalogue=SMOOTH
@@ -188,6 +192,7 @@ def test_two_causes_are_both_found(tmp_path: Path) -> None:
     assert finding.gain.elpd_difference > gain_needed(len(SMOOTH))
 
 
+@pytest.mark.slow
 def test_what_has_no_name_ends_as_unknown(tmp_path: Path) -> None:
     _, finding = finding_of(tmp_path, ["shaking"], seed=1, effect_size=6.0, setting=PAIRS, catalogue=SMOOTH)
     assert finding.verdict is Verdict.UNKNOWN

@@ -398,6 +398,7 @@ def test_a_video_searched_anew_may_share_a_number_that_no_other_one_has(
     assert found is lacking or ANGULAR_DRAG.name in found.joint.numbers.names
 
 
+@pytest.mark.slow
 def test_a_kick_that_can_be_in_one_place_only_acts_there() -> None:
     """A single place is no choice among several, whose logarithm was taken for that nothing happens."""
     _, fit = fitted("external_impulse", 3.0, seed=2)

@@ -4,7 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from vrdp_prob.discovery.discover import _from_first_frames, _in_motion, _limits, _not_asked, _not_explained
+from vrdp_prob.discovery.discover import _from_first_frames, _in_motion
+from vrdp_prob.discovery.notes import limits, not_asked, not_explained
 from vrdp_prob.inference import default_model
 from vrdp_prob.inference.map_fit import MapFit, fit_map
 from vrdp_prob.scene import Body, Shape, Tracks
@@ -17,23 +18,23 @@ def _tracks(video: str, step: float, *, start: float = 0.0) -> Tracks:
 
 
 def test_nothing_limits_ordinary_tracks() -> None:
-    assert _limits([_tracks("v", 0.04), _tracks("w", 0.04)]) == []
+    assert limits([_tracks("v", 0.04), _tracks("w", 0.04)]) == []
 
 
 def test_what_is_true_of_some_videos_is_told_of_these() -> None:
-    (sentence,) = _limits([_tracks("v", 0.04), _tracks("w", 33.0)])
+    (sentence,) = limits([_tracks("v", 0.04), _tracks("w", 33.0)])
     assert sentence.startswith("w: Frames are 33 s apart")
     assert "see whether times are in s" in sentence
 
 
 def test_what_is_true_of_all_is_told_once() -> None:
-    assert _limits([_tracks("v", 0.04, start=1.7e9), _tracks("w", 0.04, start=1.8e9)]) == [
+    assert limits([_tracks("v", 0.04, start=1.7e9), _tracks("w", 0.04, start=1.8e9)]) == [
         "Times are counted from the first frame, since they began long after their zero."
     ]
 
 
 def test_of_a_limit_that_many_videos_have_one_is_told() -> None:
-    (sentence,) = _limits([_tracks("u", 2.0), _tracks("v", 0.04), _tracks("w", 33.0), _tracks("x", 0.5)])
+    (sentence,) = limits([_tracks("u", 2.0), _tracks("v", 0.04), _tracks("w", 33.0), _tracks("x", 0.5)])
     assert sentence.startswith("u (and two other videos alike): Frames are 2 s apart")
 
 
@@ -63,12 +64,12 @@ def _fit(video: str, residual_sd: float) -> MapFit:
 
 def test_videos_that_are_not_explained_are_told_of() -> None:
     fine, off, worst = _fit("u", 1.2e-3), _fit("v", 4e-3), _fit("w", 0.25)
-    assert _not_explained([fine]) == []
-    (sentence,) = _not_explained([fine, off])
+    assert not_explained([fine]) == []
+    (sentence,) = not_explained([fine, off])
     assert sentence.startswith(
         "What is seen in v is not explained: after the best fit positions are off by 0.004 m, 4 "
     )
-    (sentence,) = _not_explained([fine, off, worst])
+    (sentence,) = not_explained([fine, off, worst])
     assert sentence.startswith(
         "What is seen in 2 of the 3 videos is not explained: after the best fit positions are off "
     )
@@ -77,11 +78,11 @@ def test_videos_that_are_not_explained_are_told_of() -> None:
 
 def test_what_only_some_videos_tell_is_not_asked_and_that_is_told() -> None:
     plain, other = _tracks("v", 0.04), _tracks("w", 0.04)
-    assert _not_asked([plain, other]) == []
+    assert not_asked([plain, other]) == []
     angles = np.zeros((40, 1))
     turning = Tracks.from_arrays("x", plain.bodies, plain.times, plain.positions, angles=angles)
-    (sentence,) = _not_asked([plain, turning])
+    (sentence,) = not_asked([plain, turning])
     assert sentence.startswith("Whether the motion depends on spin is not asked, since v does not tell the angles")
     heavy = replace(plain, bodies=(replace(plain.bodies[0], mass=1.0),))
-    (sentence,) = _not_asked([heavy, other])
+    (sentence,) = not_asked([heavy, other])
     assert "the masses of some bodies only are stated" in sentence

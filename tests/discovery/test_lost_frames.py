@@ -29,6 +29,7 @@ def test_the_lost_time_is_that_of_the_truth(found: tuple[Trial, Trial]) -> None:
     assert np.mean([abs(one.mean - strength) < 4 * one.sd for one in lost]) > 0.5
 
 
+@pytest.mark.slow
 def test_the_time_of_the_loss_is_told_with_the_interval_between_two_frames(found: tuple[Trial, Trial]) -> None:
     _, trial = found
     values = {name: one for name, one in estimates(trial.fit, ClockError()).items() if name.startswith("lost_at")}

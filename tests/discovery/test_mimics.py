@@ -61,6 +61,7 @@ def test_some_of_many_videos_are_asked_what_follows_the_grain_of_a_table(monkeyp
     assert found.best is found.base
 
 
+@pytest.mark.slow
 def test_models_beside_which_laws_are_put_are_those_of_some_of_many_videos(monkeypatch: pytest.MonkeyPatch) -> None:
     found = search_that_found(SurfaceTilt(), "surface_tilt", 5.0, SMALL)
     everywhere = mimics._Models.of(found)

@@ -1,6 +1,7 @@
 """What is local is begun at several sizes."""
 
 import numpy as np
+import pytest
 
 from tests.discovery.fitted import fitted
 from tests.discovery.scenes import Setting
@@ -11,6 +12,7 @@ from vrdp_prob.discovery.selection.trials import Trial
 from vrdp_prob.models.effects.friction_patch import FrictionPatch
 
 
+@pytest.mark.slow
 def test_a_patch_is_begun_at_another_size_that_explains_as_much() -> None:
     data, fit = fitted("friction_patch", 3.0, seed=3, setting=Setting(videos=6, bodies=3))
     base = Trial((), fit)

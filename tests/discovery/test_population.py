@@ -7,7 +7,8 @@ import pytest
 
 from tests.discovery.fitted import fitted
 from tests.discovery.scenes import Setting
-from vrdp_prob.inference.several_videos.learned import believing, learned_model
+from vrdp_prob.inference.several_videos.beliefs import believing
+from vrdp_prob.inference.several_videos.learned import learned_model
 from vrdp_prob.inference.several_videos.population import with_learned_population
 from vrdp_prob.models.effects.material_friction import MATERIAL_RATIO, MaterialFriction
 from vrdp_prob.models.parameters import AIR_DRAG, MASS, RESTITUTION, SLIDING_FRICTION, WALL_RESTITUTION

@@ -37,6 +37,7 @@ def test_what_is_found_in_some_videos_is_told_of_all(tmp_path: Path) -> None:
     assert not any("looked for in" in note for note in all_six.notes)
 
 
+@pytest.mark.slow
 def test_what_shows_in_other_videos_alone_is_no_cause_but_told_of(tmp_path: Path) -> None:
     found = found_in(tmp_path, ["external_impulse"], seed=4, searched=3)
     assert found.verdict is Verdict.UNKNOWN

@@ -1,5 +1,7 @@
 """Contacts that spring back across are found beside friction in contacts."""
 
+import pytest
+
 from tests.discovery.fitted import fitted
 from tests.discovery.scenes import Setting
 from vrdp_prob.discovery.candidates.scores import score_causes
@@ -15,6 +17,7 @@ TRUE = 0.6
 MANY = Setting(videos=5, bodies=4, frames=70)
 
 
+@pytest.mark.slow
 def test_what_friction_leaves_where_contacts_spring_back_is_found_and_measured() -> None:
     data, base = fitted("springing_contacts", 10.0, seed=2, setting=MANY)
     rubbing = fit_together(data.tracks, model=base.model.with_effect(ContactFriction()), model_error=False)

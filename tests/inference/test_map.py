@@ -94,6 +94,7 @@ def test_an_error_of_which_its_own_fit_shows_nothing_is_none(monkeypatch: pytest
     assert fit.log_density == pytest.approx(plain.log_density)
 
 
+@pytest.mark.slow
 def test_alternatives_find_a_contact_that_one_start_misses() -> None:
     _, greedy = fitted(14, GROWING)
     assert not greedy.succeeded

@@ -21,7 +21,7 @@ from vrdp_prob.progress import ProgressDisplay
 
 MIMIC = 0.5
 """Probability that a cause only follows something outside the catalogue, where something outside it is at work."""
-EXPLAINED, MENDED = 0.5, 0.6
+SHARE_EXPLAINED, SHARE_MENDED = 0.5, 0.6
 """Share of what the model left unexplained beyond the noise, and of the checks that failed, that the named causes must
 explain for them to be the verdict where something is left."""
 LEAST_SHARE = 0.01
@@ -157,8 +157,8 @@ def _verdict(found: Search, before: Sequence[Check], after: Sequence[Check]) -> 
     left = something_left(after)
     if not found.best.causes:
         return Verdict.UNKNOWN if left or _loses_any(found.base) else Verdict.NONE
-    explained = _excess(found.best) <= (1 - EXPLAINED) * _excess(found.base)
-    mended = _failing(after) <= (1 - MENDED) * _failing(before)
+    explained = _excess(found.best) <= (1 - SHARE_EXPLAINED) * _excess(found.base)
+    mended = _failing(after) <= (1 - SHARE_MENDED) * _failing(before)
     return Verdict.UNKNOWN if left and not (explained and mended) else Verdict.NAMED
 
 

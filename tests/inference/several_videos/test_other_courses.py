@@ -10,8 +10,9 @@ from tests.inference.several_videos.videos import sliding
 from vrdp_prob.inference.map_fit import MapFit
 from vrdp_prob.inference.several_videos import fitting, second_look
 from vrdp_prob.inference.several_videos.fitting import SharedFit, fit_together
-from vrdp_prob.models.parameters import SLIDING_FRICTION
+from vrdp_prob.models.parameters import GRAVITY, SLIDING_FRICTION, WALL_RESTITUTION, belief_key
 from vrdp_prob.models.physics import PhysicsModel
+from vrdp_prob.scene import Body, Shape, Tracks, Wall
 
 
 def _fit(log_density: float) -> SharedFit:
@@ -42,6 +43,31 @@ def test_where_nobody_is_trusted_nothing_is_told(monkeypatch: pytest.MonkeyPatch
     assert told().beliefs["sliding_friction"].prior.sd < 0.5 * SLIDING_FRICTION.prior.sd
     monkeypatch.setattr(second_look, "trusted", lambda fits: [index != 1 for index in range(len(fits))])
     assert told() is fit.model
+
+
+def _against_a_wall(seed: int, restitution: float = 0.7) -> Tracks:
+    """A disc that slides against a wall and back, in closed form."""
+    generator = np.random.default_rng(seed)
+    radius, braking, speed = 0.2, 0.06 * GRAVITY, generator.uniform(1.5, 2.0)
+    times = np.arange(40) / 25
+    hit = (speed - np.sqrt(speed**2 - 2 * braking)) / braking
+    since = np.maximum(times - hit, 0.0)
+    back = restitution * (speed - braking * hit)
+    since = np.minimum(since, back / braking)
+    forth = speed * np.minimum(times, hit) - braking * np.minimum(times, hit) ** 2 / 2
+    places = np.stack([forth - back * since + braking * since**2 / 2, np.zeros_like(times)], axis=-1)
+    seen = places[:, None] + generator.normal(scale=0.003, size=(len(times), 1, 2))
+    wall = Wall(1.0 + radius, -3.0, 1.0 + radius, 3.0, None)
+    bodies = (Body("disc", Shape.CYLINDER, radius),)
+    return Tracks.from_arrays(f"wall {seed}", bodies, times, seen, walls=(wall,))
+
+
+def test_what_others_say_of_a_wall_is_told_with_what_they_say_of_the_table() -> None:
+    fit = fit_together([_against_a_wall(seed) for seed in (1, 2, 3)], model=PhysicsModel.base(), model_error=False)
+    told = second_look._told(fit.fits, fit.structures, fit.model, None, [0, 1], islands=False)
+    name = belief_key(*fit.joint.numbers.keys[0])
+    assert told.beliefs[name].prior.mean == pytest.approx(fit.joint.gaussian.mean[0], abs=1e-3)
+    assert told.beliefs[name].prior.mean > WALL_RESTITUTION.prior.mean + 0.03  # bodies, too, take part of what is lost
 
 
 @pytest.mark.parametrize(

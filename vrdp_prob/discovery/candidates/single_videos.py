@@ -26,7 +26,7 @@ NEARLY, MOST_TOLD = 0.6, 2
 """Share of the gain of the first from which another cause is told of, too, and number of causes that are."""
 FAR_BEHIND = 0.3
 """Share of the gain of the first, which explains most, below which a cause is not tried in a further video."""
-EXPLAINED = 1.1
+EXPLAINS = 1.1
 """Residuals in units of the noise up to which a cause explains a video; no further ones are tried then."""
 CONTACT_HOOKS = (
     "tangential_impulse",
@@ -162,7 +162,7 @@ class _Searches:
             if plain:
                 self._before[video] = fits.pop(0).modes[0].log_density
             before = self._before[video]
-            told = [_Found(max(one.modes[0].log_density - before, 0.0), one.misfit.ratio < EXPLAINED) for one in fits]
+            told = [_Found(max(one.modes[0].log_density - before, 0.0), one.misfit.ratio < EXPLAINS) for one in fits]
             found += zip(some, told, strict=True)
             if any(one.explains for one in told):
                 break

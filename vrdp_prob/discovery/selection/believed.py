@@ -9,7 +9,7 @@ from vrdp_prob.discovery.candidates.scores import happens_once
 from vrdp_prob.discovery.selection.estimates import widened
 from vrdp_prob.discovery.selection.reach import reaches
 from vrdp_prob.discovery.selection.trials import Trial
-from vrdp_prob.inference.several_videos.learned import believing
+from vrdp_prob.inference.several_videos.beliefs import believing
 from vrdp_prob.inference.several_videos.population import shared_sd, with_learned_population
 from vrdp_prob.models.physics import PhysicsModel
 

@@ -51,7 +51,7 @@ SPREAD_ROUNDS = 3
 PATCHED = 0.5
 """Share of the videos with a cause that happens once from which on, if they stray still or it comes with a contact, it
 explains none of them."""
-MOVED = 1e-3
+ALIKE_BY_CHANCE = 1e-3
 """Probability that lateness of neighbouring frames is so much alike by chance, below which it is none."""
 FELL = 5.0
 """Nats by which a video may be less probable with one more cause; beyond that it has lost its course of events."""
@@ -312,7 +312,7 @@ class Trial:
         late as their neighbours are stand for motion along the paths.
         """
         if cause.overrides("frame_jitter"):
-            return alike_in_neighbours(self.fit) < MOVED
+            return alike_in_neighbours(self.fit) < ALIKE_BY_CHANCE
         if not happens_once(cause):
             return False
         acting = self.acting(cause)

@@ -34,7 +34,7 @@ LARGEST = 2.0
 """Change of a logarithm beyond which the ridge is followed no further."""
 WORTHWHILE = 0.2
 """Nats by which the density one standard deviation along the ridge has to be higher than without the map..."""
-LOST = 20.0
+DEEPEST = 20.0
 """...where what lies deeper below the mode counts as so deep, lest one place with no hope decide."""
 
 
@@ -80,7 +80,7 @@ class ContactRidge:
         ends = gaussian.points(np.concatenate([along, -along]))
         middle = robust_cost(residuals(gaussian.mean[None]), None)
         bent, unbent = (
-            np.minimum(robust_cost(residuals(one), None) - middle, LOST).mean()
+            np.minimum(robust_cost(residuals(one), None) - middle, DEEPEST).mean()
             for one in (self.bent(torch.from_numpy(ends)).numpy(), ends)
         )
         return bool(bent < unbent - WORTHWHILE)

@@ -43,7 +43,7 @@ MOST_UNREFINED = 2
 """...at most so often in a row."""
 WORSE = 1.3
 """A window whose new frames fit worse than this gets fresh candidates."""
-EXPLAINED = 1.3
+EXPLAINS_SO_FAR = 1.3
 """A fit explains the frames so far up to this factor on the cost that noise alone would make."""
 GOOD_FIT = 1.1
 """No further candidate is refined once the mean squared residual is below this (in units of the noise)."""
@@ -173,7 +173,7 @@ class GrowingFit:
         expected = self.expected_cost(frame_count)
         self.hypotheses = [
             replace(
-                one, point=turned_least(self.likelihood, one.point), explains=one.cost < EXPLAINED * expected
+                one, point=turned_least(self.likelihood, one.point), explains=one.cost < EXPLAINS_SO_FAR * expected
             ).noted(end)
             for one in kept
         ]

@@ -33,7 +33,7 @@ TOO_DEAR = 2.0
 looked at."""
 MOVED, MOST_HELD = 0.5, 2
 """Standard deviations by which a common step has to move a number for that to be held instead, and how many are."""
-FELL = 2.0
+LEFT_RIDGE = 2.0
 """Nats that a video may lose on the way along its ridge before it is taken to have left it over an edge."""
 
 
@@ -249,7 +249,7 @@ def _followed(
     def found(index: int) -> Float[np.ndarray, "_"]:
         video, own = ridges.videos[index], state.locals[index]
         found = ridges.end(index, state.shared, own, target)
-        if around is None or video.value(target, found) > state.values[index] - FELL:
+        if around is None or video.value(target, found) > state.values[index] - LEFT_RIDGE:
             return found
         expected = own + around[index].slope @ (target - state.shared)
         return best_of_cloud(video, target, expected, around[index].local_root, found)

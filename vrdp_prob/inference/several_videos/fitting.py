@@ -224,11 +224,14 @@ class SharedFit:
             joint.gaussian.mean,
             [joint.gaussian.locals[index].centre for index in others],
         )
-        points = {index: rest.point(place) for place, index in enumerate(others)}
         settled = [
-            replace(fit, modes=(replace(fit.modes[0], point=points.get(index, joint.point(index))),))
+            replace(fit, modes=(replace(fit.modes[0], point=joint.point(index)),))
             for index, fit in enumerate(self.fits)
         ]
+        for place, index in enumerate(others):
+            fit, point = self.fits[index], rest.point(place)
+            misfit = judge(rest.videos[place].likelihood, point, fit.clues)
+            settled[index] = replace(fit, modes=(replace(fit.modes[0], point=point),), misfit=misfit)
         fits = look_again(
             settled,
             lost,

@@ -21,7 +21,7 @@ from vrdp_prob.inference.several_videos.climb_state import EXPECTED, TOLERANCE, 
 from vrdp_prob.inference.several_videos.joint_fit import JointFit, expand_all
 from vrdp_prob.inference.several_videos.linking import LinkedVideo, SharedNumbers
 
-SEARCHES = 8
+ROUNDS = 8
 """Searches, each in units of the Gaussian around the end of the one before, until one gains next to nothing..."""
 ITERATIONS, MEMORY = 100, 20
 """...of so many steps at most, which remember so many before them..."""
@@ -113,7 +113,7 @@ def climb_by_gradient(
     if not np.isfinite(value):
         raise state.impossible(videos)
     slopes, ended = expand_all(numbers, videos, shared, locals_), False
-    for _ in range(SEARCHES):
+    for _ in range(ROUNDS):
         gaussian = slopes.gaussian(shared, locals_, numbers.logarithms)
         units = _Whitened(numbers, videos, gaussian, FAILED - value)
         result = minimize(

@@ -14,8 +14,8 @@ from vrdp_prob.inference.map_fit import MapFit, NoWorldError, fit_map
 from vrdp_prob.inference.runs.parallel import in_processes
 from vrdp_prob.inference.search.plan import IN_DOUBT, TURNING, FitPlan, Optimiser
 from vrdp_prob.inference.several_videos.agreement import consensus
+from vrdp_prob.inference.several_videos.beliefs import believing
 from vrdp_prob.inference.several_videos.parts import carried_starts, link_fits, plain_likelihood, stream
-from vrdp_prob.models.parameters import Prior, Scope
 from vrdp_prob.models.physics import PhysicsModel
 from vrdp_prob.models.unknowns import Held, Structure, structure_of
 
@@ -39,7 +39,7 @@ SAME = 0.01
 """Fits whose residuals differ by a smaller share are taken for the same one, and unless they are far worse than those
 of other videos no further one is looked for in the same way: with what the others say, or without, since what they say
 may be wrong where cubes whose yaws nobody measured are on wrong islands."""
-FELL = 20.0
+LESS_PROBABLE = 20.0
 """Nats by which a fit may be less probable than the one it replaces: residuals of a video that has gone astray
 altogether count as outliers, and what is left looks small."""
 WIDER, LEAST_SD = 2.0, 0.02
@@ -305,7 +305,7 @@ class _Look:
             return
         gained = one.best.misfit.residual_sd / found.misfit.residual_sd - 1
         better_from = -SAME if self.yielding else SAME
-        if gained > better_from and found.log_density > one.best.log_density - FELL:
+        if gained > better_from and found.log_density > one.best.log_density - LESS_PROBABLE:
             structure = structure_of(found.likelihood.coordinates, one.doubted.held)
             likelihood = plain_likelihood(found.clues, self.model, structure)
             one.best = one.better = replace(found, likelihood=likelihood)
@@ -356,7 +356,7 @@ def _told(
     *,
     islands: bool,
 ) -> PhysicsModel:
-    """The model with what those videos that are asked, and trusted, say of shared parameters as their prior.
+    """The model with what those videos that are asked, and trusted, say of what all share as its prior.
 
     Where none of them is trusted it stays as it is.
     """
@@ -366,11 +366,4 @@ def _told(
     if not any(believed):
         return model
     found = consensus(numbers, videos, points, believed, islands=islands)
-    known = dict(zip(numbers.keys, zip(found.mean, found.sd, strict=True), strict=True))
-    beliefs = {}
-    for parameter in model.parameters:
-        place = known.get((parameter.name, ()))
-        if parameter.scope is Scope.SHARED and place is not None:
-            sd = min(max(WIDER * place[1], LEAST_SD), parameter.prior.sd)
-            beliefs[parameter.name] = replace(parameter, prior=Prior(float(place[0]), float(sd)))
-    return PhysicsModel(model.name, model.effects, {**model.beliefs, **beliefs})
+    return believing(model, numbers.keys, found.mean, np.maximum(WIDER * found.sd, LEAST_SD))

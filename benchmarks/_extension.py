@@ -15,6 +15,7 @@ from vrdp_prob.discovery.page.document import write_finding
 from vrdp_prob.files import write_atomically
 from vrdp_prob.inference import default_model
 from vrdp_prob.inference.map_fit import fit_map
+from vrdp_prob.inference.runs.parallel import several_processes
 from vrdp_prob.inference.several_videos import SharedFit, fit_together, learned_model
 from vrdp_prob.models.physics import PhysicsModel
 from vrdp_prob.progress import progress_display
@@ -47,7 +48,8 @@ def learned_base(training: Sequence[Tracks], folder: Path) -> Learned:
     """What some videos tell under the default model; the fit is kept in a folder."""
 
     def found() -> SharedFit:
-        return fit_together(training, model=default_model(), seed=0, progress=progress_display(quiet=False))
+        with several_processes(None):
+            return fit_together(training, model=default_model(), seed=0, progress=progress_display(quiet=False))
 
     fit = _kept(folder / "base.pickle", found)
     return Learned(fit, learned_model(fit))

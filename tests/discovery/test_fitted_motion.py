@@ -66,6 +66,13 @@ def test_a_push_is_a_tilt_of_the_table(video: int) -> None:
         assert off(scale * motion.pushed(push)[..., :2, 0], expected[..., :2]) < 0.03
 
 
+def test_where_nothing_is_asked_for_nothing_is_changed() -> None:
+    """As of accelerations where frames lie too far apart for any stretch of a path to hold several of them."""
+    motion = motions()[0][2]
+    none = motion.pushed(np.zeros((*motion.velocity.shape, 0)))
+    assert none.shape == (*motion.speed.shape, 3, 0)
+
+
 def test_grown_radii_change_the_motion_as_larger_ones_do() -> None:
     for likelihood, point, motion in motions():
         ends = []

@@ -18,6 +18,7 @@ from vrdp_prob.models.effects.contact_radius_error import ContactRadiusError
 from vrdp_prob.models.effects.effect import Effect
 from vrdp_prob.models.effects.external_impulse import ExternalImpulse
 from vrdp_prob.models.effects.lens_distortion import LensDistortion
+from vrdp_prob.models.effects.slip_to_roll import SlipToRoll
 from vrdp_prob.models.effects.surface_tilt import SurfaceTilt
 
 RADIUS, LENS = ContactRadiusError.name, LensDistortion.name
@@ -272,6 +273,29 @@ def test_a_cause_with_which_no_joint_world_can_begin_is_left_out(monkeypatch: py
     trial = refit_with("", 0.0)
     trial.choices, trial.names, trial.fit = {}, (), Mock(fits=[], model=Mock(effects=()))
     assert refits_with()._lost(trial, []) == []
+
+
+@pytest.mark.parametrize(
+    ("brought", "second", "begun"),
+    [(600.0, 384.0, 1), (600.0, 566.0, 2), (500.0, 384.0, 2), (None, 384.0, 2)],
+    ids=["kept", "kept, and another promises as much", "not kept", "no world in common"],
+)
+def test_where_one_brings_what_it_promised_no_other_that_promised_less_is_fitted_from_the_beginning(
+    brought: float | None, second: float, begun: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    slip, radius = refit_with("slip", 0.0), refit_with("radius", 0.0)
+    slip.brought.return_value, radius.brought.return_value = brought, 400.0
+    made = Mock(side_effect=[None if brought is None else slip, radius])
+    told = [((SlipToRoll(),), 572.0), ((ContactRadiusError(),), second)]
+    monkeypatch.setattr(Extensions, "from_the_beginning", lambda _self, *asked: made(*asked))
+    monkeypatch.setattr(refits, "lost_videos", lambda _fit: [0])
+    monkeypatch.setattr(refits, "causes_of_lost_videos", lambda *_given, **_named: told)
+    monkeypatch.setattr(Leavings, "of", lambda _self, _trial: Mock(scores=()))
+    trial = refit_with("", 0.0)
+    trial.choices, trial.names, trial.fit = {}, (), Mock(fits=[], model=Mock(effects=()))
+    expected = [radius] if brought is None else [slip, radius][:begun]
+    assert refits_with(needed=6.0)._lost(trial, []) == expected
+    assert made.call_count == begun
 
 
 @pytest.mark.parametrize(("causes", "single"), [("", True), ("", False), ("tilt", False)])

@@ -175,7 +175,7 @@ class FittedMotion:
         change = np.zeros_like(half)
         for frame, node in enumerate(self.nodes[1:], start=1):
             span = self.times[frame] - self.times[node]
-            before = (change[node] + span * half[node]).reshape(-1, count)
+            before = (change[node] + span * half[node]).reshape(len(self.steps[frame]), count)
             change[frame] = (self.steps[frame] @ before).reshape(change[frame].shape) + span * half[frame]
         return change[:, :, SEEN]
 
@@ -189,9 +189,8 @@ class FittedMotion:
         begin = waiting[np.minimum(np.searchsorted(self.times[waiting[:-1]], kicks.times), len(waiting) - 1)]
         for frame, node in enumerate(self.nodes):
             if frame:
-                change[frame] = (self.steps[frame] @ change[node].reshape(len(self.steps[frame]), -1)).reshape(
-                    change[frame].shape
-                )
+                before = change[node].reshape(len(self.steps[frame]), -1)
+                change[frame] = (self.steps[frame] @ before).reshape(change[frame].shape)
             for kick in np.flatnonzero((kicks.times <= self.times[frame]) & (begin >= frame)):
                 since = self.times[frame] - kicks.times[kick]
                 change[frame, kicks.bodies[kick], PLACES] += moves[kick] + since * changes[kick]

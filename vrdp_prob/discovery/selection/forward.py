@@ -8,7 +8,7 @@ import numpy as np
 
 from vrdp_prob.discovery.candidates.scores import mends_any_course
 from vrdp_prob.discovery.selection.beginning import Beginning
-from vrdp_prob.discovery.selection.gains import gain, merit
+from vrdp_prob.discovery.selection.gains import OUT_OF_REACH, gain, merit
 from vrdp_prob.discovery.selection.leavings import Leavings, Left
 from vrdp_prob.discovery.selection.lesser_models import LesserModels
 from vrdp_prob.discovery.selection.refits import Refits
@@ -24,8 +24,6 @@ COURSES_LEFT = (
 )
 TRIFLING = 0.1
 """Share of what a model lacks that a better course must bring for causes to be looked for once more."""
-OUT_OF_REACH = 2.0
-"""Gain, in those that are needed, by which a cause is ahead of others for none of them to be as probable as it is."""
 MOSTLY = 0.5
 """Share of what a cause brings that is brought in one video if it may be a course of events there."""
 

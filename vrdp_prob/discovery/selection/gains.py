@@ -7,6 +7,9 @@ from jaxtyping import Float
 
 from vrdp_prob.discovery.selection.trials import Trial
 
+OUT_OF_REACH = 2.0
+"""Gain, in those that are needed, by which a cause is ahead of others for none of them to be as probable as it is."""
+
 
 def merit(trial: Trial, overdispersion: Float[np.ndarray, "video"] | None = None) -> float:
     """By which models are ordered: what they predict of left-out videos, less what their causes are believed less.

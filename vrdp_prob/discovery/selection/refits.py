@@ -15,7 +15,7 @@ from vrdp_prob.discovery.checks.false_discovery import something_left
 from vrdp_prob.discovery.selection.courses import Courses
 from vrdp_prob.discovery.selection.doubts import HELD_BY_BODIES, causes_with_own_check_failing
 from vrdp_prob.discovery.selection.extensions import Extensions, explaining
-from vrdp_prob.discovery.selection.gains import gain, merit, weights
+from vrdp_prob.discovery.selection.gains import OUT_OF_REACH, gain, merit, weights
 from vrdp_prob.discovery.selection.leavings import Leavings
 from vrdp_prob.discovery.selection.shortlist import CLOSE, SHORTLIST_LEVEL, lasting, shortlist
 from vrdp_prob.discovery.selection.trials import Trial
@@ -322,7 +322,8 @@ class Refits:
         """Fits from the beginning, with causes that explain videos whose course of events nothing else explains.
 
         Kicks in several videos explain none of them: they mend any course. What acts in all videos, and is missed in
-        single ones alone, has to explain them.
+        single ones alone, has to explain them. Where one brings all videos what it promised in single ones, another
+        that promised far less is none to begin with.
         """
         if trial.choices:
             return []
@@ -334,8 +335,17 @@ class Refits:
         lost = [one for one in lost_videos(trial.fit.fits) if one in still_lost]
         must = bool(trial.causes) or loses_single_videos(trial.fit.fits)
         told = causes_of_lost_videos(trial.fit, lost, left, likely, self.needed, seed=self.seed, must_explain=must)
-        again = [causes for causes, promised in told if len(causes) > 1 or reached.get(causes[0].name, 0.0) < promised]
-        return [one for causes in again if (one := self.extensions.from_the_beginning(trial, causes)) is not None]
+        fits: list[Trial] = []
+        kept = 0.0
+        for causes, promised in told:
+            if promised < kept - OUT_OF_REACH * self.needed:
+                continue
+            brought = reached.get(causes[0].name, 0.0) if len(causes) == 1 else 0.0
+            if brought < promised and (begun := self.extensions.from_the_beginning(trial, causes)) is not None:
+                fits.append(begun)
+                brought = begun.brought(trial)
+            kept = max(kept, promised) if brought >= promised else kept
+        return fits
 
     def doubted(self, trial: Trial, lesser: Trial, divisor: Float[np.ndarray, "video"]) -> bool:
         """Whether a cause brings too little, or in too few of the videos that could have been drawn, or may be nothing.

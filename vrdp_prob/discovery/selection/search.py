@@ -8,8 +8,8 @@ from jaxtyping import Float
 
 from vrdp_prob.discovery.selection.beginning import Beginning
 from vrdp_prob.discovery.selection.comparison import Comparison
-from vrdp_prob.discovery.selection.forward import OUT_OF_REACH, ForwardSelection
-from vrdp_prob.discovery.selection.gains import gain, merit
+from vrdp_prob.discovery.selection.forward import ForwardSelection
+from vrdp_prob.discovery.selection.gains import OUT_OF_REACH, gain, merit
 from vrdp_prob.discovery.selection.leavings import Left
 from vrdp_prob.discovery.selection.lesser_models import LesserModels
 from vrdp_prob.discovery.selection.refits import Refits

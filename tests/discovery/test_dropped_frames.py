@@ -117,6 +117,7 @@ def test_the_fit_finds_those_that_tracks_do_not_show_and_explains_the_rest(found
         assert places <= set(np.round(true_places(hidden(1), index), 6))
 
 
+@pytest.mark.slow
 def test_it_explains_every_video_and_is_gone_without_the_cause(found: tuple[Trial, Trial]) -> None:
     _, trial = found
     (cause,) = trial.causes

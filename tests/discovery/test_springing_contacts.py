@@ -33,6 +33,7 @@ def test_what_friction_leaves_where_contacts_spring_back_is_found_and_measured()
     assert abs(found.mean - TRUE) < 3 * found.sd  # one of two tops, within a nat of each other
 
 
+@pytest.mark.slow
 def test_it_is_looked_for_beside_friction_in_contacts_alone() -> None:
     _, fit = fitted("springing_contacts", 10.0, seed=2, setting=MANY)
     springing = TangentialRestitution()
